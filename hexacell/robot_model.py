@@ -16,6 +16,12 @@ from hexacell.controller_config.interface import ConfigFormat, ControllerGeometr
 from hexacell.errors import FileError, UsageError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
+from hexacell.identification.identified_zeros import (
+    HeldParameters,
+    IdentifiedZeros,
+    ParameterChoice,
+    zero_columns,
+)
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
 from hexacell.identification.solver.result import GeometryEstimate, Identification
@@ -59,6 +65,7 @@ class Robot:
         work_frame: the axes of the controller's base frame about which a work frame can be taught.
         effects: systematic ones, as they are stated of the machine.
         refused: commands that the controller refused in this run, and those that a person took out.
+        identifies: which parameters are identified.
     """
 
     mechanism: Mechanism
@@ -78,6 +85,7 @@ class Robot:
     work_frame: str = "xyz"
     effects: tuple[Effect, ...] = ()
     refused: RefusedCommands = field(default_factory=RefusedCommands)
+    identifies: ParameterChoice = ParameterChoice.ALL
 
     @cached_property
     def commanding(self) -> Geometry:
@@ -106,6 +114,26 @@ class Robot:
         """The parameters of an estimate that are outside the drawing's tolerances."""
         return tolerance_violations(found, self.mechanism, self.drawing, self.tolerances)
 
+    def identified_zeros(self, found: Identification) -> IdentifiedZeros | None:
+        """The zeros by an identification's records, where these alone are identified."""
+        if self.identifies is ParameterChoice.ALL:
+            return None
+        return IdentifiedZeros.of(found, self.controller)
+
+    @cached_property
+    def held(self) -> HeldParameters | None:
+        """What is not identified; none where all is."""
+        if self.identifies is ParameterChoice.ALL:
+            return None
+        return HeldParameters(zero_columns(self.mechanism, self.controller), self.prior.covariance)
+
+    @cached_property
+    def unknowns(self) -> int:
+        """How many parameters are identified."""
+        if self.identifies is ParameterChoice.ALL:
+            return len(self.mechanism.convention.free_names())
+        return int(zero_columns(self.mechanism, self.controller).shape[1])
+
     def problem(self, measurements: MeasurementSet) -> Problem:
         """The identification problem of records that were commanded with the controller's geometries."""
         return build_problem(
@@ -118,6 +146,7 @@ class Robot:
             provisional=self.provisional,
             earlier=self.earlier,
             systematic=RecordEffects(self.effects),
+            unknowns=self.unknowns,
         )
 
     def belief(self, identified: Identification | None = None) -> RobotBelief:
@@ -289,4 +318,5 @@ def make_robot(
         earlier=(drawn,) if taught is None else (drawn, CommandingGeometry.of(mechanism, taught)),
         work_frame=settings.task.work_frame,
         effects=stated_effects(settings),
+        identifies=(ParameterChoice.ZEROS if settings.identification.only_zeros else ParameterChoice.ALL),
     )

@@ -127,6 +127,8 @@ def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], 
         return {}
     found = identify(robot.problem(state.measurements()))
     belief = robot.belief(found)
-    budget = Task.of(settings, robot, belief).budget(found, belief, effects, robot.known_effects)
+    budget = Task.of(settings, robot, belief).budget(
+        found, belief, effects, robot.known_effects, zeros=robot.identified_zeros(found)
+    )
     columns = {} if budget is None else budget.parameter_columns
     return {name: tuple(map(tuple, each.T.tolist())) for name, each in columns.items()}

@@ -25,6 +25,7 @@ from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses, requi
 from hexacell.cell.loader import Cell
 from hexacell.errors import UsageError
 from hexacell.identification.estimator import identify
+from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.reporting.assessment import Assessment, assess
 from hexacell.robot_model import robot_of
@@ -67,12 +68,15 @@ class PlanTrial:
 
 
 def fit_measurements(
-    cell: Cell, measurements: MeasurementSet, folder: RunFolder | None = None
+    cell: Cell,
+    measurements: MeasurementSet,
+    folder: RunFolder | None = None,
+    identify_only: ParameterChoice | None = None,
 ) -> Assessment:
     """Identify the geometry of a cell's robot from records, and check it.
 
     ``folder`` is where they are kept: if it is that of a run, its journal tells what commanded them, and
-    the noise that it measured.
+    the noise that it measured. ``identify_only``: in the place of what the cell file says.
 
     Raises:
         IdentifiabilityError: the records cannot determine it.
@@ -86,6 +90,8 @@ def fit_measurements(
     if measured is not None:
         settings = with_measured_noise(settings, measured)
         robot = robot.with_errors_of(settings)
+    if identify_only is not None:
+        robot = replace(robot, identifies=identify_only)
     found = identify(robot.problem(measurements))
     return assess(settings, robot, measurements, found, measured_noise=measured)
 

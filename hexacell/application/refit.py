@@ -65,4 +65,5 @@ def _identified(cell: Cell, state: RunState) -> IdentificationResult:
     assert started is not None  # noqa: S101 - seen by the caller
     robot = started_robot(cell.settings, started)
     known = Calibration(cell.settings, robot, Mode(started.mode), accepted=started.accepted).robot_of(state)
-    return IdentificationResult.of(identify(known.problem(state.measurements())))
+    found = identify(known.problem(state.measurements()))
+    return IdentificationResult.of(found, known.identified_zeros(found))

@@ -13,6 +13,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError, LimitError, ReachError, UsageError
 from hexacell.experiment_design.predicted_records import GaugeZero, estimate_gauge_zero
 from hexacell.identification.belief import RobotBelief
+from hexacell.identification.identified_zeros import ParameterChoice, zeros_by_noise
 from hexacell.identification.solver.result import UNDETERMINED_RATIO
 from hexacell.kinematics.pose import Pose
 from hexacell.motion.path_check import is_clear
@@ -63,7 +64,7 @@ def _out_of_travel(plan: Plan, name: str, point: int, pose: Pose) -> Iterator[He
 
 def too_few_records(plan: Plan) -> Iterator[HexacellError]:
     """That points, orientations and budget give fewer equations than there are parameters."""
-    unknowns = len(plan.robot.mechanism.convention.free_names())
+    unknowns = plan.robot.unknowns
     planned = plan.forecaster.planned(CampaignState())
     equations = sum(3 * (records - 1) for records in planned.values())
     if equations >= unknowns:
@@ -209,9 +210,12 @@ def _expected_zero(plan: Plan, belief: RobotBelief, point: int) -> GaugeZero:
 def _undetermined_parameters(plan: Plan) -> Iterator[HexacellError]:
     """That even well spread poses within the limits leave many parameters as uncertain as drawn."""
     names = plan.robot.mechanism.convention.free_names()
-    before = plan.robot.prior.sigma
-    after = np.sqrt(np.diag(plan.predicted_belief().covariance))
-    rows = np.flatnonzero(after > UNDETERMINED_RATIO * before)
+    before, predicted = plan.robot.prior, plan.predicted_belief().covariance
+    after = np.sqrt(np.diag(predicted))
+    if plan.robot.identifies is not ParameterChoice.ALL:
+        information = np.linalg.inv(predicted) - before.precision
+        after = zeros_by_noise(plan.robot.mechanism, plan.robot.controller, information)
+    rows = np.flatnonzero(after > UNDETERMINED_RATIO * before.sigma)
     if len(rows) > UNDETERMINED_SHARE * len(names):
         shown = ", ".join(names[row] for row in rows[:NAMES_SHOWN])
         more = ", ..." if len(rows) > NAMES_SHOWN else ""

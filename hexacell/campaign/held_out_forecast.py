@@ -27,8 +27,11 @@ def predicted_verdicts(
 ) -> VerdictForecast | None:
     """What a run will say of healthy machines with this geometry; none where nothing can be said.
 
-    ``budget`` is that of the identification.
+    ``budget`` is that of the identification. With zeros alone the verdict is one on what is held, of which
+    nobody knows more than its tolerances.
     """
+    if plan.robot.held is not None:
+        return None
     try:
         updated = with_held_out_records(plan, found)
     except HexacellError:

@@ -18,6 +18,7 @@ from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion
 from hexacell.experiment_design.pose_selection import SelectedPose, select_from_list, select_pose
 from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.identification.belief import RobotBelief
+from hexacell.identification.identified_zeros import ParameterChoice, zero_columns
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.paths import PathPlanner, find_route
 from hexacell.robot_model import Robot
@@ -110,6 +111,9 @@ class PoseChooser:
         if name == "parameters":
             scaled = belief.basis / belief.mechanism.parameters.like_a_mm[:, None]
             return Criterion(scaled.T @ scaled)
+        if name == "information" and self.robot.identifies is not ParameterChoice.ALL:
+            columns = zero_columns(self.robot.mechanism, self.robot.controller)
+            return Criterion(columns @ columns.T)
         error = self.task.error(belief) if name == "task" else None
         return D_OPTIMAL if error is None else Criterion(error.weight())
 

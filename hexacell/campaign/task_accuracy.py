@@ -11,6 +11,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.experiment_design.candidates import workspace_poses
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.pose_accuracy import error_jacobian
+from hexacell.identification.identified_zeros import HeldParameters, IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -26,12 +27,17 @@ class TaskError:
 
     Attributes:
         jacobian: (n, 3, p) of positions, mm, without what another choice of frames would explain.
+        held: parameters that are not identified, if any: their tolerances are part of every error.
     """
 
     jacobian: Array
+    held: HeldParameters | None = None
 
     def variances(self, covariance: Array) -> Array:
-        """Mean square distances (n,), mm^2, under a covariance (p, p) of the free parameters."""
+        """Mean square distances (n,), mm^2, under a covariance (p, p) of the estimated free parameters."""
+        if self.held is not None:
+            gain = self.held.gain(self.jacobian.reshape(-1, self.jacobian.shape[-1]))
+            covariance = self.held.covariance(gain, covariance)
         squares: Array = np.einsum("nap,pq,naq->n", self.jacobian, covariance, self.jacobian, optimize=True)
         return squares
 
@@ -58,11 +64,12 @@ class Task:
     """Task poses, and poses across the workspace over which the frames are fitted.
 
     Both are in the mechanism's frame convention. Where a cell states no task poses, the workspace
-    poses are the task.
+    poses are the task. ``held`` are the parameters that are not identified.
     """
 
     poses: PoseBatch
     workspace: PoseBatch
+    held: HeldParameters | None = None
 
     @classmethod
     def of(cls, settings: CellSettings, robot: Robot, belief: RobotBelief) -> Task:
@@ -71,11 +78,11 @@ class Task:
         workspace = workspace_poses(belief, robot.frames.poses(points).positions)
         stated = robot.from_commands(Pose(*pose) for pose in settings.task.poses)
         poses = stated if len(stated) else workspace
-        return cls(poses, workspace if len(workspace) else poses)
+        return cls(poses, workspace if len(workspace) else poses, robot.held)
 
     def reachable(self, belief: RobotBelief) -> Task:
         """The poses that the estimated robot reaches."""
-        return Task(_reachable(belief, self.poses), _reachable(belief, self.workspace))
+        return Task(_reachable(belief, self.poses), _reachable(belief, self.workspace), self.held)
 
     def budget(
         self,
@@ -84,23 +91,31 @@ class Task:
         effects: Iterable[Effect],
         earlier: Mapping[str, Array] | None = None,
         scale: ScaleObservation | None = None,
+        zeros: IdentifiedZeros | None = None,
     ) -> UncertaintyBudget | None:
         """What is not known of the errors; none if the estimated robot can take no task pose.
 
-        ``earlier``, ``scale``: see :meth:`UncertaintyBudget.of`.
+        ``earlier``, ``scale``, ``zeros``: see :meth:`UncertaintyBudget.of`.
         """
         reached = self.reachable(belief)
         if not len(reached.poses) or not len(reached.workspace):
             return None
         poses, workspace = reached.poses, reached.workspace
         return UncertaintyBudget.of(
-            found, belief, effects, task=poses, workspace=workspace, earlier=earlier, scale=scale
+            found,
+            belief,
+            effects,
+            task=poses,
+            workspace=workspace,
+            earlier=earlier,
+            scale=scale,
+            zeros=zeros,
         )
 
     def error(self, belief: RobotBelief) -> TaskError | None:
         """How the error depends on the parameters; none if the estimated robot can take no task pose."""
         jacobian = self.jacobian(belief)
-        return None if jacobian is None else TaskError(jacobian[:, :3])
+        return None if jacobian is None else TaskError(jacobian[:, :3], self.held)
 
     def jacobian(self, belief: RobotBelief) -> Array | None:
         """Derivatives (n, 6, p) of positions, mm, and rotation vectors, rad, by the free parameters.

@@ -15,6 +15,7 @@ from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.cell.model import CellSettings
 from hexacell.identification.diagnostics.frame_choice import choose_frames
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
+from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.robot_model import Robot
@@ -61,8 +62,11 @@ class WrittenGeometry:
 
 
 def as_written(settings: CellSettings, robot: Robot, identified: Geometry) -> WrittenGeometry:
-    """What the controller gets of an ``identified`` geometry in the mechanism's frame convention."""
-    if robot.taught is None:
+    """What the controller gets of an ``identified`` geometry in the mechanism's frame convention.
+
+    With zeros alone it keeps its frames: other ones would change all its numbers.
+    """
+    if robot.taught is None or robot.identifies is not ParameterChoice.ALL:
         return WrittenGeometry(robot.for_controller(identified), None)
     choice = choose_frames(
         robot.mechanism,

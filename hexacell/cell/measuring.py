@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from hexacell.cell.fields import (
     NotNegative,
@@ -79,6 +79,37 @@ class IdentificationSettings(Section):
     provisional: bool = Field(
         False, description="true: write a better geometry to the controller after the first point"
     )
+    identify: tuple[Literal["all", "zeros"], ...] = Field(
+        ("all",),
+        description='["zeros"]: the encoders\' zeros alone; all else stays as the controller has it',
+    )
+
+    @field_validator("identify", mode="before")
+    @classmethod
+    def _one_word_is_a_list(cls, given: object) -> object:
+        if isinstance(given, str):
+            return (given,)
+        return tuple(given) if isinstance(given, list) else given
+
+    @property
+    def only_zeros(self) -> bool:
+        """Whether the encoders' zeros alone are identified."""
+        return self.identify == ("zeros",)
+
+    @model_validator(mode="after")
+    def _one_choice(self) -> Self:
+        if len(self.identify) != 1:
+            raise broken_rule("identify is one of all and zeros", 'Write ["zeros"], or remove it')
+        return self
+
+    @model_validator(mode="after")
+    def _zeros_alone_are_not_written_provisionally(self) -> Self:
+        if self.only_zeros and self.provisional:
+            raise broken_rule(
+                "a provisional geometry has all parameters, and zeros alone are to be identified",
+                "Remove provisional, or identify",
+            )
+        return self
 
     @model_validator(mode="after")
     def _points_are_chosen_or_listed(self) -> Self:

@@ -110,6 +110,20 @@ def _compare(told: Array, residual: Callable[[Array], Array], steps: Array, name
         np.testing.assert_allclose(told[..., column], differences, rtol=0.0, atol=limit, err_msg=words)
 
 
+def check_encoder_zeros(example: MechanismExample) -> None:
+    """A leg with a change of its zero closes with as much less on its encoder, and no other leg changes."""
+    mechanism = example.mechanism
+    for geometry in example.robots():
+        reached = example.reached(geometry)
+        poses, joints = example.poses[reached], example.joints(geometry)[reached]
+        zeros = mechanism.encoder_zeros(geometry)
+        for leg in range(6):
+            changed = Geometry(mechanism.parameters, geometry.vector + zeros[:, leg])
+            shown = joints - np.eye(6)[leg]
+            left = mechanism.residual_and_jacobian(changed, poses, shown)[0]
+            np.testing.assert_allclose(left, 0.0, atol=ROUNDING, err_msg=f"encoder zero of leg {leg + 1}")
+
+
 def check_forward(example: MechanismExample) -> None:
     """The robot goes where the inverse sends it: forward kinematics from the drawing's pose leads back."""
     for geometry in example.robots():

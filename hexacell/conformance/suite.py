@@ -15,6 +15,7 @@ from hexacell.conformance.identification_checks import check_identification
 from hexacell.conformance.kinematics_checks import (
     check_batches,
     check_derivatives,
+    check_encoder_zeros,
     check_forward,
     check_inverse,
     check_legs,
@@ -50,6 +51,10 @@ class MechanismConformance:
     def test_forward_and_inverse_agree(self) -> None:
         """For robots within the tolerances."""
         check_forward(self.example)
+
+    def test_encoder_zeros_are_changes_of_parameters(self) -> None:
+        """Which one level of identification leaves to them alone."""
+        check_encoder_zeros(self.example)
 
     def test_batches_of_geometries(self) -> None:
         """Each pose has its own."""

@@ -232,6 +232,14 @@ class Mechanism(Protocol):
         """The same machine in other frames."""
         ...
 
+    def encoder_zeros(self, geometry: Geometry) -> Array:
+        """Changes (P, 6) of the parameters that an encoder does too, which shows 1 less on each leg.
+
+        They are in the unit of the joint variables: with the change of a leg and 1 less on its encoder the
+        legs close as before, at all poses.
+        """
+        ...
+
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         """The guides on which sliders move; none for a mechanism whose words have no guide."""
         ...

@@ -227,6 +227,12 @@ class ParameterSet:
         """One kind's values ``(..., 6, c)`` or ``(..., 6)`` in vectors (..., P): a view."""
         return vector[..., self.slices[symbol]].reshape(*vector.shape[:-1], *self.shapes[symbol])
 
+    def changes(self, symbol: str, values: Array) -> Array:
+        """Changes (P, k) of all parameters by those (6, c, k) or (6, k) of one kind alone."""
+        changes = np.zeros((len(self), values.shape[-1]))
+        changes[self.slices[symbol]] = values.reshape(-1, values.shape[-1])
+        return changes
+
     def vector(self, values: Mapping[str, ArrayLike]) -> Array:
         """The vector (P,) of the values under each kind's symbol.
 

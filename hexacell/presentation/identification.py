@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from hexacell.identification.diagnostics.model_tests import contradicted_points
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.repeatability import Repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
+from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import GeometricParameter, JointUnit, ParameterUnit
@@ -30,7 +31,8 @@ def identification_report(assessed: Assessment) -> str:
         accuracy_table(assessed),
         budget_table(assessed.budget),
         _data_and_termination(found),
-        parameter_table(found, assessed.drawing),
+        _identified(assessed),
+        parameter_table(assessed.zeros or found, assessed.drawing),
         residual_line(found),
         points_line(assessed),
         noise_table(assessed.noise),
@@ -91,24 +93,38 @@ def _data_and_termination(found: Identification) -> str:
     )
 
 
-def parameter_table(found: Identification, drawing: Geometry) -> str:
+def _identified(assessed: Assessment) -> str:
+    """Which parameters are identified, where not all are."""
+    if assessed.zeros is None:
+        return ""
+    zeros, free = assessed.zeros.columns.shape[1], len(assessed.found.free)
+    return wrapped(
+        f"Identified: zeros only, {zeros} of {free}. All else is as the controller has it, and its "
+        "tolerances are its uncertainty."
+    )
+
+
+def parameter_table(found: Identification | IdentifiedZeros, drawing: Geometry) -> str:
     """One line a parameter, mm or mrad; those that the frame convention fixes are left out."""
     undetermined, parameters = set(found.undetermined), found.geometry.parameters
+    held = set() if isinstance(found, Identification) else set(parameters.names) - set(found.names)
     values = np.array([drawing.vector, found.geometry.vector, found.sigma]) / parameters.like_a_mm
     names = [_with_unit(parameter) for parameter in parameters.parameters]
     width = max(4, *map(len, names))
     lines = [
         f"{name:{width}}{old:10.3f}{new:12.3f}{new - old:+9.3f}{sigma:8.3f}  "
-        + (
-            "not determined by these data"
-            if name.split(",")[0] in undetermined
-            else _significance(new - old, sigma)
-        )
+        + _word(name.split(",")[0], undetermined, held, _significance(new - old, sigma))
         for name, (old, new, sigma) in zip(names, values.T, strict=True)
         if sigma > 0.0
     ]
     header = f"{'mm':{width}}{'drawing':>10}{'identified':>12}{'change':>9}{'sigma':>8}"
     return "\n".join([header, *lines])
+
+
+def _word(name: str, undetermined: Collection[str], held: Collection[str], otherwise: str) -> str:
+    if name in held:
+        return "not identified"
+    return "not determined by these data" if name in undetermined else otherwise
 
 
 def _with_unit(parameter: GeometricParameter) -> str:

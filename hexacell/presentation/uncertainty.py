@@ -15,10 +15,11 @@ def budget_table(budget: UncertaintyBudget | None) -> str:
         return ""
     lines = [line for line in budget.lines if max(_figures(line)) >= SMALLEST_MM]
     title = "Uncertainty at the worst task pose, mm"
+    noise = "noise, and all that is not identified" if budget.has_held else "noise of the readings"
     return "\n".join(
         [
             f"{title:44}{'size':>12}{'result':>8}{'direct':>8}{'both':>8}",
-            f"  {'noise of the readings':42}{'':12}{budget.noise_mm:8.3f}{'':8}{budget.noise_mm:8.3f}",
+            f"  {noise:42}{'':12}{budget.noise_mm:8.3f}{'':8}{budget.noise_mm:8.3f}",
             *map(_row, lines),
             f"  {'standard uncertainty (root of the squares)':70}{budget.standard_mm:8.3f}",
             f"  {_expanded(budget):70}{budget.expanded_mm:8.3f}",

@@ -18,6 +18,7 @@ from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicte
 from hexacell.identification.diagnostics.repeatability import Repeatability, repeatability
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.diagnostics.variance_components import NoiseLevels, noise_levels
+from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareVerdict
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.identification.solver.result import Identification
@@ -52,6 +53,7 @@ class Assessment:
         points: each point's records predicted by the others, where those determine the geometry.
         measured_noise: at the start of the run that took the records; none where that is not known.
         possible_causes: of residuals that are too large, the largest share first.
+        zeros: where these alone are identified; ``found`` is the estimate of all, which tests the data.
     """
 
     found: Identification
@@ -68,6 +70,12 @@ class Assessment:
     possible_causes: tuple[PossibleCause, ...] = ()
     measured_noise: MeasuredNoise | None = None
     points: tuple[PointPrediction, ...] = ()
+    zeros: IdentifiedZeros | None = None
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Of the identified parameters those that the data hardly determine."""
+        return (self.zeros or self.found).undetermined
 
     @property
     def refused(self) -> bool:
@@ -84,8 +92,9 @@ class Assessment:
     def determines_too_little(self) -> bool:
         """Whether so many parameters are as uncertain as drawn that the geometry is hardly a result."""
         free = self.found.problem.mechanism.convention.free_names()
-        unknown = set(self.found.undetermined) & set(free)
-        return len(unknown) > UNDETERMINED_SHARE * len(free)
+        unknown = set(self.undetermined) & set(free)
+        identified = free if self.zeros is None else self.zeros.names
+        return len(unknown) > UNDETERMINED_SHARE * len(identified)
 
     @property
     def improvement(self) -> ExpectedImprovement | None:
@@ -116,7 +125,9 @@ def assess(
     ``measured_noise`` is what settings and robot contain already.
     """
     left_out = {record for record, _ in found.left_out}
-    belief = robot.belief(found)
+    belief, zeros = robot.belief(found), robot.identified_zeros(found)
+    if zeros is not None:
+        belief = replace(belief, covariance=zeros.free_covariance)
     task = Task.of(settings, robot, belief)
     accuracy = predicted_accuracy(belief, task=task.poses, workspace=task.workspace)
     return Assessment(
@@ -129,11 +140,12 @@ def assess(
         task=tuple(robot.to_command(task.poses.pose(row)) for row in range(len(task.poses))),
         task_named=bool(settings.task.poses),
         accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
-        budget=task.budget(found, belief, robot.effects, robot.known_effects),
+        budget=task.budget(found, belief, robot.effects, robot.known_effects, zeros=zeros),
         tolerance_violations=robot.tolerance_violations(found.estimate),
         possible_causes=possible_causes(found) if _is_doubtful(found) else (),
         measured_noise=measured_noise,
         points=leave_one_point_out(found) if found.converged else (),
+        zeros=zeros,
     )
 
 

@@ -23,7 +23,7 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
     """What ``hexacell fit --json`` prints and ``result.json`` holds (``docs/interface.md``)."""
     found = assessed.found
     return {
-        **IdentificationResult.of(found).document(found.geometry.parameters),
+        **IdentificationResult.of(found, assessed.zeros).document(found.geometry.parameters),
         "findings": list(findings(assessed)),
         "verdict": Verdict.NOT_EVALUATED.value,  # no held-out records
         "goodness": _goodness(found.goodness),

@@ -8,7 +8,6 @@ from hexacell.identification.diagnostics.model_tests import PointPrediction, con
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
-from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.mechanism import FrameConvention
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.reporting.assessment import SEPARATED_PAIRS, Assessment
@@ -98,13 +97,13 @@ def _verdict(assessed: Assessment) -> str:
         return _no_gain(assessed)
     if assessed.refused:
         return _contradicted(found.goodness)
-    if found.undetermined:
+    if assessed.undetermined:
         return _incomplete(assessed)
     return _point_verdict(assessed) or _residual_verdict(found.goodness)
 
 
 def _incomplete(assessed: Assessment) -> str:
-    what = f"{_undetermined(assessed.found)} not determined by these data"
+    what = f"{_undetermined(assessed)} not determined by these data"
     if not assessed.determines_too_little:
         return f"Incomplete: {what}."
     return f"Not usable: {what}. Measure at more points, and in more orientations with larger tilts."
@@ -174,10 +173,10 @@ def _possible_causes(assessed: Assessment) -> str:
     )
 
 
-def _undetermined(found: Identification) -> str:
-    convention = found.problem.mechanism.convention
+def _undetermined(assessed: Assessment) -> str:
+    convention = assessed.found.problem.mechanism.convention
     free = convention.free_names()
-    names = [convention.display_name(name) for name in found.undetermined if name in free]
+    names = [convention.display_name(name) for name in assessed.undetermined if name in free]
     if len(names) > NAMED_PARAMETERS:
         return f"{len(names)} of {len(free)} parameters are"
     return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'}"

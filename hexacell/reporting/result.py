@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from hexacell.cell.fields import Frozen, GeometryDocument
+from hexacell.identification.identified_zeros import IdentifiedZeros, ParameterChoice
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.identification.solver.result import (
@@ -52,8 +53,10 @@ class OutlierRecord(Frozen):
 class IdentificationResult(Frozen):
     """The identified geometry and its uncertainty: the first part of ``result.json``.
 
-    ``expected_chi2`` is the mean of ``chi2`` if model and noise are right, where an earlier result takes
-    part in the estimate; where only the drawing does, it is none, and that mean is ``dof``.
+    ``expected_chi2`` is the mean of ``chi2`` if model and noise are right, where an earlier result, or the
+    tolerances of what is held, take part in the estimate; where only the drawing does, it is none, and that
+    mean is ``dof``. ``identifies`` says which parameters are identified; the others are as the controller
+    has them, with their tolerances as sigma.
     """
 
     converged: bool
@@ -71,11 +74,12 @@ class IdentificationResult(Frozen):
     outliers: tuple[OutlierRecord, ...]
     frame: str
     expected_chi2: float | None = None
+    identifies: ParameterChoice = ParameterChoice.ALL
 
     @classmethod
-    def of(cls, found: Identification) -> Self:
-        """What is kept of an identification."""
-        parameters = found.geometry.parameters
+    def of(cls, found: Identification, zeros: IdentifiedZeros | None = None) -> Self:
+        """What is kept of an identification, or of the zeros alone."""
+        parameters, told = found.geometry.parameters, zeros or found
         return cls(
             converged=found.converged,
             termination=found.termination,
@@ -85,13 +89,14 @@ class IdentificationResult(Frozen):
             residual_rms_mm=found.residual_rms_mm,
             chi2=found.goodness.chi2,
             dof=found.dof,
-            geometry=parameters.document(found.geometry.vector),
-            sigma=parameters.document(found.sigma),
-            covariance=found.covariance.tolist(),
-            undetermined=found.undetermined,
+            geometry=parameters.document(told.geometry.vector),
+            sigma=parameters.document(told.sigma),
+            covariance=told.covariance.tolist(),
+            undetermined=told.undetermined,
             outliers=tuple(OutlierRecord.of(record, fault) for record, fault in found.left_out),
             frame=found.problem.mechanism.convention.name,
-            expected_chi2=found.goodness.expected if found.problem.prior.is_estimate else None,
+            expected_chi2=found.goodness.expected if found.problem.prior.is_estimate or zeros else None,
+            identifies=ParameterChoice.ALL if zeros is None else ParameterChoice.ZEROS,
         )
 
     def document(self, parameters: ParameterSet) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from hexacell.cell.fields import Frozen, SixNumbers
 from hexacell.cell.model import CellSettings
 from hexacell.decision import Verdict, decide, worst_verdict
 from hexacell.identification.diagnostics.model_tests import update
+from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.mechanism import Mechanism
@@ -174,9 +175,17 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
     )
 
 
-def outcome_line(result: IdentificationResult, parameters: int, verified: Verification) -> str:
-    """The outcome of a calibration in one line: what was used, before and after, the error, the verdict."""
-    parts = [f"{parameters} parameters, {result.records} records at {result.points} points"]
+def outcome_line(
+    result: IdentificationResult, parameters: int, verified: Verification, unknowns: int | None = None
+) -> str:
+    """The outcome of a calibration in one line: what was used, before and after, the error, the verdict.
+
+    ``unknowns``: how many of the parameters are identified, if not all.
+    """
+    what = f"{parameters} parameters"
+    if result.identifies is not ParameterChoice.ALL:
+        what = f"zeros only, {unknowns} of {what}"
+    parts = [f"{what}, {result.records} records at {result.points} points"]
     if verified.before_mm is not None and verified.after_mm is not None:
         means = f"{verified.before_mm:.2f} -> {verified.after_mm:.3f} mm"
         parts.append(f"mean deviation at held-out poses {means}")
@@ -233,7 +242,9 @@ def verified_accuracy(
         budget = (
             task.budget(updated, belief, robot.effects, robot.known_effects, check.observation) or budget
         )
-    errors = budget.errors_of(found.free - updated.free)
+    # With zeros alone, what is written is not what the records tell of all parameters.
+    written = found.free if robot.identifies is ParameterChoice.ALL else robot.free_parameters
+    errors = budget.errors_of(written - updated.free)
     limits = settings.acceptance
     factor = limits.guard_band_factor
     return VerifiedAccuracy(

@@ -21,6 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.identification.belief import RobotBelief
+from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -74,12 +75,14 @@ class UncertaintyBudget:
         noise: (t, 6, p) errors by the noise of the readings, mm and rad, one standard deviation a column.
         lines: the systematic effects.
         known: (t, 6) errors that measurements of effects tell, mm and rad.
+        has_held: whether ``noise`` contains what is not known of parameters that are not identified.
     """
 
     jacobian: Array
     noise: Array
     lines: tuple[BudgetLine, ...]
     known: Array
+    has_held: bool = False
 
     @classmethod
     def of(
@@ -92,18 +95,22 @@ class UncertaintyBudget:
         workspace: PoseBatch,
         earlier: Mapping[str, Array] | None = None,
         scale: ScaleObservation | None = None,
+        zeros: IdentifiedZeros | None = None,
     ) -> UncertaintyBudget:
         """The budget of an identification; its estimate reaches all task and workspace poses.
 
         An effect that the mechanism cannot have gets no line. Where the prior was an earlier estimate,
         ``earlier`` has the :attr:`parameter_columns` of that one's budget: both share constant effects.
         ``scale`` is what a length check, with the :attr:`parameter_columns` of this budget, measured of the
-        scale common to all encoders, in the place of the size stated for it.
+        scale common to all encoders, in the place of the size stated for it. ``zeros``: these alone are
+        identified, and what is held errs by its tolerances.
         """
-        propagation = Propagation.of(found, belief, task=task, workspace=workspace, earlier=earlier)
+        propagation = Propagation.of(
+            found, belief, task=task, workspace=workspace, earlier=earlier, zeros=zeros
+        )
         effects = tuple(_measured(effect, scale) for effect in effects)
         measured = MeasuredScale.of(propagation, scale)
-        covariance = found.free_covariance * found.goodness.noise_factor**2
+        covariance = (zeros or found).free_covariance * found.goodness.noise_factor**2
         estimated = (effect for effect in effects if effect.is_estimated)
         for columns in (effect.size * propagation.parameter_columns(effect) for effect in estimated):
             covariance = covariance - columns @ columns.T
@@ -114,7 +121,7 @@ class UncertaintyBudget:
         lines = (_line(propagation, effect, visible, measured) for effect in effects)
         acting = tuple(line for line in lines if line.columns.shape[-1])
         known = measured.known + _known(propagation, effects)
-        return cls(propagation.jacobian, noise, acting, known)
+        return cls(propagation.jacobian, noise, acting, known, has_held=zeros is not None)
 
     def errors_of(self, difference: Array) -> TaskErrors:
         """The errors of a geometry whose free parameters differ by (p,) from the estimate.

@@ -33,6 +33,7 @@ import numpy as np
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit
 from hexacell.identification.diagnostics.pose_accuracy import error_jacobian, teachable_frames
+from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
@@ -97,12 +98,14 @@ class Propagation:
         task: PoseBatch,
         workspace: PoseBatch,
         earlier: Mapping[str, Array] | None = None,
+        zeros: IdentifiedZeros | None = None,
     ) -> Propagation:
         """Of an identification and the belief made of it, which reaches all task and workspace poses.
 
         ``earlier`` has the :meth:`parameter_columns` of the estimate that was the prior of this one, by the
-        names of the effects; none where the prior is a drawing.
+        names of the effects; none where the prior is a drawing. ``zeros``: these alone are identified.
         """
+        kept = np.eye(len(found.free)) if zeros is None else zeros.projector
         problem, prediction = found.problem, found.prediction
         elimination = NuisanceElimination(problem, prediction.weights)
         centred = elimination.centred(prediction.jacobian)
@@ -112,13 +115,13 @@ class Propagation:
             readings=Readings(prediction.poses.rotations, problem.deviations, problem.gauges),
             task=placement_of(belief, task),
             workspace=placement_of(belief, workspace),
-            gain=np.einsum("pq,nqa->pna", found.free_covariance, weighted),
+            gain=np.einsum("pq,nqa->pna", kept @ found.free_covariance, weighted),
             jacobian=error_jacobian(belief, task, workspace),
             frames=teachable_frames(belief, workspace),
             elimination=elimination,
             record_jacobian=prediction.jacobian,
             covariance=found.free_covariance,
-            prior_gain=found.free_covariance @ found.active_prior,
+            prior_gain=kept @ found.free_covariance @ found.active_prior,
             earlier=earlier or {},
         )
 

@@ -28,6 +28,7 @@ from hexacell.campaign.teaching import WrittenGeometry, as_written
 from hexacell.cell.model import CellSettings
 from hexacell.decision import ErrorLimits, Verdict
 from hexacell.errors import HexacellError
+from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
@@ -75,6 +76,11 @@ class Calibration:
     measured_noise: MeasuredNoise | None = None
     length_check: bool = False
     removed: RemovedPoses = NOTHING_REMOVED
+
+    def __post_init__(self) -> None:
+        # Checks, and the quick level that carries one on, have to do with all that may have drifted.
+        if self.mode is not Mode.OPTIMISE and self.robot.identifies is not ParameterChoice.ALL:
+            object.__setattr__(self, "robot", replace(self.robot, identifies=ParameterChoice.ALL))
 
     def without(self, removed: RemovedPoses) -> Calibration:
         """The same without what a person took out of its plan."""
@@ -239,7 +245,8 @@ class Calibration:
 
     def held_out_poses_after(self, identified: Identification, before: PosesByPoint) -> PosesByPoint:
         """See :meth:`HeldOutPoses.after`."""
-        written = self._commanded_by(self.as_written(identified.geometry).geometry)
+        zeros = self.robot.identified_zeros(identified)
+        written = self._commanded_by(self.as_written((zeros or identified).geometry).geometry)
         return written.held_out_poses.after(identified, before)
 
     def confirming_poses(self, identified: Identification, state: RunState) -> PosesByPoint:

@@ -57,7 +57,8 @@ class Computations:
         settings, noise = calibration.settings, calibration.measured_noise
         assessed = assess(settings, robot, measurements, identified, noise)
         self.folder.write_result(fit_document(assessed))
-        result, held_out = IdentificationResult.of(identified), calibration.held_out_poses(identified)
+        result = IdentificationResult.of(identified, assessed.zeros)
+        held_out = calibration.held_out_poses(identified)
         return events.Identified(
             result=result,
             held_out=held_out,
@@ -118,7 +119,7 @@ class Computations:
             poses = calibration.confirming_poses(found, state)
             if any(poses):
                 return events.ConfirmationPlanned(reason=reason_of(verification), poses=poses)
-        line = outcome_line(_identified(state), len(found.free), verification)
+        line = outcome_line(_identified(state), len(found.free), verification, written.unknowns)
         return events.ResultValidated(verdict=verification.verdict, line=line, verification=verification)
 
     def _judge_check(self, state: RunState) -> events.ResultValidated:

@@ -33,6 +33,11 @@ def _fit(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "fit", "identify the geometry from a measurement file", "records.fit")
     add_cell(parser)
     add_file(parser, "--measurements", "the records (CSV)", is_required=True)
+    parser.add_argument(
+        "--identify",
+        choices=("all", "zeros"),
+        help="all parameters, or the encoders' zeros alone (default: as the cell file says)",
+    )
     add_json(parser)
 
 

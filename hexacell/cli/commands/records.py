@@ -8,6 +8,7 @@ from hexacell.application.offline import MOST_RECORDS_BEFORE_NEXT, fit_measureme
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
+from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.measurements.records import MeasurementSet
 from hexacell.presentation.documents import next_document
@@ -27,7 +28,8 @@ def fit(options: argparse.Namespace) -> ExitCode:
     folder = RunFolder(options.measurements.parent)
     measurements = read_measurements(options.measurements)
     _tell_size(console, measurements)
-    assessed = fit_measurements(cell, measurements, folder)
+    choice = None if options.identify is None else ParameterChoice(options.identify)
+    assessed = fit_measurements(cell, measurements, folder, choice)
     console.document(fit_document(assessed))
     if not options.json:
         console.print(identification_report(assessed))

@@ -44,7 +44,7 @@ def require_enough_records(problem: Problem) -> None:
     Raises:
         IdentifiabilityError: names what is missing, and what to measure.
     """
-    parameters = len(problem.prior.covariance)
+    parameters = problem.unknowns or len(problem.prior.covariance)
     if problem.points < 2:
         raise IdentifiabilityError(
             f"records at one point cannot determine the {parameters} parameters, whatever their number",

@@ -204,6 +204,8 @@ class Problem:
             base frame.
         systematic: the errors of records that are no noise. The estimate takes no account of them, the
             tests of it do.
+        unknowns: how many parameters the records are to determine, the rest of them being known from the
+            prior; 0: all.
     """
 
     mechanism: Mechanism
@@ -219,6 +221,7 @@ class Problem:
     labels: NDArray[np.int_]
     gauges: Array
     systematic: SystematicModel = field(default=no_systematic_errors)
+    unknowns: int = 0
 
     @property
     def basis(self) -> Array:
@@ -309,6 +312,7 @@ def build_problem(
     provisional: Sequence[Geometry] = (),
     earlier: Sequence[CommandingGeometry] = (),
     systematic: SystematicModel = no_systematic_errors,
+    unknowns: int = 0,
 ) -> Problem:
     """The problem of a measurement set.
 
@@ -344,6 +348,7 @@ def build_problem(
         labels=labels,
         gauges=change.base,
         systematic=systematic,
+        unknowns=unknowns,
     )
 
 

@@ -131,6 +131,10 @@ class GoughStewart:
         base = (geometry["base"] - change.origin) @ change.base.T
         return gough_stewart_geometry(base, geometry["platform"] @ change.platform.T, geometry["offset"])
 
+    def encoder_zeros(self, geometry: Geometry) -> Array:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; the offsets."""
+        return self.parameters.changes("offset", np.eye(6))
+
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`: it has none."""
         return None

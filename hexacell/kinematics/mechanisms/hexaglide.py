@@ -130,6 +130,12 @@ class Hexaglide:
         S = (geometry["S"] - change.origin) @ change.base.T
         return hexaglide_geometry(S, geometry["B"] @ change.platform.T, geometry["l"])
 
+    def encoder_zeros(self, geometry: Geometry) -> Array:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; the joints on the sliders, along x."""
+        moved = np.zeros((6, 3, 6))
+        moved[np.arange(6), 0, np.arange(6)] = 1.0
+        return self.parameters.changes("S", moved)
+
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         _, v = _leg_vectors(geometry, poses, joints)

@@ -208,6 +208,10 @@ class RotaryCranks:
         }
         return Geometry.of(ROTARY_CRANKS_PARAMETERS, values)
 
+    def encoder_zeros(self, geometry: Geometry) -> Array:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; the cranks' zeros."""
+        return self.parameters.changes("zero", np.eye(6))
+
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`: it has none."""
         return None

@@ -165,6 +165,12 @@ class SixRails:
             geometry["l"],
         )
 
+    def encoder_zeros(self, geometry: Geometry) -> Array:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; the sliders, along their rails."""
+        moved = np.zeros((6, 3, 6))
+        moved[np.arange(6), :, np.arange(6)] = _directions(geometry["rail"])
+        return self.parameters.changes("S", moved)
+
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`; across as the rail leans by a and b."""
         _, v = _leg_vectors(geometry, poses, joints)

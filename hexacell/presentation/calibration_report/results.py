@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from hexacell.application.reported_run import ReportedRun
+from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.presentation.calibration_report.blocks import Block, Chapter, Paragraph, Table
 from hexacell.presentation.quick_level import quick_accuracy_sentences
 from hexacell.reporting.check_result import ParameterChange
+from hexacell.reporting.result import IdentificationResult
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 SMALLEST_MM = 0.0005
@@ -59,6 +61,7 @@ def observability_chapter(run: ReportedRun) -> Chapter | None:
     undetermined = ", ".join(result.undetermined) or "none"
     sentences = [
         f"{result.records} records at {result.points} points.",
+        *_choice(result),
         f"Residuals {1e3 * result.residual_rms_mm:.1f} um (rms), chi2 {result.chi2:.1f} of {expected:.0f}.",
         *([] if quick is None else [quick_accuracy_sentences(quick)]),
         f"Parameters that the records do not determine: {undetermined}.",
@@ -105,6 +108,14 @@ def _parameter_rows(run: ReportedRun) -> Iterator[tuple[str, ...]]:
             f"{new[row] - old[row]:+.{decimals}f}",
             f"{COVERAGE_FACTOR * sigma[row]:.{decimals}f}",
         )
+
+
+def _choice(result: IdentificationResult) -> list[str]:
+    """Which parameters are identified, where not all are."""
+    if result.identifies is ParameterChoice.ALL:
+        return []
+    sentence = "The encoders' zeros alone are identified. All else is as the controller had it"
+    return [f"{sentence}, and its tolerances are its uncertainty."]
 
 
 def _left_out(run: ReportedRun) -> str:

@@ -17,6 +17,7 @@ KEYS = {
     "sigma",
     "parameters", "covariance", "undetermined", "outliers", "frame", "termination",
     "expected_chi2",
+    "identifies",
 }  # fmt: skip
 
 

@@ -133,6 +133,11 @@ class Ring:
         B = geometry["B"] @ change.platform.T
         return Geometry.of(PARAMETERS, {"ring": ring, "B": B, "l": geometry["l"]})
 
+    def encoder_zeros(self, geometry: Geometry) -> Array:
+        moved = np.zeros((6, 3, 6))
+        moved[np.arange(6), 1, np.arange(6)] = 1.0
+        return self.parameters.changes("ring", moved)
+
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         return None
 

@@ -1,0 +1,187 @@
+"""A first level of identification: the zeros of the encoders alone, all else as the controller has it.
+
+The zeros z change the free parameters by ``D z``. All parameters are estimated as ever: by that estimate x
+the data and the model are tested, and the verdict judges by it what is written. Those zeros are taken with
+which the poses of the records err least, however the frames are chosen:
+
+    minimize  |J (x0 + D z - x)|,    x0 + D z = x0 + G (x - x0),    G = D (J D)^+ J,
+
+with the controller's geometry x0, and the derivatives J of positions and turns (times the platform's
+radius) by the parameters, less what changes of the frames explain. With the covariance C of x, and C0 of
+the tolerances, which say how wrong the held parameters may be, the result errs by
+
+    G C G^T + H C0 H^T + G C H^T + H C G^T,    H = 1 - G
+
+(the error of a Bayesian estimate does not depend on the estimate). So a parameter that is not identified
+keeps its tolerance for its uncertainty. This is a Schmidt-Kalman filter with another gain (Jazwinski,
+Stochastic Processes and Filtering Theory, 1970). Least squares of the residuals with all else held, as
+other programs have it, explain joints that are 2 mm off by zeros that are 18 mm off, and serve no pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.identification.diagnostics.frame_alignment import frame_derivatives
+from hexacell.identification.solver.result import UNDETERMINED_RATIO, Identification
+from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.rotations import Array
+
+SAME_CHANGE = 1e-6
+"""Of the largest singular value: zeros whose common change is no more than one of frames are one less."""
+
+UNSEEN = 1e-3
+"""Of the largest: a change of the zeros that moves no pose more is none."""
+
+
+class ParameterChoice(StrEnum):
+    """Which parameters are identified."""
+
+    ALL = "all"
+    ZEROS = "zeros"
+
+
+def zero_columns(mechanism: Mechanism, geometry: Geometry) -> Array:
+    """Changes (p, k) of the free parameters by the zeros: a basis of them, in the convention's frames.
+
+    There are six zeros, and one less where a change of all together is one of the base frame only.
+    """
+    normal, _ = mechanism.normalize_frames(geometry)
+    by_zeros = free_parameter_derivatives(mechanism, normal).T @ mechanism.encoder_zeros(normal)
+    left, sizes, _ = np.linalg.svd(by_zeros, full_matrices=False)
+    columns: Array = left[:, sizes > SAME_CHANGE * sizes[0]]
+    return columns
+
+
+def zeros_by_noise(mechanism: Mechanism, geometry: Geometry, information: Array) -> Array:
+    """Standard deviations (p,) of the zeros by an information (p, p), were all else exact; else zero."""
+    columns = zero_columns(mechanism, geometry)
+    inverse = np.linalg.inv(columns.T @ information @ columns)
+    return np.sqrt(np.maximum(np.diag(columns @ inverse @ columns.T), 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class HeldParameters:
+    """What is identified beside parameters that are held.
+
+    Attributes:
+        columns: (p, k) changes of the free parameters by the zeros.
+        tolerances: (p, p) covariance of all free parameters by the drawing, or by an earlier result.
+    """
+
+    columns: Array
+    tolerances: Array
+
+    def gain(self, errors: Array) -> Array:
+        """G (p, p) with which some errors (m, p) by the free parameters are least."""
+        gain: Array = self.columns @ np.linalg.pinv(errors @ self.columns, rcond=UNSEEN) @ errors
+        return gain
+
+    def covariance(self, gain: Array, estimated: Array) -> Array:
+        """That of the result (p, p), by that of the estimate of all parameters."""
+        held = np.eye(len(gain)) - gain
+        crossing = gain @ estimated @ held.T
+        total = gain @ estimated @ gain.T + held @ self.tolerances @ held.T + crossing + crossing.T
+        # Where the prior was released, the estimate is a little worse than the tolerances alone say.
+        units = np.sqrt(np.diag(self.tolerances))
+        scaled = 0.5 * (total + total.T) / np.outer(units, units)
+        variances, axes = np.linalg.eigh(scaled)
+        result: Array = ((axes * np.maximum(variances, 0.0)) @ axes.T) * np.outer(units, units)
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedZeros:
+    """The zeros by the records of an identification.
+
+    Attributes:
+        found: the estimate of all parameters, by the same records.
+        held: free parameters (p,) that the controller has.
+        columns: (p, k) changes of these by the zeros.
+    """
+
+    found: Identification
+    held: Array
+    columns: Array
+
+    @classmethod
+    def of(cls, found: Identification, controller: Geometry) -> IdentifiedZeros:
+        """Of a controller's geometry in any frames."""
+        mechanism = found.problem.mechanism
+        normal, _ = mechanism.normalize_frames(controller)
+        held = mechanism.convention.free_parameters(normal)
+        return cls(found, held, zero_columns(mechanism, normal))
+
+    @property
+    def kept(self) -> HeldParameters:
+        """What is held, with the tolerances that the records were identified with."""
+        return HeldParameters(self.columns, self.found.problem.prior.covariance)
+
+    @cached_property
+    def projector(self) -> Array:
+        """G (p, p): what becomes of a change of the estimate of all parameters."""
+        return self.kept.gain(_pose_errors(self.found))
+
+    @cached_property
+    def free(self) -> Array:
+        """The free parameters (p,) with these zeros."""
+        free: Array = self.held + self.projector @ (self.found.free - self.held)
+        return free
+
+    @cached_property
+    def free_covariance(self) -> Array:
+        """Theirs (p, p); of what is held it is that of the tolerances."""
+        return self.kept.covariance(self.projector, self.found.free_covariance)
+
+    @property
+    def geometry(self) -> Geometry:
+        """In the frame convention."""
+        return self.found.problem.geometry(self.free)
+
+    @property
+    def covariance(self) -> Array:
+        """(P, P) of all parameters."""
+        basis = self.found.problem.basis
+        covariance: Array = basis @ self.free_covariance @ basis.T
+        return covariance
+
+    @property
+    def sigma(self) -> Array:
+        """(P,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters that the zeros change."""
+        changed = np.abs(self.found.problem.basis @ self.columns).max(axis=1) > SAME_CHANGE
+        names = self.found.geometry.parameters.names
+        return tuple(names[row] for row in np.flatnonzero(changed))
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Those of them of which the estimate by the records says hardly more than the drawing."""
+        taken = self.found.problem.basis @ self.projector
+        by_noise = np.sqrt(np.diag(taken @ self.found.free_covariance @ taken.T))
+        limits = UNDETERMINED_RATIO * self.found.prior_sigma
+        names = self.found.geometry.parameters.names
+        unknown = {names[row] for row in np.flatnonzero(by_noise > limits)}
+        return tuple(name for name in self.names if name in unknown)
+
+
+def _pose_errors(found: Identification) -> Array:
+    """Derivatives (6 n, p) of the records' poses by the free parameters, less those by changes of frames.
+
+    Rotations are times the platform's radius, mm.
+    """
+    mechanism, prediction = found.problem.mechanism, found.prediction
+    weights = np.repeat([1.0, float(mechanism.platform_radius(found.geometry))], 3)[:, None]
+    columns = (weights * prediction.pose_jacobian).reshape(-1, len(found.free))
+    frames, _ = np.linalg.qr((weights * frame_derivatives(prediction.poses)).reshape(-1, 9))
+    left: Array = columns - frames @ (frames.T @ columns)
+    return left

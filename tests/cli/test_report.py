@@ -63,6 +63,17 @@ def test_the_page_says_what_the_run_found_the_verdict_first(typed_here, demo, ru
         assert (re.search(rf"\b{parameter['name']} mm -?\d", said) is not None) == is_free
 
 
+def test_each_set_is_told_with_the_drift_of_its_gauges(typed_here, run) -> None:
+    assert typed_here("report", run).code == 0
+    said = text_of((run / "report.html").read_text())
+    closed = [
+        one.event for one in read_entries(run / "journal.jsonl") if isinstance(one.event, events.SetClosed)
+    ]
+    drift = max(map(abs, closed[0].drift_mm))
+    assert re.search(rf"\bpoint 1 11 \d\.\d{{3}} {drift:.3f} point 2 11 ", said)
+    assert "held-out point 3, before 6 " in said
+
+
 def test_it_is_the_same_again_and_changes_nothing_else(typed_here, run) -> None:
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
     assert typed_here("report", run).code == 0

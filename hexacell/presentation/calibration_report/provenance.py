@@ -8,6 +8,7 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.application.reported_run import ReportedRun
 from hexacell.cell.certificates import CertificateSettings
 from hexacell.presentation.calibration_report.blocks import Chapter, Facts, Paragraph, Table
+from hexacell.presentation.events import set_name
 from hexacell.presentation.measured_noise import measured_noise_lines
 
 NOT_STATED = "not stated"
@@ -25,7 +26,23 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
         pairs.append(("Temperature", "not measured"))
     pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
     noise = () if state.noise is None else measured_noise_lines(state.noise.noise)
-    return Chapter("Conditions", (Facts(tuple(pairs)), *map(Paragraph, noise)))
+    return Chapter("Conditions", (Facts(tuple(pairs)), *map(Paragraph, noise), *_sets_table(run)))
+
+
+def _sets_table(run: ReportedRun) -> tuple[Table, ...]:
+    """Each set whose reference was read again, with how far the gauges had drifted by then."""
+    columns = ("Set of records", "records", "largest deviation, mm", "drift of the gauges, mm")
+    rows = tuple(
+        (
+            set_name(key),
+            str(len(measured.samples)),
+            f"{max(abs(value) for one in measured.samples for value in one.deviation_mm):.3f}",
+            f"{max(map(abs, measured.drift_mm)):.3f}",
+        )
+        for key, measured in run.state.sets.items()
+        if measured.drift_mm is not None and measured.samples
+    )
+    return (Table(columns, rows),) if rows else ()
 
 
 def traceability_chapter(run: ReportedRun) -> Chapter:

@@ -26,7 +26,13 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
         pairs.append(("Temperature", "not measured"))
     pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
     noise = () if state.noise is None else measured_noise_lines(state.noise.noise)
-    return Chapter("Conditions", (Facts(tuple(pairs)), *map(Paragraph, noise), *_sets_table(run)))
+    return Chapter("Conditions", (Facts(tuple(pairs)), *map(_sentence, noise), *_sets_table(run)))
+
+
+def _sentence(line: str) -> Paragraph:
+    """A line of a run's output as a sentence of a page."""
+    text = line[:1].upper() + line[1:]
+    return Paragraph(text if text.endswith(".") else f"{text}.")
 
 
 def _sets_table(run: ReportedRun) -> tuple[Table, ...]:

@@ -87,6 +87,7 @@ def encode_command(command: str) -> bytes:
 def timed_move(pose: Pose, duration_s: float) -> str:
     """The block that moves to ``pose`` in inverse time: F is 1 / duration, in 1/min.
 
+    In machine coordinates (G53): a rotation of the coordinate system (G10 L2 R) is told by no query.
     It has more decimals than the six of reported positions. A feed rate (G94) would count X, Y and Z only
     (LinuxCNC, G-code reference, G93 and G94), and a rapid move (G0) goes as fast as the machine can.
 
@@ -97,7 +98,7 @@ def timed_move(pose: Pose, duration_s: float) -> str:
         raise ValueError("a coordinate is not a finite number")
     words = zip("XYZABC", pose.as_tuple(), strict=True)
     coordinates = " ".join(f"{axis}{value:.{_DECIMALS}f}" for axis, value in words)
-    return f"G93 G1 {coordinates} F{_SECONDS_A_MINUTE / duration_s:.{_DECIMALS}f}"
+    return f"G53 G93 G1 {coordinates} F{_SECONDS_A_MINUTE / duration_s:.{_DECIMALS}f}"
 
 
 def restoring_block(codes: str) -> str:

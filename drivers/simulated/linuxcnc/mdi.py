@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hexacell.kinematics.pose import Pose
 
@@ -15,6 +15,8 @@ _MOTIONS = (0.0, 1.0, 80.0)
 _FEED_MODES = (93.0, 94.0)
 _MODES = (17.0, 21.0, 49.0, 54.0, 64.0, 90.0)
 """G codes of the modes that are always active here."""
+
+_MACHINE_COORDINATES, _SET_COORDINATE_SYSTEM = 53.0, 10.0
 
 INVERSE_TIME, PER_MINUTE = 93, 94
 _NO_MOTION = 80
@@ -26,11 +28,15 @@ class BlockError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class ModalState:
-    """What a block leaves to those after it: G0, G1 or G80, G93 or G94, and the feed of G94, mm/min."""
+    """What a block leaves to those after it: G0, G1 or G80, G93 or G94, and the feed of G94, mm/min.
+
+    ``rotation_deg`` is that of the coordinate system about z (G10 L2 R), which no query tells.
+    """
 
     motion: int = 0
     feed_mode: int = PER_MINUTE
     feed: float = 0.0
+    rotation_deg: float = 0.0
 
     @property
     def codes(self) -> str:
@@ -63,6 +69,8 @@ def parse_block(block: str, current: Pose, modes: ModalState | None = None) -> P
     words = _words(block)
     codes = [value for letter, value in words if letter == "G"]
     numbers = {letter: value for letter, value in words if letter != "G"}
+    if _SET_COORDINATE_SYSTEM in codes:
+        return ParsedBlock(replace(modes or ModalState(), rotation_deg=numbers.get("R", 0.0)))
     for letter in numbers:
         if letter not in (*_AXES, "F"):
             raise BlockError(f"Bad character '{letter.lower()}' used")
@@ -72,8 +80,17 @@ def parse_block(block: str, current: Pose, modes: ModalState | None = None) -> P
         return ParsedBlock(modes)
     coordinates = dict(zip(_AXES, current.as_tuple(), strict=True)) | numbers
     target = Pose(*coordinates.values())
+    if _MACHINE_COORDINATES not in codes:
+        target = _rotated(target, modes.rotation_deg)
     duration_s = _duration(modes, feed, current, target)
     return ParsedBlock(modes, target, duration_s) if numbers else ParsedBlock(modes)
+
+
+def _rotated(target: Pose, degrees: float) -> Pose:
+    """Where X and Y lead in a coordinate system that is rotated about the machine's origin."""
+    sine, cosine = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
+    x, y, *rest = target.as_tuple()
+    return Pose(cosine * x - sine * y, sine * x + cosine * y, *rest)
 
 
 def _modes_after(codes: Sequence[float], feed: float | None, before: ModalState) -> ModalState:
@@ -83,7 +100,7 @@ def _modes_after(codes: Sequence[float], feed: float | None, before: ModalState)
     feed_mode = _one_of_group(codes, _FEED_MODES, before.feed_mode)
     kept = before.feed if feed_mode == before.feed_mode == PER_MINUTE else 0.0
     stated = feed if feed is not None and feed_mode == PER_MINUTE else kept
-    return ModalState(motion, feed_mode, stated)
+    return replace(before, motion=motion, feed_mode=feed_mode, feed=stated)
 
 
 def _one_of_group(codes: Sequence[float], group: tuple[float, ...], before: int) -> int:
@@ -122,5 +139,5 @@ def _words(block: str) -> list[tuple[str, float]]:
 
 
 def _check_code(code: float) -> None:
-    if code not in _MOTIONS + _FEED_MODES + _MODES:
+    if code not in (*_MOTIONS, *_FEED_MODES, *_MODES, _MACHINE_COORDINATES):
         raise BlockError("G-code out of range" if code >= 100 else "Unknown g code used")

@@ -69,7 +69,8 @@ def test_a_command_longer_than_the_limit_is_refused():
 def test_a_timed_move_is_formatted_exactly():
     pose = Pose(10.0, -20.5, 560.123456789, 5.0, -4.0, 3.0)
     assert timed_move(pose, 2.5) == (
-        "G93 G1 X10.00000000 Y-20.50000000 Z560.12345679 A5.00000000 B-4.00000000 C3.00000000 F24.00000000"
+        "G53 G93 G1 X10.00000000 Y-20.50000000 Z560.12345679 "
+        "A5.00000000 B-4.00000000 C3.00000000 F24.00000000"
     )
 
 
@@ -77,9 +78,9 @@ def test_a_timed_move_is_formatted_exactly():
 def test_a_timed_move_keeps_pose_and_duration_and_fits_a_line(pose, duration_s):
     words = timed_move(pose, duration_s).split()
     letters, values = zip(*((word[0], float(word[1:])) for word in words), strict=True)
-    assert "".join(letters) == "GGXYZABCF"
-    assert values[2:8] == pytest.approx(pose.as_tuple(), abs=1e-7)
-    assert 60.0 / values[8] == pytest.approx(duration_s, rel=1e-4)
+    assert "".join(letters) == "GGGXYZABCF"
+    assert values[3:9] == pytest.approx(pose.as_tuple(), abs=1e-7)
+    assert 60.0 / values[9] == pytest.approx(duration_s, rel=1e-4)
     encode_command(f"set mdi {timed_move(pose, duration_s)}")
 
 

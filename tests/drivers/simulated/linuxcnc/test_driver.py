@@ -49,6 +49,12 @@ async def begin(ready, machine):
     return moving
 
 
+async def test_a_rotation_that_no_query_tells_does_not_move_the_target(ready, simulated, machine):
+    simulated.state.modes = replace(simulated.state.modes, rotation_deg=30.0)
+    await ready.move(TARGET, MOVE_S)
+    assert machine.pose() == TARGET
+
+
 async def test_from_emergency_stop_to_a_pose(driver, machine):
     controller = driver()
     try:

@@ -58,6 +58,18 @@ def test_a_move_lasts_as_its_feed_or_inverse_time_says(block, duration_s):
     assert parse_block(block, HERE).duration_s == duration_s
 
 
+def test_a_rotated_coordinate_system_turns_every_move_but_one_in_machine_coordinates():
+    rotated = parse_block("G10 L2 P1 R90", HERE).modes
+    there = Pose(100.0, 0.0, 550.0, 0.0, 0.0, 0.0)
+    words = "X100 Y0 Z550 A0 B0 C0"
+    turned = parse_block(f"G0 {words}", HERE, rotated).target
+    assert turned is not None
+    assert turned.as_tuple() == pytest.approx((0.0, 100.0, 550.0, 0.0, 0.0, 0.0))
+    assert parse_block(f"G53 G0 {words}", HERE, rotated).target == there
+    assert parse_block("G94", HERE, rotated).modes.rotation_deg == 90.0
+    assert parse_block("G10 L2 P1 R0", HERE, rotated).modes.rotation_deg == 0.0
+
+
 @pytest.mark.parametrize(
     ("block", "words"),
     [

@@ -1,0 +1,79 @@
+"""The driver against the real LinuxCNC: what no query tells, and what an acknowledgement hides."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from drivers.controllers.errors import MoveRefused, PoseRefused
+from drivers.controllers.linuxcnc.controller import LinuxcncrshController
+from drivers.interfaces import StartupAction
+from hexacell.cell.loader import load_cell
+from hexacell.errors import DeviceError
+from hexacell.kinematics.pose import Pose
+
+ALL = frozenset(StartupAction)
+THERE = Pose(40.0, -20.0, 560.0, 5.0, -4.0, 10.0)
+MOVE_S = 0.5
+
+
+@pytest.fixture
+async def driver(linuxcnc):
+    made = LinuxcncrshController(load_cell(linuxcnc.folder / "cell.toml").settings.controller)
+    await made.open()
+    yield made
+    await made.close()
+
+
+async def distance(driver: LinuxcncrshController, pose: Pose) -> float:
+    there = (await driver.pose()).as_tuple()
+    return max(abs(one - other) for one, other in zip(there, pose.as_tuple(), strict=True))
+
+
+async def test_it_gets_ready_moves_and_stops(driver) -> None:
+    await driver.prepare(ALL)
+    await driver.move(THERE, MOVE_S)
+    assert await distance(driver, THERE) < 1e-3
+    standing = (await driver.status()).heartbeat
+    moving = asyncio.create_task(driver.move(Pose(-150.0, 100.0, 500.0), 60.0))
+    while (await driver.status()).heartbeat == standing:
+        pass
+    await driver.stop()
+    with pytest.raises(DeviceError, match="stopped"):
+        await moving
+    assert 0.0 < await distance(driver, THERE) < 150.0
+
+
+async def test_a_rotated_coordinate_system_does_not_move_the_target(linuxcnc, driver) -> None:
+    await driver.prepare(ALL)
+    await driver.move(Pose(0.0, 0.0, 550.0), MOVE_S)
+    with linuxcnc.connect() as client:
+        assert "ACK" in client.ask("set mdi G10 L2 P1 R30")
+    await driver.prepare(ALL)
+    await driver.move(THERE, MOVE_S)
+    assert await distance(driver, THERE) < 1e-3
+
+
+@pytest.mark.parametrize("block", ["G10 L2 P1 X5", "G92 X3", "G20", "G91"])
+async def test_what_changes_coordinates_is_refused_before_a_move(linuxcnc, driver, block) -> None:
+    await driver.prepare(ALL)
+    with linuxcnc.connect() as client:
+        assert "ACK" in client.ask(f"set mdi {block}")
+    with pytest.raises(DeviceError, match=r"offset|inches|relative"):
+        await driver.prepare(ALL)
+
+
+async def test_a_pose_beyond_a_limit_of_the_ini_is_refused_with_its_axis(driver) -> None:
+    await driver.prepare(ALL)
+    with pytest.raises(PoseRefused, match="limit") as caught:
+        await driver.move(Pose(0.0, 0.0, 550.0, 50.0, 0.0, 0.0), MOVE_S)
+    assert (caught.value.axis, caught.value.is_highest) == ("A", True)
+    await driver.move(THERE, MOVE_S)
+
+
+async def test_a_pose_that_the_kinematics_cannot_reach_is_refused(driver) -> None:
+    await driver.prepare(ALL)
+    with pytest.raises(MoveRefused):
+        await driver.move(Pose(0.0, 0.0, 749.0, 40.0, 40.0, 55.0), MOVE_S)
+    await driver.move(THERE, MOVE_S)

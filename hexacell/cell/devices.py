@@ -195,6 +195,9 @@ class ControllerSettings(Section):
         "reset-estop (the emergency stop that it starts in, before a run begins), switch-on, home",
     )
     homing_timeout_s: Positive = Field(60.0, description="longest wait until all joints are homed")
+    unit_mm: Positive = Field(
+        1.0, description="one unit of the positions that it tells; of an inch machine 25.4"
+    )
     position_tolerance_mm: Positive = Field(0.01, description="arrival: largest position difference")
     angle_tolerance_deg: Positive = Field(0.01, description="arrival: largest angle difference")
     move_timeout_s: Positive | None = Field(

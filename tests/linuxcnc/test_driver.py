@@ -55,12 +55,22 @@ async def test_a_rotated_coordinate_system_does_not_move_the_target(linuxcnc, dr
     assert await distance(driver, THERE) < 1e-3
 
 
-@pytest.mark.parametrize("block", ["G10 L2 P1 X5", "G92 X3", "G20", "G91"])
+async def test_a_program_in_inches_is_no_obstacle_and_stays_in_inches(linuxcnc, driver) -> None:
+    await driver.prepare(ALL)
+    with linuxcnc.connect() as client:
+        assert "ACK" in client.ask("set mdi G20")
+        await driver.prepare(ALL)
+        await driver.move(THERE, MOVE_S)
+        assert await distance(driver, THERE) < 1e-3
+        assert "G20" in client.ask("get program_codes").split()
+
+
+@pytest.mark.parametrize("block", ["G10 L2 P1 X5", "G92 X3", "G91"])
 async def test_what_changes_coordinates_is_refused_before_a_move(linuxcnc, driver, block) -> None:
     await driver.prepare(ALL)
     with linuxcnc.connect() as client:
         assert "ACK" in client.ask(f"set mdi {block}")
-    with pytest.raises(DeviceError, match=r"offset|inches|relative"):
+    with pytest.raises(DeviceError, match=r"offset|relative"):
         await driver.prepare(ALL)
 
 

@@ -10,6 +10,7 @@ from typing import TypeVar
 from drivers.controllers.errors import CommandRefused, ConnectionLost
 from drivers.controllers.linuxcnc.connection import Connection
 from drivers.controllers.linuxcnc.protocol import Response, parse_homed, parse_pose, parse_positions
+from drivers.controllers.linuxcnc.settings import Address
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 
@@ -55,9 +56,12 @@ class ErrorMessages:
 class ControllerCommands:
     """Get and set commands over one connection."""
 
-    def __init__(self, connection: Connection, subject: str, messages: ErrorMessages | None = None) -> None:
+    def __init__(
+        self, connection: Connection, address: Address, messages: ErrorMessages | None = None
+    ) -> None:
         self.connection = connection
-        self.subject = subject
+        self.subject = address.name
+        self.unit_mm = address.unit_mm
         self._messages = messages or ErrorMessages()
 
     async def get(self, what: str) -> str:
@@ -87,11 +91,13 @@ class ControllerCommands:
 
     async def pose(self) -> Pose:
         """The actual pose, mm and deg, by the controller's own kinematics."""
-        return self._parsed(parse_pose, await self.get("abs_act_pos"))
+        x, y, z, *angles = self._parsed(parse_pose, await self.get("abs_act_pos")).as_tuple()
+        return Pose(self.unit_mm * x, self.unit_mm * y, self.unit_mm * z, *angles)
 
     async def joints(self) -> tuple[float, ...]:
         """The six actual joint positions, mm."""
-        return self._parsed(parse_positions, await self.get("joint_pos"))
+        told = self._parsed(parse_positions, await self.get("joint_pos"))
+        return tuple(self.unit_mm * value for value in told)
 
     async def all_homed(self) -> bool:
         """Whether every joint is homed."""

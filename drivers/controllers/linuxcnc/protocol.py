@@ -87,9 +87,10 @@ def encode_command(command: str) -> bytes:
 def timed_move(pose: Pose, duration_s: float) -> str:
     """The block that moves to ``pose`` in inverse time: F is 1 / duration, in 1/min.
 
-    In machine coordinates (G53): a rotation of the coordinate system (G10 L2 R) is told by no query.
-    It has more decimals than the six of reported positions. A feed rate (G94) would count X, Y and Z only
-    (LinuxCNC, G-code reference, G93 and G94), and a rapid move (G0) goes as fast as the machine can.
+    In millimetres (G21), and in machine coordinates (G53): no query tells that the coordinate system is
+    rotated (G10 L2 R). It has more decimals than the six of reported positions. A feed rate (G94) would
+    count X, Y and Z only (LinuxCNC, G-code reference, G93 and G94), and a rapid move (G0) goes as fast as
+    it can.
 
     Raises:
         ValueError: A coordinate is not a finite number.
@@ -98,21 +99,22 @@ def timed_move(pose: Pose, duration_s: float) -> str:
         raise ValueError("a coordinate is not a finite number")
     words = zip("XYZABC", pose.as_tuple(), strict=True)
     coordinates = " ".join(f"{axis}{value:.{_DECIMALS}f}" for axis, value in words)
-    return f"G53 G93 G1 {coordinates} F{_SECONDS_A_MINUTE / duration_s:.{_DECIMALS}f}"
+    return f"G21 G53 G93 G1 {coordinates} F{_SECONDS_A_MINUTE / duration_s:.{_DECIMALS}f}"
 
 
 def restoring_block(codes: str) -> str:
     """The block that restores what :func:`timed_move` changes, from the words after ``PROGRAM_CODES``.
 
-    That are the motion, the feed mode, and the feed, which a change of its mode sets to zero. A G1 that has
-    no feed is refused, and other motions need more words: instead of these, no motion is active (G80).
+    That are inches, the motion, the feed mode, and the feed, which a change of its mode sets to zero. A G1
+    that has no feed is refused, and other motions need more words: instead, no motion is active (G80).
     """
     words = codes.upper().split()
     mode = next((word for word in words if word in ("G93", "G94", "G95")), "G94")
     feed = next((word for word in words if word.startswith("F")), "F0")
     has_feed = mode != "G93" and float(feed[1:]) != 0.0
     motion = "G0" if not words or "G0" in words else "G1" if "G1" in words and has_feed else "G80"
-    return f"{mode} {motion} {feed}" if has_feed else f"{mode} {motion}"
+    units = ("G20",) if "G20" in words else ()
+    return " ".join((*units, mode, motion, *((feed,) if has_feed else ())))
 
 
 def parse_explanation(line: str) -> str:

@@ -149,7 +149,7 @@ class Session:
         async with self._arbiter.exclusive():
             connection = await Connection.open(self._address, self._timeouts, self._trace)
         connection.send_turn = self._arbiter.command_turn
-        commands = ControllerCommands(connection, self._address.name, self._messages)
+        commands = ControllerCommands(connection, self._address, self._messages)
         try:
             await startup.acknowledge_on_completion(commands)
             self._require_open()  # it may have been closed meanwhile

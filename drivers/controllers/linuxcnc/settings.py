@@ -12,12 +12,16 @@ from hexacell.errors import UsageError
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """A server and the passwords it was started with; they are sent in clear text."""
+    """A server and the passwords it was started with; they are sent in clear text.
+
+    ``unit_mm`` is one unit of the positions that it tells.
+    """
 
     host: str
     port: int
     connect_password: str = field(repr=False)
     enable_password: str = field(repr=False)
+    unit_mm: float = 1.0
 
     @classmethod
     def of(cls, settings: ControllerSettings) -> Self:
@@ -29,7 +33,8 @@ class Address:
         if settings.port is None:
             raise UsageError("the cell file names no controller port", action="Set controller.port")
         connect, enable = settings.connect_password, settings.enable_password
-        return cls(settings.host, settings.port, connect.get_secret_value(), enable.get_secret_value())
+        passwords = connect.get_secret_value(), enable.get_secret_value()
+        return cls(settings.host, settings.port, *passwords, settings.unit_mm)
 
     @property
     def name(self) -> str:

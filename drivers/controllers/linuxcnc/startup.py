@@ -20,6 +20,7 @@ Stopped = Callable[[], bool]
 
 _MODAL_ACTION = "Put it into RS274NGC_STARTUP_CODE, or send it in MDI"
 _OFFSET_MM = 1e-6
+_UNITS_MM = {"MM": 1.0, "CM": 10.0, "INCH": 25.4}
 _FULL_FEED_PERCENT = 100.0
 
 
@@ -121,24 +122,26 @@ async def enter_mdi_mode(commands: ControllerCommands, timeouts: Timeouts) -> No
 
 
 async def check_coordinate_system(commands: ControllerCommands) -> str:
-    """Check that ``X1`` means 1 mm in machine coordinates, and a duration what it says.
+    """Check that ``G21 X1`` means 1 mm in machine coordinates, and a duration what it says.
 
     Gives the modal codes, empty where the server does not know them.
 
     Raises:
-        DeviceError: Inches, relative moves, a tool length, an offset or a feed override is active.
+        DeviceError: It counts in another unit than the cell file says; or relative moves, a tool length, an
+            offset or a feed override is active.
     """
     units = (await commands.get_if_known("user_linear_units")).upper()
-    if units not in ("MM", ""):
+    if units and _UNITS_MM.get(units) != commands.unit_mm:
         raise DeviceError(
-            f"counts in {units.lower()}",
+            f"counts in {units.lower()}, controller.unit_mm is {commands.unit_mm:g}",
             subject=commands.subject,
-            action="Set [TRAJ] LINEAR_UNITS = mm in its INI file",
+            action=f"Set controller.unit_mm = {_UNITS_MM[units]:g}"
+            if units in _UNITS_MM
+            else "Set [TRAJ] LINEAR_UNITS = mm in its INI file",
         )
     text = await commands.get_if_known("program_codes")
     codes = text.upper().split()
     for wrong, meaning, right in (
-        ("G20", "takes coordinates in inches", "G21"),
         ("G91", "takes coordinates as relative", "G90"),
         ("G43", "adds a tool length", "G49"),
     ):

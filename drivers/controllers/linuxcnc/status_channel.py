@@ -102,4 +102,4 @@ class StatusConnection:
         async with self._arbiter.exclusive():
             connection = await Connection.open(self._address, self._timeouts, self._trace, commanding=False)
         connection.send_turn = self._arbiter.query_turn
-        return ControllerCommands(connection, self._address.name, self._messages)
+        return ControllerCommands(connection, self._address, self._messages)

@@ -52,7 +52,7 @@ async def _stopped_over(
     try:
         await ready.take_control(_QUICK_TIMEOUT_S)
         await ready.request("set abort", _QUICK_TIMEOUT_S)
-        return await _is_at_standstill(ControllerCommands(ready, address.name), timeouts.poll, tolerance_mm)
+        return await _is_at_standstill(ControllerCommands(ready, address), timeouts.poll, tolerance_mm)
     except DeviceError:
         return False
     finally:
@@ -67,9 +67,7 @@ async def _try_to_stop(
         try:
             connection = await Connection.open(address, timeouts, recorder)
             try:
-                await _abort_until_still(
-                    ControllerCommands(connection, address.name), timeouts, tolerance_mm
-                )
+                await _abort_until_still(ControllerCommands(connection, address), timeouts, tolerance_mm)
             finally:
                 await connection.close()
         except DeviceError:

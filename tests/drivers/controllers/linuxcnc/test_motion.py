@@ -255,6 +255,23 @@ async def test_the_modes_of_before_are_restored_after_a_move(play):
     await driver.close()
 
 
+async def test_an_inch_machine_is_commanded_in_mm_and_what_it_tells_is_converted(play):
+    inches = ("get user_linear_units", b"USER_LINEAR_UNITS INCH\r\n")
+    modes = ("get program_codes", b"PROGRAM_CODES G0 G17 G40 G20 G90 G94 G54 G49 F0 S0\r\n")
+    there = b"ABS_ACT_POS 0.393701 0.787402 22.047244 5.000000 -4.000000 3.000000\r\n"
+    joints = b"JOINT_POS 1.0 2.0 -3.0 4.0 5.0 6.0\r\n"
+    homed = ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
+    told = [homed, ("get abs_act_pos", there), ("get joint_pos", joints)]
+    moved = [(MDI, ACK), ("get abs_act_pos", there), ("set mdi G20 G94 G0", ACK)]
+    driver = await play.opened([*READY, inches, modes, *CHECKED[2:], *moved, *told], unit_mm=25.4)
+    await driver.prepare(frozenset())
+    await driver.move(TARGET, MOVE_S)
+    reported = await driver.position()
+    assert reported is not None
+    assert reported.joints == pytest.approx((25.4, 50.8, -76.2, 101.6, 127.0, 152.4))
+    assert reported.pose.as_tuple() == pytest.approx(TARGET.as_tuple(), abs=2e-5)
+
+
 async def test_the_modes_that_a_stopped_move_leaves_are_restored_by_the_next_preparation(play):
     play.patience = play.IMPATIENT
     refused = [(MDI, b"SET MDI NAK\n\r"), ("get enable", b"ENABLE ON\r\n"), NO_ERROR]

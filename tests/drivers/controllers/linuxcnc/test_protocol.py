@@ -69,7 +69,7 @@ def test_a_command_longer_than_the_limit_is_refused():
 def test_a_timed_move_is_formatted_exactly():
     pose = Pose(10.0, -20.5, 560.123456789, 5.0, -4.0, 3.0)
     assert timed_move(pose, 2.5) == (
-        "G53 G93 G1 X10.00000000 Y-20.50000000 Z560.12345679 "
+        "G21 G53 G93 G1 X10.00000000 Y-20.50000000 Z560.12345679 "
         "A5.00000000 B-4.00000000 C3.00000000 F24.00000000"
     )
 
@@ -78,9 +78,9 @@ def test_a_timed_move_is_formatted_exactly():
 def test_a_timed_move_keeps_pose_and_duration_and_fits_a_line(pose, duration_s):
     words = timed_move(pose, duration_s).split()
     letters, values = zip(*((word[0], float(word[1:])) for word in words), strict=True)
-    assert "".join(letters) == "GGGXYZABCF"
-    assert values[3:9] == pytest.approx(pose.as_tuple(), abs=1e-7)
-    assert 60.0 / values[9] == pytest.approx(duration_s, rel=1e-4)
+    assert "".join(letters) == "GGGGXYZABCF"
+    assert values[4:10] == pytest.approx(pose.as_tuple(), abs=1e-7)
+    assert 60.0 / values[10] == pytest.approx(duration_s, rel=1e-4)
     encode_command(f"set mdi {timed_move(pose, duration_s)}")
 
 
@@ -91,6 +91,7 @@ def test_a_timed_move_keeps_pose_and_duration_and_fits_a_line(pose, duration_s):
         ("G1 G17 G40 G21 G90 G94 G54 G49 F250 S0", "G94 G1 F250"),
         ("G80 G17 G40 G21 G90 G94 F0 S0", "G94 G80"),
         ("G1 G90 G93 F3000 S0", "G93 G80"),
+        ("G0 G17 G20 G90 G94 F0 S0", "G20 G94 G0"),
         ("G1 G90 G94 F0 S0", "G94 G80"),
         ("G2 G90 G95 F0.5 S0", "G95 G80 F0.5"),
         ("", "G94 G0"),

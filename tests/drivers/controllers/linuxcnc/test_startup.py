@@ -174,11 +174,11 @@ async def test_an_acknowledged_command_without_effect_is_reported(play, conversa
     [
         (
             [("get user_linear_units", b"USER_LINEAR_UNITS INCH\r\n")],
-            r"counts in inch. Set \[TRAJ\] LINEAR_UNITS = mm",
+            r"counts in inch, controller.unit_mm is 1. Set controller.unit_mm = 25.4",
         ),
         (
-            [UNITS, ("get program_codes", b"PROGRAM_CODES G0 G17 G20 G90 G54 G49\r\n")],
-            r"takes coordinates in inches \(G20\). G21 is needed",
+            [("get user_linear_units", b"USER_LINEAR_UNITS CUSTOM\r\n")],
+            r"counts in custom, controller.unit_mm is 1. Set \[TRAJ\] LINEAR_UNITS = mm",
         ),
         (
             [UNITS, ("get program_codes", b"PROGRAM_CODES G0 G17 G21 G91 G54 G49\r\n")],

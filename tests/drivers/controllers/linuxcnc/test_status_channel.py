@@ -61,7 +61,7 @@ async def test_error_messages_are_read_when_the_machine_switches_off(play) -> No
 FAULT = ("get error", b"ERROR joint 3 following error\r\n")
 MOVE_S = 3.0
 BLOCK = (
-    "set mdi G53 G93 G1 X1.00000000 Y2.00000000 Z3.00000000 "
+    "set mdi G21 G53 G93 G1 X1.00000000 Y2.00000000 Z3.00000000 "
     "A0.00000000 B0.00000000 C0.00000000 F20.00000000"
 )
 RESTORED = ("set mdi G94 G0", b"SET MDI ACK\n\r")

@@ -122,7 +122,7 @@ def averaging_seconds(settings: CellSettings, windows: int) -> float:
 def _with_repeatability(settings: CellSettings, measured: MeasuredNoise) -> object:
     """The section of systematic effects; stops that were measured are in the noise of the records."""
     stated, approaches = settings.uncertainty, measured.approaches
-    if approaches is None or approaches.source is not ScatterSource.SLIDERS:
+    if approaches is None or approaches.source is not ScatterSource.JOINTS:
         return stated
     key = repeatability_key(approaches.unit)
     sources = stated.sources | {key: f"{approaches.visits} visits of the first reference"}

@@ -99,7 +99,7 @@ def _of_instrument(one: InstrumentNoise) -> Iterator[str]:
 
 def _of_approaches(found: RepeatedApproaches, source: ScatterSource) -> str:
     size = f"{_number(found.excess)} {found.unit.thousandth}"
-    if source is ScatterSource.SLIDERS:
+    if source is ScatterSource.JOINTS:
         what = f"the joints stop {size} beside what their encoders show"
         look = "Look for play in guides and joints, and for friction"
     elif source is ScatterSource.ENCODERS or source.startswith("encoder"):

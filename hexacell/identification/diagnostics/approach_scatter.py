@@ -1,12 +1,12 @@
 """Scatter between approaches: one pose visited again and again from different directions.
 
-At every visit the gauges see where the ball is, and the encoders where the sliders are. What the encoders
+At every visit the gauges see where the ball is, and the encoders where the joints are. What the encoders
 see of the ball's motion is no error of the model. The rest is, for each visit less their mean,
 
     r = d - G q,      G = dP/dq,      covariance  G diag(s_q^2) G^T + diag(s_d^2)
 
 with the noise of encoders and gauges that is stated for a record. Whether there is more is a chi-square
-test. Where it comes from, ball and sliders tell together. With stops s of the sliders that differ from
+test. Where it comes from, ball and joints tell together. With stops s of the joints that differ from
 visit to visit, play p between their encoders and joints, and errors e and g of encoders and gauges,
 
     q = s + e,      d = G (s + p) + g,
@@ -14,7 +14,7 @@ visit to visit, play p between their encoders and joints, and errors e and g of 
 so that play moves the ball and not the encoders, an error of the encoders the encoders and not the ball,
 and an error of one gauge that gauge alone. For each source one variance more is estimated by restricted
 maximum likelihood, with that of the stops. The likeliest source is named; a single instrument only where
-it is ten times as likely as all sliders or all encoders.
+it is ten times as likely as all joints or all encoders.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ FEWEST_VISITS = 3
 """Fewer visits, the first one included, tell nothing."""
 CONFIDENCE = 0.95
 INSTRUMENT_ODDS = 10.0
-"""How many times as likely as all sliders or encoders a single instrument must be to be named."""
+"""How many times as likely as all joints or encoders a single instrument must be to be named."""
 LARGEST_EXCESS = 1e3
 """Times the stated noise up to which sizes are sought."""
 ROUGH = 1e-2
@@ -46,7 +46,7 @@ STOP_SIZES = 100
 class ScatterSource(StrEnum):
     """What does not repeat."""
 
-    SLIDERS = "sliders"
+    JOINTS = "joints"
     ENCODERS = "encoders"
     GAUGE_X = "gauge x"
     GAUGE_Y = "gauge y"
@@ -58,6 +58,11 @@ class ScatterSource(StrEnum):
     ENCODER_5 = "encoder 5"
     ENCODER_6 = "encoder 6"
 
+    @classmethod
+    def _missing_(cls, value: object) -> ScatterSource | None:
+        """Journals up to version 11 have the word for a Hexaglide's joints."""
+        return cls.JOINTS if value == "sliders" else None
+
     @property
     def instruments(self) -> Array:
         """Which of gauges x, y, z and the encoders of legs 1 to 6 it is noise of: (9,), 1 or 0."""
@@ -66,7 +71,7 @@ class ScatterSource(StrEnum):
         return np.asarray(np.eye(3 + LEGS)[ALONE.index(self)])
 
 
-TOGETHER = (ScatterSource.SLIDERS, ScatterSource.ENCODERS)
+TOGETHER = (ScatterSource.JOINTS, ScatterSource.ENCODERS)
 ALONE = tuple(source for source in ScatterSource if source not in TOGETHER)
 
 
@@ -80,7 +85,7 @@ class ApproachScatter:
         ball_mm: how far the ball is from its mean, as the gauges see it (root mean square distance).
         chi_square: of what the encoders do not explain, under the stated noise.
         source: what does not repeat; none where the stated noise explains everything.
-        excess: one standard deviation of it beside the stated noise, of each slider or encoder or of
+        excess: one standard deviation of it beside the stated noise, of each joint or encoder or of
             the instrument.
     """
 
@@ -142,8 +147,8 @@ class _Visits:
     """Visits of one pose.
 
     Attributes:
-        products: (9, 9), mm^2, of ball and sliders less their means, summed over the visits.
-        motion: (9, 6) of ball and encoders by the stops of the sliders.
+        products: (9, 9), mm^2, of ball and joints less their means, summed over the visits.
+        motion: (9, 6) of ball and encoders by the stops of the joints.
         stated: (9, 9) covariance of the instruments.
     """
 
@@ -163,7 +168,7 @@ class _Visits:
         return float(np.sqrt(np.trace(self.products[:3, :3]) / self.freedom))
 
     def unexplained(self) -> float:
-        """Chi-square of what the encoders do not explain, which no stop of the sliders changes."""
+        """Chi-square of what the encoders do not explain, which no stop of the joints changes."""
         rest = np.concatenate([np.eye(3), -self.motion[:3]], axis=1)
         covariance, products = rest @ self.stated @ rest.T, rest @ self.products @ rest.T
         return float(np.trace(np.linalg.solve(covariance, products)))
@@ -173,7 +178,7 @@ class _Visits:
         from scipy.optimize import minimize_scalar  # noqa: PLC0415 - its import takes half a second
 
         added = np.diag(source.instruments)
-        if source is ScatterSource.SLIDERS:
+        if source is ScatterSource.JOINTS:
             moved = np.concatenate([self.motion[:3], np.zeros((LEGS, LEGS))])
             added = moved @ moved.T
         unit = float(np.sqrt(np.diag(self.stated)[source.instruments > 0.0].mean()))

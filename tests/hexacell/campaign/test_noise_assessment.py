@@ -110,7 +110,7 @@ def test_one_noisy_instrument_is_named_and_counts_as_it_is(plan, row) -> None:
 def test_play_becomes_noise_of_the_encoders_and_the_repeatability_of_the_budget(plan) -> None:
     measured = assess_noise(plan, readings(plan, sliders=0.06))
     assert measured.approaches is not None
-    assert measured.approaches.source is ScatterSource.SLIDERS
+    assert measured.approaches.source is ScatterSource.JOINTS
     assert measured.approaches.excess == pytest.approx(0.06, rel=0.4)
     expected = np.hypot(STATED, measured.approaches.excess)
     assert records_of(measured)[3:] == pytest.approx(np.full(6, expected))

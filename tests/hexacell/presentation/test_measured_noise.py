@@ -98,7 +98,7 @@ def test_false_readings_are_told() -> None:
 @pytest.mark.parametrize(
     ("source", "what", "action"),
     [
-        (ScatterSource.SLIDERS, "the joints stop 49 um beside what their encoders show", "Look for play"),
+        (ScatterSource.JOINTS, "the joints stop 49 um beside what their encoders show", "Look for play"),
         (ScatterSource.ENCODERS, "encoders: 49 um beside where the joints are", "reading heads"),
         (ScatterSource.ENCODER_3, "encoder 3: 49 um beside where the joints are", "reading heads"),
         (ScatterSource.GAUGE_Z, "gauge z shows 49 um more or less at the same place", "its plunger"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hexacell.campaign.measured_noise import InstrumentNoise, RepeatedApproaches
+from hexacell.identification.diagnostics.approach_scatter import ScatterSource
 from hexacell.kinematics.parameters import JointUnit
 from procedures.run import events
 
@@ -34,4 +35,6 @@ def test_noise() -> None:
     assert (found.reading, found.drift, found.stated, found.record) == (0.1, 0.2, 0.3, 0.4)
     assert found.unit is JointUnit.MM
     visits = {"visits": 7, "degrees_of_freedom": 18, "ball_mm": 0.1, "ratio": 2.0, "source": "sliders"}
-    assert RepeatedApproaches.model_validate(visits | {"excess_mm": 0.05}).excess == 0.05
+    approaches = RepeatedApproaches.model_validate(visits | {"excess_mm": 0.05})
+    assert (approaches.excess, approaches.source) == (0.05, ScatterSource.JOINTS)
+    assert approaches.model_dump(mode="json")["source"] == "joints"

@@ -54,8 +54,8 @@ def test_the_upper_limit_of_the_noise_holds_in_95_percent(visit) -> None:
 def test_play_of_the_sliders_is_found_with_its_size(visit) -> None:
     found = [visit(sliders=0.05) for _ in range(100)]
     named = Counter(one.source for one in found)
-    assert named[ScatterSource.SLIDERS] >= 95
-    sizes = [one.excess for one in found if one.source is ScatterSource.SLIDERS]
+    assert named[ScatterSource.JOINTS] >= 95
+    sizes = [one.excess for one in found if one.source is ScatterSource.JOINTS]
     assert np.median(sizes) == pytest.approx(0.05, rel=0.15)
 
 
@@ -77,7 +77,7 @@ def test_a_gauge_that_does_not_repeat_is_named_with_its_size(visit, gauges, sour
 @pytest.mark.parametrize("stops", [0.0, 0.02])
 def test_play_moves_the_ball_and_errors_of_encoders_do_not(visit, stops) -> None:
     """Whether the controller stops at the same place or not, neither is taken for the other."""
-    for kind, source in (("sliders", ScatterSource.SLIDERS), ("encoders", ScatterSource.ENCODERS)):
+    for kind, source in (("sliders", ScatterSource.JOINTS), ("encoders", ScatterSource.ENCODERS)):
         found = [visit(stops=stops, **{kind: 0.04}) for _ in range(60)]
         named = [one for one in found if one.source is source]
         assert len(named) >= 56
@@ -100,7 +100,7 @@ def test_a_single_instrument_is_rarely_blamed_for_all_sliders_or_encoders(visit)
 
 
 def test_each_source_is_noise_of_its_instruments() -> None:
-    both = [ScatterSource.SLIDERS.instruments, ScatterSource.ENCODERS.instruments]
+    both = [ScatterSource.JOINTS.instruments, ScatterSource.ENCODERS.instruments]
     assert [one.tolist() for one in both] == [[0, 0, 0, 1, 1, 1, 1, 1, 1]] * 2
     assert np.sum([source.instruments for source in ALONE], axis=0).tolist() == [1] * 9
     assert ScatterSource.GAUGE_Y.instruments.tolist() == [0, 1, 0, 0, 0, 0, 0, 0, 0]

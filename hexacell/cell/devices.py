@@ -204,6 +204,20 @@ class ControllerSettings(Section):
         None, exclude=True, description="no longer used: how long a move may last follows from its duration"
     )
 
+    @property
+    def joint_unit_mm(self) -> float:
+        """One unit of the joint variables that it tells, in mm."""
+        return self.unit_mm
+
+
+class RotaryControllerSettings(ControllerSettings):
+    """The controller of a robot whose joints turn."""
+
+    @property
+    def joint_unit_mm(self) -> float:
+        """One degree: an inch machine tells angles in degrees too."""
+        return 1.0
+
 
 class ThermometerSettings(Section):
     """A thermometer at the machine or in the room; its readings are kept with every record."""

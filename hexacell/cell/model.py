@@ -16,6 +16,7 @@ from hexacell.cell.devices import (
     EncoderSettings,
     GaugeSettings,
     LinearEncoderSettings,
+    RotaryControllerSettings,
     RotaryEncoderSettings,
     ThermometerSettings,
 )
@@ -271,6 +272,7 @@ def cell_model(mechanism: str) -> type[CellSettings]:
         uncertainty=(uncertainty, uncertainty()),
         robot=(robot, ...),
         encoders=(encoders, ...),
+        controller=(RotaryControllerSettings if is_rotary else ControllerSettings, ...),
         tolerances=(tolerances, tolerances() if has_defaults else ...),
         simulation=(simulation | None, None),
         **_in_unit(

@@ -62,6 +62,7 @@ class ControllerCommands:
         self.connection = connection
         self.subject = address.name
         self.unit_mm = address.unit_mm
+        self.joint_unit_mm = address.joint_unit_mm
         self._messages = messages or ErrorMessages()
 
     async def get(self, what: str) -> str:
@@ -95,9 +96,9 @@ class ControllerCommands:
         return Pose(self.unit_mm * x, self.unit_mm * y, self.unit_mm * z, *angles)
 
     async def joints(self) -> tuple[float, ...]:
-        """The six actual joint positions, mm."""
+        """The six actual joint variables, mm or deg."""
         told = self._parsed(parse_positions, await self.get("joint_pos"))
-        return tuple(self.unit_mm * value for value in told)
+        return tuple(self.joint_unit_mm * value for value in told)
 
     async def all_homed(self) -> bool:
         """Whether every joint is homed."""

@@ -14,7 +14,7 @@ from hexacell.errors import UsageError
 class Address:
     """A server and the passwords it was started with; they are sent in clear text.
 
-    ``unit_mm`` is one unit of the positions that it tells.
+    ``unit_mm`` is one unit of the positions that it tells, ``joint_unit_mm`` one of the joint variables.
     """
 
     host: str
@@ -22,6 +22,7 @@ class Address:
     connect_password: str = field(repr=False)
     enable_password: str = field(repr=False)
     unit_mm: float = 1.0
+    joint_unit_mm: float = 1.0
 
     @classmethod
     def of(cls, settings: ControllerSettings) -> Self:
@@ -34,7 +35,7 @@ class Address:
             raise UsageError("the cell file names no controller port", action="Set controller.port")
         connect, enable = settings.connect_password, settings.enable_password
         passwords = connect.get_secret_value(), enable.get_secret_value()
-        return cls(settings.host, settings.port, *passwords, settings.unit_mm)
+        return cls(settings.host, settings.port, *passwords, settings.unit_mm, settings.joint_unit_mm)
 
     @property
     def name(self) -> str:

@@ -92,6 +92,16 @@ def test_a_count_is_a_length_or_an_angle() -> None:
     assert (rotary.step, rotary.unit) == (0.1, JointUnit.DEG)
 
 
+def test_an_inch_machine_tells_angles_in_degrees(tmp_path: Path) -> None:
+    inches = changed(tmp_path, "[controller]\n", "[controller]\nunit_mm = 25.4\n")
+    rotary = load_cell(inches).settings.controller
+    assert (rotary.unit_mm, rotary.joint_unit_mm) == (25.4, 1.0)
+    linear = tmp_path / "linear.toml"
+    text = (CONFIGS / "gough-stewart.toml").read_text()
+    linear.write_text(text.replace("[controller]\n", "[controller]\nunit_mm = 25.4\n"))
+    assert load_cell(linear).settings.controller.joint_unit_mm == 25.4
+
+
 def test_encoders_of_angles_have_no_scale_and_are_off_centre() -> None:
     settings = load_cell(CONFIGS / "rotary-cranks.toml").settings
     names = {effect.name: effect.unit for effect in stated_effects(settings)}

@@ -13,7 +13,7 @@ from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.settings import Address, Timeouts
 from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import WireTrace
-from hexacell.cell.devices import ControllerSettings
+from hexacell.cell.devices import ControllerSettings, RotaryControllerSettings
 from hexacell.errors import DeviceError, ExitCode, UsageError
 
 HELLO = "hello EMC hexacell 1.0"
@@ -241,3 +241,11 @@ async def test_passwords_stay_out_of_the_trace(play):
         b"hello *** hexacell 1.0\r\nset echo off\r\nset verbose on\r\nset enable ***\r\n"
     )
     assert "machine.ini" in trace.text()
+
+
+@pytest.mark.parametrize(
+    ("made", "joint_unit_mm"), [(ControllerSettings, 25.4), (RotaryControllerSettings, 1.0)]
+)
+def test_an_inch_machine_tells_angles_in_degrees(made: type[ControllerSettings], joint_unit_mm: float):
+    address = Address.of(made(config="robot.toml", port=5007, unit_mm=25.4))
+    assert (address.unit_mm, address.joint_unit_mm) == (25.4, joint_unit_mm)

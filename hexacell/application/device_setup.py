@@ -83,6 +83,10 @@ def _plugins(settings: CellSettings) -> Iterator[tuple[KeyPath, Group, str]]:
     yield ("robot", "mechanism"), Group.MECHANISMS, settings.robot.mechanism
 
 
+CONTROLLER_SCALES = "controller"
+"""The protocol of encoders that the controller reads: their driver is given that of the controller."""
+
+
 @dataclass(frozen=True)
 class Connected:
     """A cell's open devices, and the trace of their traffic."""
@@ -107,8 +111,12 @@ def devices_of(
         MountedGauge(load(Group.GAUGES, gauge.protocol)(gauge, links), gauge.mounting)
         for gauge in settings.gauges
     )
-    encoders = load(Group.ENCODERS, settings.encoders.protocol)(settings.encoders, trace=trace)
     controller = load(Group.CONTROLLERS, settings.controller.protocol)(settings.controller, trace=trace)
+    factory = load(Group.ENCODERS, settings.encoders.protocol)
+    of_controller = settings.encoders.protocol == CONTROLLER_SCALES
+    encoders = factory(
+        settings.encoders, **({"controller": controller} if of_controller else {"trace": trace})
+    )
     return Devices(gauges, encoders, controller, stop_input_of(settings.guards, folder or Path()))
 
 

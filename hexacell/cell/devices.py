@@ -83,7 +83,7 @@ class GaugeSettings(Section):
 class EncoderSettings(Section, ABC):
     """The bank of six joint encoders, but for what a count is."""
 
-    protocol: Text = Field("cia406", description="cia406, or one that a plug-in adds")
+    protocol: Text = Field("cia406", description="cia406, controller, or one that a plug-in adds")
     bus: dict[str, Any] | None = Field(None, description="passed to python-can's Bus")
     nodes: tuple[NodeId, NodeId, NodeId, NodeId, NodeId, NodeId] = Field(
         (1, 2, 3, 4, 5, 6), description="CANopen node ids of legs 1 to 6, each from 1 to 127"

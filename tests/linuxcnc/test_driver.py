@@ -8,7 +8,9 @@ import pytest
 
 from drivers.controllers.errors import MoveRefused, PoseRefused
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
+from drivers.encoders.of_controller import ControllerScales
 from drivers.interfaces import StartupAction
+from hexacell.cell.devices import LinearEncoderSettings
 from hexacell.cell.loader import load_cell
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
@@ -87,3 +89,20 @@ async def test_a_pose_that_the_kinematics_cannot_reach_is_refused(driver) -> Non
     with pytest.raises(MoveRefused):
         await driver.move(Pose(0.0, 0.0, 749.0, 40.0, 40.0, 55.0), MOVE_S)
     await driver.move(THERE, MOVE_S)
+
+
+async def test_its_scales_are_read_also_during_a_move(linuxcnc, driver) -> None:
+    settings = LinearEncoderSettings.model_validate({"protocol": "controller", "measuring_step_nm": 1})
+    scales = ControllerScales(settings, driver)
+    with pytest.raises(DeviceError, match="are not homed"):
+        await scales.read()
+    await driver.prepare(ALL)
+    before = await scales.read()
+    moving = asyncio.create_task(driver.move(THERE, 3.0))
+    while (await scales.read()).counts == before.counts:
+        assert not moving.done()
+    on_the_way = await scales.read()
+    await moving
+    after = await scales.read()
+    assert len({before.counts, on_the_way.counts, after.counts}) == 3
+    assert after.positions == await driver.joint_positions()

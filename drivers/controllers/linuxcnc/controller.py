@@ -138,6 +138,10 @@ class LinuxcncrshController:
         async with self._order:
             return await (await self._session.synchronized()).joints()
 
+    async def joints_now(self) -> tuple[float, ...] | None:
+        """The six joints, also during ``move``; none before all are homed."""
+        return await self._session.joints()
+
     async def status(self) -> ControllerStatus:
         """Emergency stop, enabled, and error messages; also during ``move``."""
         return await self._session.status()

@@ -125,6 +125,16 @@ class Session:
         await self._arbiter.stop_ended()
         return await self._status.read()
 
+    async def joints(self) -> tuple[float, ...] | None:
+        """Where the joints are now, over the same connection; none before all are homed.
+
+        Raises:
+            DeviceError: The session is closed, or they cannot be read.
+        """
+        self._require_open()
+        await self._arbiter.stop_ended()
+        return await self._status.joints()
+
     async def stop(self, tolerance_mm: float) -> None:
         """Stop the motion over a connection of its own; no command is sent meanwhile.
 

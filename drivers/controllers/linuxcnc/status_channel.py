@@ -55,6 +55,20 @@ class StatusConnection:
                 await self._channel.close()
                 raise
 
+    async def joints(self) -> tuple[float, ...] | None:
+        """Where the joints are now; none before all are homed.
+
+        Raises:
+            DeviceError: It cannot be read.
+        """
+        async with self._query:
+            commands = await self._channel.synchronized()
+            try:
+                return await commands.joints() if await commands.all_homed() else None
+            except ConnectionLost:
+                await self._channel.close()
+                raise
+
     def begin_disabled(self) -> None:
         """An order is about to enable the machine."""
         self._was_enabled, self._messages.for_status = False, []

@@ -1,0 +1,72 @@
+"""Encoders that are wired to the robot's controller: their positions as it tells them.
+
+Of most machines the scales are those of the drives, and nothing but the controller can read them. What it
+tells is as old as its last cycle (10 ms of LinuxCNC's task) and a position only once the joints are homed.
+It is kept in counts of the size that the cell file states. A comparison of encoders and controller says
+nothing then: both are one reading, and a scale that slips moves both.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+from drivers.encoders.cia406 import joint_variables
+from drivers.interfaces import DeviceIdentity, EncoderSample
+from hexacell.cell.devices import EncoderSettings
+from hexacell.errors import DeviceError, UsageError
+
+PROTOCOL = "controller"
+
+
+@runtime_checkable
+class JointPositions(Protocol):
+    """A controller that tells where its joints are, also during a move."""
+
+    async def joints_now(self) -> tuple[float, ...] | None:
+        """The six joints, in the unit of the joint variables; none before they are homed."""
+        ...
+
+
+class ControllerScales:
+    """``drivers.interfaces.EncoderBank`` of the scales at a controller; opened and closed with that.
+
+    Raises:
+        UsageError: this controller does not tell its joints.
+    """
+
+    def __init__(self, settings: EncoderSettings, controller: object) -> None:
+        if not isinstance(controller, JointPositions):
+            raise UsageError(
+                "the controller does not tell where its joints are",
+                action="Give the encoders a bus of their own, in [encoders]",
+            )
+        self._settings = settings
+        self._controller = controller
+
+    async def open(self) -> tuple[DeviceIdentity, ...]:
+        """One identity a leg; nothing is asked."""
+        return tuple(
+            DeviceIdentity(f"encoder of leg {leg}", PROTOCOL, "as the controller tells its joints")
+            for leg in range(1, 7)
+        )
+
+    async def read(self) -> EncoderSample:
+        """One sample.
+
+        Raises:
+            DeviceError: the joints are not homed, or the controller does not answer.
+        """
+        told = await self._controller.joints_now()
+        if told is None:
+            raise DeviceError(
+                "are not homed: what the controller tells of its joints is no position yet",
+                subject="encoders",
+                action="Home the controller, or let controller.startup do it",
+            )
+        settings = self._settings
+        terms = zip(told, settings.direction, settings.offset, strict=True)
+        counts = tuple(round(sign * (joint - offset) / settings.step) for joint, sign, offset in terms)
+        return EncoderSample(counts, joint_variables(counts, settings), settings.unit)
+
+    async def close(self) -> None:
+        """Nothing is open."""

@@ -1,0 +1,57 @@
+"""Encoders that only the controller can read."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.encoders.cia406 import joint_variables
+from drivers.encoders.of_controller import ControllerScales
+from hexacell.cell.devices import LinearEncoderSettings
+from hexacell.errors import DeviceError, UsageError
+
+JOINTS = (-461.827519, -455.741652, -448.908104, 465.952312, 465.044723, 488.923462)
+
+
+class Controller:
+    """Tells its joints, or that they are not homed."""
+
+    joints: tuple[float, ...] | None = JOINTS
+
+    async def joints_now(self) -> tuple[float, ...] | None:
+        return self.joints
+
+
+def settings(**changes: object) -> LinearEncoderSettings:
+    return LinearEncoderSettings.model_validate(
+        {"protocol": "controller", "measuring_step_nm": 1} | changes
+    )
+
+
+async def test_positions_are_what_the_controller_tells_and_counts_give_them_again() -> None:
+    own = settings()
+    bank = ControllerScales(own, Controller())
+    assert [one.name for one in await bank.open()] == [f"encoder of leg {leg}" for leg in range(1, 7)]
+    sample = await bank.read()
+    assert sample.positions == pytest.approx(JOINTS, abs=5e-7)
+    assert joint_variables(sample.counts, own) == sample.positions, "as a replay computes them"
+    await bank.close()
+
+
+async def test_direction_and_offset_are_those_of_the_cell_file() -> None:
+    own = settings(direction=(1, -1, 1, 1, 1, 1), offset_mm=(0, 0, 0, 0, 0, 10), measuring_step_nm=1000)
+    sample = await ControllerScales(own, Controller()).read()
+    assert sample.counts[1] == 455742
+    assert sample.counts[5] == 478923
+    assert sample.positions == pytest.approx(JOINTS, abs=5e-4)
+
+
+async def test_joints_that_are_not_homed_are_no_positions() -> None:
+    controller = Controller()
+    controller.joints = None
+    with pytest.raises(DeviceError, match="are not homed"):
+        await ControllerScales(settings(), controller).read()
+
+
+def test_a_controller_that_does_not_tell_its_joints_is_refused() -> None:
+    with pytest.raises(UsageError, match="does not tell where its joints are"):
+        ControllerScales(settings(), object())

@@ -41,10 +41,10 @@ def test_every_kind_that_hexacell_itself_announces() -> None:
     own = {group: plugins.names(group) for group in Group}
     assert own == {
         Group.GAUGES: ("cdi", "mux10", "sylvac"),
-        Group.ENCODERS: ("cia406",),
+        Group.ENCODERS: ("cia406", "controller"),
         Group.CONTROLLERS: ("linuxcncrsh",),
         Group.THERMOMETERS: ("sysfs",),
-        Group.CONFIG_FORMATS: ("toml",),
+        Group.CONFIG_FORMATS: ("linuxcnc-hal", "linuxcnc-ini", "template", "toml"),
         Group.MECHANISMS: ("gough-stewart", "hexaglide", "rotary-cranks", "six-rails"),
     }
 

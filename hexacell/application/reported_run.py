@@ -78,6 +78,9 @@ def reported_run(run: Path) -> ReportedRun:
         FileError: one of its files cannot be read, or is damaged.
     """
     folder = RunFolder(run)
+    if not folder.journal.is_file() and folder.attempts.is_file():
+        action = "`hexacell history CELL --json` says why"
+        raise UsageError("this run never began", subject=run, action=action)
     if not folder.journal.is_file():
         raise UsageError("this is no run folder", subject=run, action="`hexacell history CELL` lists them")
     entries = read_entries(folder.journal)

@@ -148,6 +148,15 @@ def test_what_is_no_run_is_refused(typed_here, cell_folder, named) -> None:
     assert "this is no run folder" in outcome.err
 
 
+def test_a_run_that_never_began_has_no_report(typed_here, short_cell) -> None:
+    always = '\n[unattended]\nquiet_hours = ["00:00-12:00", "12:00-00:00"]\n'
+    short_cell.cell.write_text(short_cell.cell.read_text() + always)
+    typed_here("run", short_cell.cell, "--unattended")
+    [night] = short_cell.runs()
+    outcome = typed_here("report", night)
+    assert (outcome.code, "this run never began" in outcome.err) == (2, True)
+
+
 def test_a_damaged_result_is_told(typed_here, run) -> None:
     (run / "result.json").write_text("{")
     outcome = typed_here("report", run)

@@ -117,6 +117,7 @@ class Forecaster:
         error = self.task.error(belief)
         if error is None:
             return PointRanking(dict.fromkeys(points, math.inf), points[0])
+        error = error.of_estimate
         information = PlannedInformation.of(self.planned_sets(), belief)
         gains: dict[int, float] = {}
         rates: dict[int, float] = {}

@@ -66,7 +66,12 @@ class StoppingRules:
         return self._target_reached(state) or self._another_point(state, point)
 
     def little_gain(self, proposed: MeasurePose) -> str | None:
-        """Why a proposed record is not worth its time."""
+        """Why a proposed record is not worth its time.
+
+        Of zeros alone none is judged: what is held makes most of the error, and no record lowers that.
+        """
+        if self.forecaster.task.held is not None:
+            return None
         least, forecast = self.settings.identification.least_gain_mm, proposed.forecast
         if forecast is None or forecast.now_mm - forecast.next_mm >= least:
             return None

@@ -28,16 +28,22 @@ class TaskError:
     Attributes:
         jacobian: (n, 3, p) of positions, mm, without what another choice of frames would explain.
         held: parameters that are not identified, if any: their tolerances are part of every error.
+        gain: with which the others are then identified (p, p), for poses all over the workspace.
     """
 
     jacobian: Array
     held: HeldParameters | None = None
+    gain: Array | None = None
+
+    @property
+    def of_estimate(self) -> TaskError:
+        """Of the estimate of all parameters, which records improve whatever is held."""
+        return TaskError(self.jacobian)
 
     def variances(self, covariance: Array) -> Array:
         """Mean square distances (n,), mm^2, under a covariance (p, p) of the estimated free parameters."""
-        if self.held is not None:
-            gain = self.held.gain(self.jacobian.reshape(-1, self.jacobian.shape[-1]))
-            covariance = self.held.covariance(gain, covariance)
+        if self.held is not None and self.gain is not None:
+            covariance = self.held.covariance(self.gain, covariance)
         squares: Array = np.einsum("nap,pq,naq->n", self.jacobian, covariance, self.jacobian, optimize=True)
         return squares
 
@@ -115,7 +121,18 @@ class Task:
     def error(self, belief: RobotBelief) -> TaskError | None:
         """How the error depends on the parameters; none if the estimated robot can take no task pose."""
         jacobian = self.jacobian(belief)
-        return None if jacobian is None else TaskError(jacobian[:, :3], self.held)
+        if jacobian is None:
+            return None
+        return TaskError(jacobian[:, :3], self.held, self._gain(belief))
+
+    def _gain(self, belief: RobotBelief) -> Array | None:
+        """As :class:`IdentifiedZeros` has it of records, which are all over the workspace too."""
+        if self.held is None:
+            return None
+        poses = _reachable(belief, self.workspace)
+        radius = float(belief.mechanism.platform_radius(belief.estimate))
+        errors = np.repeat([1.0, radius], 3)[:, None] * error_jacobian(belief, poses, poses)
+        return self.held.gain(errors.reshape(-1, errors.shape[-1]))
 
     def jacobian(self, belief: RobotBelief) -> Array | None:
         """Derivatives (n, 6, p) of positions, mm, and rotation vectors, rad, by the free parameters.

@@ -69,9 +69,14 @@ def test_a_machine_whose_joints_are_off_as_well_does_not_pass(tmp_path: Path) ->
     assert re.search(
         r"position error at the task poses \d\.\d+ .*: (fail|not evaluated)", run.document["line"]
     )
+    forecasts = re.findall(r"predicted error at the task \d\.\d+ mm, U (\d\.\d+)", run.err)
+    assert len(forecasts) == 5
+    assert min(map(float, forecasts)) > 1.0
     config = tmp_path / f"{NAME}.controller.toml"
     assert config.read_text() == (CONFIGS / config.name).read_text()
     [folder] = (tmp_path / "runs" / NAME).glob("2*")
+    replayed = run_command(tmp_path, "replay", folder)
+    assert replayed.code == 0, replayed.err
     fitted = run_command(tmp_path, "fit", cell, "--measurements", folder / "measurements.csv")
     said = " ".join(fitted.out.split())
     assert "Identified: zeros only, 6 of 33." in said

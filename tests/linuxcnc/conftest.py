@@ -74,6 +74,10 @@ class LinuxCNC:
             subprocess.run(["pkill", "-KILL", "-x", name], check=False)
         self._wait()
 
+    def signal_server(self, name: str) -> None:
+        """Send a signal to linuxcncrsh alone: ``STOP`` freezes it, ``CONT`` lets it go on."""
+        subprocess.run(["pkill", f"-{name}", "-x", "linuxcncrsh"], check=True)
+
     @property
     def log(self) -> str:
         """All that it printed."""

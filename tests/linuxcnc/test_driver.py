@@ -106,3 +106,22 @@ async def test_its_scales_are_read_also_during_a_move(linuxcnc, driver) -> None:
     after = await scales.read()
     assert len({before.counts, on_the_way.counts, after.counts}) == 3
     assert after.positions == pytest.approx(await driver.joint_positions(), abs=1e-9)
+
+
+async def test_a_frozen_server_is_told_and_it_goes_on_when_it_answers_again(linuxcnc, driver) -> None:
+    await driver.prepare(ALL)
+    standing = (await driver.status()).heartbeat
+    moving = asyncio.create_task(driver.move(THERE, 5.0))
+    while (await driver.status()).heartbeat == standing:
+        pass
+    linuxcnc.signal_server("STOP")
+    try:
+        with pytest.raises(DeviceError, match="Press the emergency stop") as caught:
+            await driver.stop()
+        assert "could not be stopped" in caught.value.problem
+    finally:
+        linuxcnc.signal_server("CONT")
+    await asyncio.wait([moving])  # LinuxCNC itself was not frozen: it may have arrived
+    await driver.prepare(ALL)
+    await driver.move(Pose(0.0, 0.0, 550.0), MOVE_S)
+    assert await distance(driver, Pose(0.0, 0.0, 550.0)) < 1e-3

@@ -81,6 +81,10 @@ class HalText:
             )
         return tokens[0]
 
+    def has(self, key: str) -> bool:
+        """Whether a line sets a pin."""
+        return key in self._tokens
+
     @cached_property
     def _tokens(self) -> Mapping[str, list[NumberToken]]:
         found: defaultdict[str, list[NumberToken]] = defaultdict(list)

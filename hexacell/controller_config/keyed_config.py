@@ -23,7 +23,7 @@ from typing import Any, Protocol, Self, TypeVar, cast
 from pydantic import Field, ValidationError
 
 from hexacell.cell.fields import Positive, Section, Text, first_mistake
-from hexacell.controller_config.interface import LARGEST_CONFIG_BYTES, ControllerGeometry
+from hexacell.controller_config.interface import LARGEST_CONFIG_BYTES, ControllerGeometry, JointRanges
 from hexacell.controller_config.number_tokens import (
     NumberToken,
     replace_tokens,
@@ -47,9 +47,15 @@ class NumberLookup(Protocol):
         """The number of a key; raises ``FileError`` if there is none, or more than one."""
         ...
 
+    def has(self, key: str) -> bool:
+        """Whether there is a number of that key."""
+        ...
+
 
 OpenText = Callable[[str, Path | None], NumberLookup]
 DefaultKey = Callable[[GeometricParameter], str]
+RangeKeys = tuple[tuple[str, str], ...]
+"""Keys of the smallest and largest joint variable of each leg."""
 
 
 class KeyedOptions(Section):
@@ -165,8 +171,14 @@ class KeyedConfig:
     """A :class:`~hexacell.controller_config.interface.ConfigFormat` of such texts."""
 
     def __init__(
-        self, parameters: ParameterSet, keys: NumberKeys, open_text: OpenText, unit_mm: float
+        self,
+        parameters: ParameterSet,
+        keys: NumberKeys,
+        open_text: OpenText,
+        unit_mm: float,
+        range_keys: RangeKeys = (),
     ) -> None:
+        self._range_keys = range_keys
         self._parameters = parameters
         self._keys = keys
         self._open = open_text
@@ -177,7 +189,8 @@ class KeyedConfig:
         text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
         lookup = self._open(text, path)
         values = [self._value(lookup, one, path) for one in self._parameters.parameters]
-        return ControllerGeometry(Geometry(self._parameters, values), self._branch(lookup, path))
+        ranges = joint_ranges(lookup, self._range_keys, self._unit_mm, path)
+        return ControllerGeometry(Geometry(self._parameters, values), self._branch(lookup, path), ranges)
 
     def rewrite(self, text: str, geometry: Geometry) -> str:
         """``text`` with ``geometry`` in it, to 1 nm; a number that agrees to half of that is kept.
@@ -233,6 +246,24 @@ class KeyedConfig:
         if (value := _number(token, source)) not in {1.0, -1.0}:
             raise token_error(token, f"{key} is {token.text}", source, "It must be 1 or -1")
         return int(value)
+
+
+def joint_ranges(lookup: NumberLookup, keys: RangeKeys, unit_mm: float, source: Path) -> JointRanges | None:
+    """Smallest and largest joint variable of each leg, mm; none where the config has not all of them.
+
+    Raises:
+        FileError: a smallest one is not below the largest.
+    """
+    if not keys or not all(lookup.has(key) for pair in keys for key in pair):
+        return None
+    found = []
+    for low_key, high_key in keys:
+        low, high = lookup.number(low_key), lookup.number(high_key)
+        if _number(low, source) >= _number(high, source):
+            problem = f"{high_key} is not above {low_key}, {low.text}"
+            raise token_error(high, problem, source, "Correct one of them")
+        found.append((unit_mm * low.value, unit_mm * high.value))
+    return tuple(found)
 
 
 def _number(token: NumberToken, source: Path | None) -> float:

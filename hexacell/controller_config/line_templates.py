@@ -141,6 +141,10 @@ class _MatchedLines:
         """The number of a parameter."""
         return self.tokens[key]
 
+    def has(self, key: str) -> bool:
+        """Whether a template names it."""
+        return key in self.tokens
+
 
 def _tokens(
     template: _LineTemplate, lines: Iterable[tuple[int, int, str]], source: Path | None

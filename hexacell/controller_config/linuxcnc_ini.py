@@ -5,7 +5,8 @@
     ...
     L6 = 700.0
 
-HAL reads them by ``setp hexaglidekins.s1x [HEXAGLIDE]S1X``.
+HAL reads them by ``setp hexaglidekins.s1x [HEXAGLIDE]S1X``. Where the same file has the limits of all six
+joints (``[JOINT_0] MIN_LIMIT``), these are the joint ranges.
 
 LinuxCNC looks for a variable in the first section of that name alone and takes the first one there; names
 are case-sensitive; what stands behind the number belongs to the value, comments too (seen with ``inivar``
@@ -27,7 +28,7 @@ from hexacell.cell.fields import Text
 from hexacell.controller_config.keyed_config import KeyedConfig, KeyedOptions, NumberKeys, options_of
 from hexacell.controller_config.number_tokens import NumberToken
 from hexacell.errors import FileError
-from hexacell.kinematics.parameters import ParameterSet
+from hexacell.kinematics.parameters import LEGS, ParameterSet
 
 SEPARATOR = "/"
 """Between a section and a variable in a key; without it the variable is in the section of the options."""
@@ -50,7 +51,11 @@ class LinuxcncIni(KeyedConfig):
         options = options_of(LinuxcncIniOptions, "linuxcnc-ini", given)
         keys = NumberKeys.of(parameters, options, lambda parameter: parameter.name.upper())
         super().__init__(
-            parameters, keys, lambda text, path: IniText(text, path, options.section), options.unit_mm
+            parameters,
+            keys,
+            lambda text, path: IniText(text, path, options.section),
+            options.unit_mm,
+            tuple((f"JOINT_{leg}/MIN_LIMIT", f"JOINT_{leg}/MAX_LIMIT") for leg in range(LEGS)),
         )
 
 

@@ -23,6 +23,9 @@ BEFORE, AFTER, INK = "#b35806", "#2166ac", "#222222"
 PLACE = (0.12, 0.17, 0.87, 0.72)
 """Of the axes in a figure; to find the best one would draw each figure twice."""
 
+LABELS_PT = 300.0
+"""For all labels of parameters side by side; with more of them they are smaller."""
+
 STYLE: dict[Any, Any] = {
     "svg.hashsalt": "hexacell",
     "svg.fonttype": "path",
@@ -85,7 +88,8 @@ def _changes(run: ReportedRun) -> Picture | None:
         capsize=2,
     )
     axes.axhline(0.0, color=INK, linewidth=0.6)
-    axes.set_xticks(np.arange(len(rows)), [parameters.parameters[row].name for row in rows], rotation=90)
+    names = [parameters.parameters[row].name for row in rows]
+    axes.set_xticks(np.arange(len(rows)), names, rotation=90, fontsize=min(9.0, LABELS_PT / len(rows)))
     axes.set_ylabel(f"change, {' or '.join(dict.fromkeys(kind.unit.shown for kind in parameters.kinds))}")
     return Picture(_svg(figure), "Change of each parameter, with its expanded uncertainty (k = 2).")
 

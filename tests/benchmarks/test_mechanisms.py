@@ -176,6 +176,9 @@ def test_a_robot_out_by_twice_its_tolerance_is_refused_and_its_leg_named(say, na
     say(f"{name}: a {what} out by twice its tolerance, refused", f"{refused} of {FAULTY}", "95")
     say(f"{name}:   with the right leg named", f"{named} of {FAULTY}", "95")
     say(f"{name}:   refused if known exactly", f"{exactly} of {FAULTY}", "reported")
+    # The target is missed where frames are free, and where less is known (docs/measured.md).
+    assert exactly >= (0.95 if what == "joint" else 0.75) * FAULTY
+    assert named >= 0.5 * FAULTY
 
 
 def _out_by_twice(robot: Robot, random: np.random.Generator, *, is_joint: bool) -> tuple[Geometry, int]:

@@ -12,7 +12,9 @@ import pytest
 
 CHECKOUT = Path(__file__).parent.parent
 
-THE_TESTS = "-m pytest -n 4 --dist loadfile --no-loadscope-reorder -m not slow and not benchmark"
+MARKED = "not slow and not benchmark and not linuxcnc"
+THE_TESTS = f"-m pytest -n 4 --dist loadfile --no-loadscope-reorder -m {MARKED}"
+
 """The arguments that ``make test`` gives to Python."""
 
 FAKE_PYTHON = """\

@@ -20,7 +20,7 @@ SET_NAMES = {
     Phase.IDENTIFY: "point {}",
     Phase.BEFORE: "held-out point {}, before",
     Phase.AFTER: "held-out point {}, after",
-    Phase.CONFIRM: "held-out point {}, confirming",
+    Phase.CONFIRM: "held-out point {}, again",
     Phase.LENGTH: "length check, mounting {}",
 }
 COMPUTATIONS = {

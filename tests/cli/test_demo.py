@@ -16,6 +16,7 @@ import pytest
 
 from hexacell.storage.cell_lock import cell_lock
 from procedures.run import events
+from procedures.run.steps import Phase
 
 # An independent reading of TOML, good enough for a config: what is text, remark, number, or neither.
 TOKEN = re.compile(
@@ -129,7 +130,8 @@ def test_the_demo_prints_the_speed_of_its_clock(demo):
 def test_the_output_of_the_demo_fits_a_terminal(demo):
     *words, _result = demo.outcome.err.splitlines()
     assert max(map(len, words)) <= 80
-    sets = [line for line in words if " records, " in line]
+    # One demo in a few hundred has confirming records, because a test of the model failed by chance.
+    sets = [line for line in words if " records, " in line and ", again" not in line]
     assert [line[:24].strip() for line in sets] == [
         *(f"point {number}" for number in range(1, 6)),
         *(f"held-out point {number}, {when}" for when in ("before", "after") for number in (1, 2, 3)),
@@ -140,7 +142,7 @@ def test_the_ball_never_leaves_the_gauges_travel(demo):
     history = demo.events()
     assert not [event for event in history if isinstance(event, events.RecordRejected)]
     samples = [event for event in history if isinstance(event, events.RecordTaken)]
-    assert len(samples) == 5 * 11 + 3 * (6 + 11)
+    assert sum(event.at.phase is not Phase.CONFIRM for event in samples) == 5 * 11 + 3 * (6 + 11)
     zeros = {event.at: np.array(event.reading.gauges_mm) for event in samples if event.orientation == 1}
     for event in samples:
         shown = event.reading.gauges_mm - zeros[event.at]

@@ -8,7 +8,14 @@ import pytest
 
 from hexacell.campaign.decisions import Forecast
 from hexacell.cell.recovery import Action, FailureKind
-from hexacell.presentation.events import COMPUTATIONS, CONFIG_CHANGES, EventFormatter, activity, event_text
+from hexacell.presentation.events import (
+    COMPUTATIONS,
+    CONFIG_CHANGES,
+    EventFormatter,
+    activity,
+    event_text,
+    set_name,
+)
 from procedures.run import events
 from procedures.run.state import RunState, fold
 from procedures.run.steps import Compute, Expectation, Move, Phase, SetKey
@@ -103,3 +110,9 @@ def test_a_closed_set_of_the_identification_is_followed_by_the_forecast():
 )
 def test_the_text_of_each_event(event, text):
     assert event_text(event, RunState()) == text
+
+
+@pytest.mark.parametrize("phase", [phase for phase in Phase if phase is not Phase.LENGTH])
+def test_the_line_of_a_set_fits_a_terminal(phase) -> None:
+    at = SetKey(phase=phase, point=9)
+    assert len(set_name(at)) <= 24

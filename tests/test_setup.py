@@ -14,7 +14,6 @@ CHECKOUT = Path(__file__).parent.parent
 
 MARKED = "not slow and not benchmark and not linuxcnc"
 THE_TESTS = f"-m pytest -n 4 --dist loadfile --no-loadscope-reorder -m {MARKED}"
-
 """The arguments that ``make test`` gives to Python."""
 
 FAKE_PYTHON = """\

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
+from shutil import which
 
 from drivers.simulated.following_physics import FollowingPhysics
 from drivers.simulated.joint_source import JointSource
@@ -24,7 +25,7 @@ class FollowedController(Closeable):
     Raises:
         FileError: the controller's config cannot be read.
         ReachError: the first point of the cell is out of reach by its config or its true geometry.
-        UsageError: faults are stated, or a clock that is not the real one.
+        UsageError: faults are stated, or a clock that is not the real one; or there is no such command.
     """
 
     def __init__(
@@ -63,6 +64,9 @@ def _require_real(settings: CellSettings, simulation: SimulationSettings) -> Non
         )
     elif settings.timing.clock_factor != 1.0:
         problem, action = "a real controller has no fast clock", "Remove timing.clock_factor"
+    elif which(simulation.joints_command[0]) is None:
+        problem = f"there is no program '{simulation.joints_command[0]}'"
+        action = "Install it, or remove [simulation]"
     else:
         return
     raise UsageError(f"[simulation] names a joints_command, but {problem}", action=action)

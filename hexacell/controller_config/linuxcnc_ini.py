@@ -106,6 +106,10 @@ class IniText:
         section, _, name = key.rpartition(SEPARATOR)
         return any((one.section, one.name) == (section or self.section, name) for one in self._variables)
 
+    def has_section(self, name: str) -> bool:
+        """Whether there is such a section with a variable in it."""
+        return any(one.section == name for one in self._variables)
+
     def _missing(self, section: str, name: str, found: list[_Variable]) -> FileError:
         if found:
             problem = (

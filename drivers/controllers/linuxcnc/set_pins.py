@@ -49,15 +49,20 @@ def set_pins(files: Sequence[Path]) -> int:
     """Set the pins of HAL files (``*.hal``) to the numbers in them and in the INI files; their number.
 
     Raises:
-        FileError: a file cannot be read, or an INI file has no such variable.
-        UsageError: there is no HAL file, LinuxCNC does not run here, or has no such pin; or its forward
-            kinematics fails with these numbers.
+        FileError: a file cannot be read, or has a section that a pin names, and not its variable.
+        UsageError: there is no HAL file or no pin in it, LinuxCNC does not run here, or has no such pin; or
+            its forward kinematics fails with these numbers.
     """
     hal = [path for path in files if path.suffix == ".hal"]
     if not hal:
         raise UsageError("no HAL file is named", action="hexacell-set-pins FILE.hal ... [FILE.ini ...]")
     inis = [path for path in files if path not in hal]
     wanted = dict(_wanted(hal, [IniText(read_text(path), path, "") for path in inis]))
+    if not wanted:
+        raise UsageError(
+            "the HAL files set no pin to a number, or to a variable of these INI files",
+            action="Name the files that have the geometry",
+        )
     before = _values(wanted)
     _set(wanted)
     time.sleep(KINEMATICS_CYCLES_S)
@@ -71,7 +76,7 @@ def set_pins(files: Sequence[Path]) -> int:
 
 
 def _wanted(hal: Iterable[Path], inis: Sequence[IniText]) -> Iterator[tuple[str, str]]:
-    """Every pin with its value as text; of an INI variable, those that one of the INI files has."""
+    """Every pin with its value as text; of INI variables, those of sections that the INI files have."""
     for path in hal:
         for line in read_text(path).split("\n"):
             if setp := SETP.fullmatch(line):
@@ -84,10 +89,8 @@ def _wanted(hal: Iterable[Path], inis: Sequence[IniText]) -> Iterator[tuple[str,
 
 def _looked_up(reference: re.Match[str], inis: Sequence[IniText]) -> str | None:
     key = f"{reference['section']}/{reference['name']}"
-    for ini in inis:
-        if ini.has(key):
-            return ini.number(key).text
-    return None
+    found = next((ini for ini in inis if ini.has_section(reference["section"])), None)
+    return None if found is None else found.number(key).text
 
 
 def _values(wanted: Iterable[str]) -> dict[str, str]:

@@ -113,6 +113,10 @@ def test_a_program_that_ends_is_started_again(tmp_path) -> None:
     [
         ({"simulation.faults": (SimulatedFault(kind="emergency stop"),)}, "only a simulated controller"),
         ({"timing.clock_factor": 10.0}, "no fast clock"),
+        (
+            {"simulation.joints_command": ("halsampler-not-here",)},
+            "there is no program 'halsampler-not-here'",
+        ),
     ],
 )
 def test_what_only_a_simulated_controller_can_is_refused(followed, changes, words) -> None:

@@ -93,6 +93,18 @@ def test_a_variable_that_is_no_single_number_is_refused(pins, files) -> None:
     assert pins()["kins.l.1"] == "580"
 
 
+def test_a_variable_that_its_section_has_not_sets_none(pins, files) -> None:
+    with pytest.raises(FileError, match=r"no L1 in a section \[KINS\]"):
+        set_pins(files(ini="[KINS]\nL2 = 591.0\n"))
+    assert pins()["kins.l.1"] == "580"
+
+
+def test_a_call_that_would_set_nothing_fails(pins, files) -> None:
+    """The file with the geometry was forgotten: the controller would go on with its old one."""
+    with pytest.raises(UsageError, match="set no pin to a number"):
+        set_pins(files(hal="setp kins.l.0 [KINS]L1\n")[:1])
+
+
 def test_without_a_hal_file_it_says_how_it_is_called(pins, files) -> None:
     with pytest.raises(UsageError, match="no HAL file is named"):
         set_pins(files()[1:])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, fields
 from enum import StrEnum
 
 from drivers.errors import GaugeSilent, WrongAnswer
+from hexacell.errors import DeviceError
 
 BIT_7 = 0x80
 TERMINATOR = b"\r"  # ends every request, and is the first line end of every answer
@@ -75,6 +76,14 @@ class FrameRejected(Exception):
 
     def __init__(self, frame: bytes) -> None:
         self.frame = frame
+        super().__init__(frame)
+
+
+class ImplausibleValue(FrameRejected):
+    """A frame of the protocol whose value cannot be; ``error`` is for the user if it comes again."""
+
+    def __init__(self, frame: bytes, error: DeviceError) -> None:
+        self.error = error
         super().__init__(frame)
 
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict
 from typing import ClassVar, TypeVar
 
-from drivers.errors import GaugeAtEnd, GaugeUnsteady, WrongSetting, ZeroVoid
+from drivers.errors import GaugeAtEnd, GaugeUnsteady, WrongAnswer, WrongSetting, ZeroVoid
+from drivers.gauges.plausibility import DisplayHistory
 from drivers.gauges.protocol import (
     TERMINATOR,
     DisplayedValue,
     FrameRejected,
     GaugeState,
+    ImplausibleValue,
     ProtocolSpec,
     Unit,
     silent_gauge,
@@ -24,9 +27,10 @@ from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, FileError
 
-AGREEMENT_MM = 0.05  # consecutive readings closer than this agree; a garbled digit differs by more
 MAX_READINGS = 12  # enough for an oscillating ball to come to rest
 MAX_REQUESTS = 3
+OTHER_DECIMALS = "Press its in/mm key, or correct resolution_mm in the cell file"
+BEYOND_TRAVEL = "Check its cable; if its zero or preset key was pressed, open it again"
 
 Parsed = TypeVar("Parsed")
 
@@ -55,6 +59,7 @@ class SerialGauge(ABC):
         self._session = 0
         self._state: GaugeState | None = None
         self._void: ZeroVoid | None = None
+        self._history = DisplayHistory(settings)
 
     @property
     def name(self) -> str:
@@ -70,17 +75,21 @@ class SerialGauge(ABC):
         """Query the settings of the instrument."""
 
     async def open(self) -> DeviceIdentity:
-        """Connect, identify, and refuse inches, hold, peak modes and a low battery.
+        """Connect, identify, and refuse inches, hold, peak modes, a low battery and other decimals.
 
         Raises:
             DeviceError: The port or the instrument is absent, or has wrong settings.
             FileError: The settings of the port are refused, or another gauge uses it.
         """
         self._state = self._void = None
+        self._history.begin()
         try:
             await self._connect()
             state = await self._read_state_when_awake()
+            if self._unusable(state):
+                state = await self._read_state()  # one damaged answer is no setting
             self._require_usable(state)
+            await self._require_stated_resolution()
         except BaseException:
             await self.close()
             raise
@@ -89,15 +98,20 @@ class SerialGauge(ABC):
         return DeviceIdentity(self.name, self.spec.protocol, description)
 
     async def read(self) -> GaugeReading:
-        """The displayed value, mm, as soon as two consecutive readings agree."""
+        """The displayed value, mm, as soon as two consecutive readings agree.
+
+        A reading does not count if bytes came after it that nobody asked for: it may have been such bytes.
+        """
         self._opened_state()
-        readings = [self._in_mm(await self._read_value())]
+        readings = [await self._read_value()]
         while len(readings) < MAX_READINGS:
-            readings.append(self._in_mm(await self._read_value()))
-            if abs(readings[-1].value_mm - readings[-2].value_mm) <= AGREEMENT_MM:
-                return readings[-1]
+            surplus = self._open_port().surplus_count
+            readings.append(await self._read_value())
+            is_in_step = self._open_port().surplus_count == surplus
+            if is_in_step and self._history.agree(*readings[-2:]):
+                return _reading(readings[-1])
         raise GaugeUnsteady(
-            f"readings do not agree: {', '.join(reading.raw for reading in readings)}",
+            f"readings do not agree: {', '.join(reading.text for reading in readings)}",
             subject=self.subject,
             action="Wait until it is still; if it is, check its cable",
         )
@@ -106,15 +120,17 @@ class SerialGauge(ABC):
         """The value displayed at this moment, mm, from a single query."""
         self._opened_state()
         try:
-            return self._in_mm(self._parse_value(await self._ask(self.value_request)))
+            return _reading(self._plausible(await self._ask(self.value_request)))
         except FrameRejected as rejection:
             self._require_silence()
-            raise unexpected_answer(self.subject, self.spec, rejection.frame) from rejection
+            raise self._rejected(rejection) from rejection
 
     async def check(self) -> None:
         """Query the settings again; a ``ZeroVoid`` if one has changed since ``open``."""
         before = self._opened_state()
         now = await self._read_state()
+        if self._unusable(now) or now.changes_since(before):
+            now = await self._read_state()  # one damaged answer is no change
         self._require_usable(now)
         if changes := now.changes_since(before):
             raise self._voided(f"was set differently: {', '.join(changes)}")
@@ -142,18 +158,36 @@ class SerialGauge(ABC):
             return await self._read_state()
 
     async def _read_value(self) -> DisplayedValue:
-        return await self._query(self.value_request, self._parse_value)
+        return await self._query(self.value_request, self._plausible)
+
+    async def _require_stated_resolution(self) -> None:
+        """Read a value, if its decimals are known beforehand: they tell inches from millimetres."""
+        if self.settings.resolution_mm is not None:
+            with suppress(GaugeAtEnd):
+                await self._read_value()
+
+    def _plausible(self, frame: bytes) -> DisplayedValue:
+        """The value in an answer, which is in mm and fits to those before; raises as ``_parse_value``."""
+        shown = self._parse_value(frame)
+        if shown.apparent_unit is Unit.INCH:
+            raise self._inch()
+        if reason := self._history.other_decimals(shown):
+            raise ImplausibleValue(frame, self._wrong_setting(reason, OTHER_DECIMALS))
+        if reason := self._history.beyond_travel(shown):
+            raise ImplausibleValue(frame, WrongAnswer(reason, subject=self.subject, action=BEYOND_TRAVEL))
+        self._history.add(shown)
+        return shown
 
     async def _query(self, request: bytes, parse: Callable[[bytes], Parsed]) -> Parsed:
         """The parsed answer; the request is repeated if ``parse`` rejects the frame."""
-        received = b""
+        rejected = FrameRejected(b"")
         for _ in range(MAX_REQUESTS):
             try:
                 return parse(await self._ask(request))
             except FrameRejected as rejection:
-                received = rejection.frame
+                rejected = rejection
                 self._require_silence()
-        raise self._garbled(received)
+        raise self._rejected(rejected)
 
     async def _ask(self, request: bytes) -> bytes:
         port = self._open_port()
@@ -168,25 +202,32 @@ class SerialGauge(ABC):
     def _require_silence(self) -> None:
         self._open_port().require_silence()
 
+    def _rejected(self, rejection: FrameRejected) -> DeviceError:
+        """The error for a frame that was rejected to the last."""
+        if isinstance(rejection, ImplausibleValue):
+            return rejection.error
+        return self._garbled(rejection.frame)
+
     def _garbled(self, received: bytes) -> DeviceError:
         return unexpected_answer(self.subject, self.spec, received)
 
-    def _in_mm(self, displayed: DisplayedValue) -> GaugeReading:
-        if displayed.apparent_unit is Unit.INCH:
-            raise self._inch()
-        return GaugeReading(displayed.value, displayed.text)
-
     def _require_usable(self, state: GaugeState) -> None:
+        if error := self._unusable(state):
+            raise error
+
+    def _unusable(self, state: GaugeState) -> WrongSetting | None:
+        """Why readings in these settings are wrong; none if they are not."""
         if state.unit is Unit.INCH:
-            raise self._inch()
+            return self._inch()
         if state.hold:
-            raise self._wrong_setting("is on hold, its value is frozen", "Release hold")
+            return self._wrong_setting("is on hold, its value is frozen", "Release hold")
         if state.mode is not None and state.mode not in self.normal_modes:
-            raise self._wrong_setting(f"is in mode {state.mode}", "Set it to normal measuring")
+            return self._wrong_setting(f"is in mode {state.mode}", "Set it to normal measuring")
         if state.scaling:
-            raise self._wrong_setting("multiplies what it measures", "Switch its ratio off")
+            return self._wrong_setting("multiplies what it measures", "Switch its ratio off")
         if state.battery_low:
-            raise self._wrong_setting("has a low battery", "Change it, then zero the gauge again")
+            return self._wrong_setting("has a low battery", "Change it, then zero the gauge again")
+        return None
 
     def _inch(self) -> WrongSetting:
         return self._wrong_setting("answers in inch", "Press its in/mm key")
@@ -216,3 +257,7 @@ class SerialGauge(ABC):
         if self._port.open_count != self._session:
             raise self._voided("lost its port meanwhile")
         return self._port
+
+
+def _reading(shown: DisplayedValue) -> GaugeReading:
+    return GaugeReading(shown.value, shown.text)

@@ -96,6 +96,8 @@ class SylvacGauge(SerialGauge):
     normal_modes: ClassVar[frozenset[str]] = frozenset({"NOR", "REF", "REF1", "REF2"})
     value_request = b"?\r"
 
+    _previous = (b"", b"")
+
     def _parse_value(self, frame: bytes) -> DisplayedValue:
         match parse_value(frame):
             case DisplayedValue() as displayed:
@@ -125,7 +127,11 @@ class SylvacGauge(SerialGauge):
         )
 
     async def _ask(self, request: bytes) -> bytes:
+        before, self._previous = self._previous, (request, b"")
         frame = await super()._ask(request)
+        self._previous = (request, frame)
+        if before == (IDENTIFICATION.command, frame) and frame not in ERROR_FRAMES:
+            raise FrameRejected(frame)  # the answer before came once more
         unsolicited = self._open_port().take_unsolicited()
         unsolicited += frame if request != IDENTIFICATION.command else b""
         if power_up := POWER_UP.search(unsolicited):

@@ -18,6 +18,8 @@ import serial
 
 from drivers.errors import PortLost
 from drivers.serial.errors import opening_errors
+from drivers.serial.framing import LINE_ENDS, cut_frame, is_copies
+from drivers.serial.parity import have_terminal_check, in_software
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError
 
@@ -29,6 +31,9 @@ FRAME_LIMIT = 256
 CHUNK_LIMIT = 4096
 SILENCE_ATTEMPTS = 5  # a line may take this many times the required silence to become silent
 OPEN_TRIES = 5
+CAREFUL_EXCHANGES = 20  # after bytes that nobody asked for, so many wait whether a frame was the only one
+EXCHANGE_TRIES = 3
+WITHOUT_WRITE_TIMEOUT = "rfc2217://"  # pyserial has none there, and refuses to open with one (its issue 412)
 
 
 class NoAnswer(Exception):
@@ -47,7 +52,14 @@ class SerialPort:
 
     A late response must never be taken for that of the next request. After a time-out, therefore, the
     next request waits until the line has been silent for ``worst_latency_s``. Bytes that come without
-    a request are read and kept in ``unsolicited``, never taken for a response.
+    a request are read and kept in ``unsolicited``, never taken for a response; copies of the last response
+    are dropped. Once there were any, a response counts only if nothing else comes with it: a key pressed on
+    an instrument, or a multiplexer that sends twice, would put all later responses out of step.
+
+    Attributes:
+        unsolicited: bytes that came without a request or too late; the latest ones only.
+        surplus_count: how often bytes had come before a request, copies included: the response to the one
+            before may have been such bytes.
     """
 
     def __init__(
@@ -61,7 +73,8 @@ class SerialPort:
         self.url = url
         self.subject = f"port {url}"
         self.unsolicited: deque[bytes] = deque(maxlen=64)
-        self._settings = settings
+        self._settings = dict(settings)
+        self._parity = in_software(self._settings)
         self._closing = closing
         self._recorder = recorder
         self._worst_latency_s = worst_latency_s
@@ -70,7 +83,9 @@ class SerialPort:
         self._asked_at = 0.0
         self._last_traffic = 0.0
         self._silence_s = 0.0
-        self._surplus = b""
+        self._surplus = self._last_frame = b""
+        self._careful = 0
+        self.surplus_count = 0
 
     def open(self) -> int:
         """Open the port unless it is open and usable; how often it has been opened.
@@ -84,7 +99,7 @@ class SerialPort:
         if self._port is None:
             self._port = self._opened()
             self.open_count += 1
-            self._silence_s, self._surplus = 0.0, b""
+            self._silence_s, self._surplus, self._last_frame, self._careful = 0.0, b"", b"", 0
         return self.open_count
 
     def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
@@ -99,9 +114,13 @@ class SerialPort:
         if self._port is None:
             raise self._lost("it is not open")
         with self._port_errors():
-            self._resynchronise(self._port)
-            self._send(self._port, request)
-            return self._frame(self._port, request, terminator, timeout_s)
+            for _ in range(EXCHANGE_TRIES):
+                self._resynchronise(self._port)
+                self._send(self._port, request)
+                frame = self._frame(self._port, request, terminator, timeout_s)
+                if not self._careful or self._is_alone(self._port, frame):
+                    return frame
+        raise self._not_silent()
 
     def require_silence(self) -> None:
         """Wait for a short silence of the line before the next request."""
@@ -134,6 +153,7 @@ class SerialPort:
             while not port.is_open:
                 attempts += 1
                 self._try_to_open(port, last=attempts == OPEN_TRIES)
+            have_terminal_check(port, self._settings)
         return port
 
     def _try_to_open(self, port: serial.Serial, *, last: bool) -> None:
@@ -150,26 +170,49 @@ class SerialPort:
         settings = {name: value for name, value in self._settings.items() if name not in lines}
         port = serial.serial_for_url(self.url, do_not_open=True, **settings)  # type: ignore[arg-type]
         port.timeout = SLICE_S  # set once and before opening: a pseudo-terminal refuses later changes
-        port.write_timeout = WRITE_SLICE_S
+        if not self.url.lower().startswith(WITHOUT_WRITE_TIMEOUT):
+            port.write_timeout = WRITE_SLICE_S
         for name, level in lines.items():
             setattr(port, name, level)
         return port
 
     def _resynchronise(self, port: serial.Serial) -> None:
         """Read unsolicited bytes until the line has been silent as long as required."""
-        self._keep_unsolicited(self._surplus)
-        self._surplus = b""
+        surplus, self._surplus = self._surplus, b""
+        self._require_silence_after(surplus)
         deadline = time.monotonic() + SILENCE_ATTEMPTS * max(self._silence_s, FRAME_GAP_S)
         while self._since_traffic_s() < self._silence_s or port.in_waiting:
             if time.monotonic() > deadline:
                 raise self._not_silent()
-            self._keep_unsolicited(self._read(port))
+            surplus += self._read(port)
+            self._require_silence_after(surplus)
+        if surplus.strip(LINE_ENDS):
+            self.surplus_count += 1
+        self._keep_unsolicited(surplus)
         self._silence_s = 0.0
 
-    def _keep_unsolicited(self, data: bytes) -> None:
-        if data.strip(LINE_ENDS):
-            self.unsolicited.append(data)
+    def _is_alone(self, port: serial.Serial, frame: bytes) -> bool:
+        """Whether nothing but copies of ``frame`` comes with it, until the line is silent."""
+        surplus, self._surplus = self._surplus, b""
+        deadline = time.monotonic() + SILENCE_ATTEMPTS * FRAME_GAP_S
+        while self._since_traffic_s() < FRAME_GAP_S and time.monotonic() < deadline:
+            surplus += self._read(port)
+        self._keep_unsolicited(surplus)
+        if not surplus.strip(LINE_ENDS):
+            self._careful -= 1
+        return is_copies(surplus, frame)
+
+    def _require_silence_after(self, surplus: bytes) -> None:
+        if surplus.strip(LINE_ENDS):
             self.require_silence()
+
+    def _keep_unsolicited(self, surplus: bytes) -> None:
+        if not surplus.strip(LINE_ENDS):
+            return
+        self.require_silence()
+        self._careful = CAREFUL_EXCHANGES
+        if not is_copies(surplus, self._last_frame):
+            self.unsolicited.append(surplus)
 
     def _since_traffic_s(self) -> float:
         return time.monotonic() - self._last_traffic
@@ -179,8 +222,8 @@ class SerialPort:
         while len(received) <= FRAME_LIMIT and time.monotonic() < self._asked_at + timeout_s:
             received += self._read(port)
             if cut := cut_frame(received, request, terminator):
-                frame, self._surplus = cut
-                return frame
+                self._last_frame, self._surplus = cut
+                return self._last_frame
         self._silence_s = self._worst_latency_s
         raise NoAnswer(received)
 
@@ -192,7 +235,7 @@ class SerialPort:
             data += self._waiting(port)
             self._last_traffic = time.monotonic()
             self._record(TrafficDirection.RECEIVED, data)
-        return data
+        return data if self._parity is None else self._parity.decode(data)
 
     def _waiting(self, port: serial.Serial) -> bytes:
         """The bytes that are in the buffer already."""
@@ -203,6 +246,7 @@ class SerialPort:
 
     def _send(self, port: serial.Serial, request: bytes) -> None:
         self.require_not_closed()
+        request = request if self._parity is None else self._parity.encode(request)
         self._record(TrafficDirection.SENT, request)
         self._asked_at = self._last_traffic = time.monotonic()
         # pyserial also raises it if all was sent and this thread was then not scheduled for so long;
@@ -254,17 +298,3 @@ def close_port(port: serial.Serial) -> None:
         port.close()
     if connection is not None:
         connection.close()
-
-
-LINE_ENDS = b"\r\n"
-
-
-def cut_frame(received: bytes, request: bytes, terminator: bytes) -> tuple[bytes, bytes] | None:
-    """The first complete frame in ``received``, ``terminator`` included, and the bytes after it.
-
-    Line ends before the frame are removed, since some devices send more of them than documented, and
-    so is the echo of ``request`` that some devices send. None as long as no frame is complete.
-    """
-    body = received.lstrip(LINE_ENDS).removeprefix(request).lstrip(LINE_ENDS)
-    head, end, rest = body.partition(terminator)
-    return (head + end, rest) if end else None

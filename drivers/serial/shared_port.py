@@ -40,6 +40,11 @@ class SharedSerialPort:
         """How often the port has been opened; it grows with every reconnection."""
         return self._port.open_count
 
+    @property
+    def surplus_count(self) -> int:
+        """See :class:`SerialPort`."""
+        return self._port.surplus_count
+
     def add_gauge(self, gauge: str, settings: Mapping[str, object], channel: int | None) -> None:
         """Let ``gauge`` use the port, alone or with a multiplexer's ``channel``.
 

@@ -61,6 +61,12 @@ class GaugeSettings(Section):
     channel: int = Field(1, ge=1, le=99, description="input of a multiplexer")
     timeout_s: Positive = Field(0.5, description="longest wait for an answer")
     travel_mm: Positive = Field(12.5, description="the instrument's own measuring range")
+    resolution_mm: Positive | None = Field(
+        None, description="the last digit of its display in mm; one with other decimals is set to inches"
+    )
+    agreement_mm: Positive | None = Field(
+        None, description="two readings in a row count if they differ by no more; by default from [noise]"
+    )
     middle_mm: InRange | None = Field(
         None,
         description="what it shows in the middle of its travel; without it, its display does not tell "

@@ -185,7 +185,7 @@ async def test_a_value_sent_by_the_data_button_of_another_channel_is_discarded(d
 
 
 async def test_five_decimals_are_inches(dialogue, gauge):
-    dialogue.expect((b"2\r", b"02A+00.00484\r"), OPENING[1])
+    dialogue.expect((b"2\r", b"02A+00.00484\r"))
     with pytest.raises(WrongSetting, match="gauge y: answers in inch"):
         await gauge.open()
 
@@ -197,10 +197,68 @@ async def test_inch_pressed_during_a_set_is_found(dialogue, opened, call):
         await getattr(opened, call)()
 
 
-async def test_another_resolution_voids_the_zero(dialogue, opened):
-    dialogue.expect((b"2\r", b"02A+000.1234\r"))
-    with pytest.raises(ZeroVoid, match="decimals 3 -> 4"):
-        await opened.check()
+@pytest.mark.parametrize("call", ["read", "check", "read_once"])
+async def test_other_decimals_are_another_unit(dialogue, opened, call):
+    """A display in inches may have three, four or five decimals, and nothing in the answer tells which."""
+    dialogue.expect(*[(b"2\r", b"02A+000.0123\r")] * (1 if call == "read_once" else 3))
+    with pytest.raises(WrongSetting, match=r"shows 4 decimals .* where it showed 3 when it was first opened"):
+        await getattr(opened, call)()
+
+
+async def test_decimals_of_the_first_opening_hold_after_it_was_opened_again(dialogue, opened):
+    await opened.close()
+    dialogue.expect(*[(b"2\r", b"02A+000.0123\r")] * 3)
+    with pytest.raises(WrongSetting, match="where it showed 3 when it was first opened"):
+        await opened.open()
+    dialogue.expect((b"2\r", VALUE), OPENING[1])
+    await opened.open()
+
+
+async def test_one_answer_with_a_misplaced_point_is_asked_for_again(dialogue, opened):
+    dialogue.expect((b"2\r", b"02A+000.0123\r"), (b"2\r", VALUE), (b"2\r", VALUE))
+    assert (await opened.read()).value_mm == 0.123
+
+
+@pytest.mark.parametrize(("resolution_mm", "decimals"), [(0.001, 3), (0.0005, 4), (0.01, 2), (0.005, 3)])
+async def test_a_gauge_of_another_resolution_than_stated_is_refused(
+    dialogue, links, settings, resolution_mm, decimals
+):
+    shown = {number: b"02A+%08.*f\r" % (number, 1.0) for number in (2, 3, 4)}
+    gauge = Mux10Gauge(settings("mux10", channel=2, resolution_mm=resolution_mm), links)
+    for number, value in shown.items():
+        if number == decimals:
+            dialogue.expect((b"2\r", value), OPENING[1], (b"2\r", value))
+            await gauge.open()
+            await gauge.close()
+        else:
+            dialogue.expect(*[(b"2\r", value)] * 3)
+            with pytest.raises(WrongSetting, match=f"resolution of {resolution_mm:g} mm has {decimals}"):
+                await gauge.open()
+
+
+async def test_values_farther_apart_than_the_travel_are_damaged(dialogue, opened):
+    dialogue.expect((b"2\r", b"02A+0040.123\r"), *[(b"2\r", VALUE)] * 2)
+    assert (await opened.read()).value_mm == 0.123
+    dialogue.expect(*[(b"2\r", b"02A+0040.123\r")] * 3)
+    with pytest.raises(WrongAnswer, match=r"shows 02A\+0040.123, and values 40.000 mm apart do not fit"):
+        await opened.read()
+
+
+async def test_values_may_be_anywhere_after_it_was_opened_again(dialogue, opened):
+    far = b"02A+0040.123\r"
+    await opened.close()
+    dialogue.expect((b"2\r", far), OPENING[1], (b"2\r", far), (b"2\r", far))
+    await opened.open()
+    assert (await opened.read()).value_mm == 40.123
+
+
+async def test_the_cell_file_says_which_readings_agree(dialogue, links, settings):
+    gauge = Mux10Gauge(settings("mux10", channel=2, agreement_mm=0.002), links)
+    values = [b"02A+0000.123\r", b"02A+0000.126\r", b"02A+0000.128\r"]
+    dialogue.expect(*OPENING, *((b"2\r", value) for value in values))
+    await gauge.open()
+    assert (await gauge.read()).value_mm == 0.128
+    await gauge.close()
 
 
 async def test_another_protocol_is_quoted_beside_what_was_expected(dialogue, gauge):

@@ -1,10 +1,10 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.serial.port import cut_frame
+from drivers.serial.framing import LINE_ENDS, cut_frame
 
-plain = st.binary(max_size=20).filter(lambda data: not set(data) & set(b"\r\n"))
-ends = st.sampled_from([b"", b"\r", b"\n", b"\r\n"])
+plain = st.binary(max_size=20).filter(lambda data: not set(data) & set(LINE_ENDS))
+ends = st.sampled_from([b"", b"\r", b"\n", b"\r\n", b"\0", b"\0\0\r\n"])
 
 
 def test_no_frame_until_it_is_complete():

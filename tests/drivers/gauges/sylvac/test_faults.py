@@ -75,7 +75,7 @@ async def test_overspeed_voids_the_zero_until_it_is_opened_again(dialogue, opene
 
 
 async def test_an_inch_gauge_is_refused(dialogue, gauge):
-    dialogue.expect(*opening(UNI=b"IN\r"))
+    dialogue.expect(*opening(UNI=b"IN\r") * 2)
     with pytest.raises(WrongSetting) as caught:
         await gauge.open()
     assert str(caught.value) == "gauge y: answers in inch. Press its in/mm key"
@@ -88,7 +88,7 @@ async def test_inch_pressed_during_a_set_is_found_in_a_reading(dialogue, opened)
 
 
 async def test_inch_pressed_during_a_set_is_found_by_the_check(dialogue, opened):
-    dialogue.expect(*opening(UNI=b"IN\r"))
+    dialogue.expect(*opening(UNI=b"IN\r") * 2)
     with pytest.raises(WrongSetting):
         await opened.check()
 
@@ -106,10 +106,10 @@ async def test_inch_pressed_during_a_set_is_found_by_the_check(dialogue, opened)
 async def test_settings_that_falsify_readings_are_refused_at_opening_and_by_the_check(
     dialogue, gauge, answers, words
 ):
-    dialogue.expect(*opening(**answers))
+    dialogue.expect(*opening(**answers) * 2)
     with pytest.raises(WrongSetting, match=words):
         await gauge.open()
-    dialogue.expect(*OPENING, *opening(**answers))
+    dialogue.expect(*OPENING, *opening(**answers) * 2)
     await gauge.open()
     with pytest.raises(WrongSetting, match=words):
         await gauge.check()
@@ -125,7 +125,7 @@ async def test_settings_that_falsify_readings_are_refused_at_opening_and_by_the_
     ],
 )
 async def test_a_setting_changed_during_a_set_voids_the_zero(dialogue, opened, answers, words):
-    dialogue.expect(*opening(**answers))
+    dialogue.expect(*opening(**answers) * 2)
     with pytest.raises(ZeroVoid, match=words):
         await opened.check()
     with pytest.raises(ZeroVoid):
@@ -135,6 +135,31 @@ async def test_a_setting_changed_during_a_set_voids_the_zero(dialogue, opened, a
 async def test_an_unchanged_gauge_passes_the_check(dialogue, opened):
     dialogue.expect(*OPENING)
     await opened.check()
+
+
+@pytest.mark.parametrize("answers", [{"PRE": b"PRE +0.008\r"}, {"STO": b"STO1\r"}, {"BAT": b"BAT0\r"}])
+async def test_one_damaged_answer_is_neither_a_change_nor_a_wrong_setting(dialogue, opened, answers):
+    dialogue.expect(*opening(**answers), *OPENING)
+    await opened.check()
+
+
+async def test_a_gauge_that_sends_everything_twice_is_used(dialogue, gauge):
+    dialogue.expect(*((question, answer, answer) for question, answer in OPENING))
+    dialogue.expect(*[(b"?\r", b"+1.000\r", b"+1.000\r")] * 2)
+    await gauge.open()
+    assert (await gauge.read()).value_mm == 1.0
+    dialogue.expect(*((question, answer, answer) for question, answer in OPENING))
+    await gauge.check()
+
+
+async def test_an_identification_that_comes_once_more_is_not_switching_on(dialogue, opened):
+    later = [(b"MOD?\r", b"SY276\r"), (b"MOD?\r", b"NOR\r")]
+    dialogue.expect(*OPENING[:3], *later, *OPENING[4:])
+    await opened.check()
+    dialogue.unasked(b"SY276\r")
+    dialogue.expect((b"?\r", b"+1.000\r"))
+    with pytest.raises(ZeroVoid, match="switched on again"):
+        await opened.read()
 
 
 async def test_a_power_up_message_before_a_request_voids_the_zero(dialogue, opened):

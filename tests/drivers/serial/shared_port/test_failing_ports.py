@@ -58,18 +58,32 @@ async def test_a_port_in_use_is_reported():
     os.close(far)
 
 
-async def test_a_pseudo_terminal_that_refuses_parity_is_reported():
+async def test_a_terminal_marks_bytes_of_wrong_parity_and_opens_again():
+    """Of a pseudo-terminal that refuses a second opening with parity, see pyserial's issue 196."""
     near, far = os.openpty()
-    for again in range(2):
+    for _ in range(2):
         link = SharedSerialPort(os.ttyname(far), {"bytesize": 7, "parity": "E", "stopbits": 2})
-        if again:  # the open that pyserial 196 is about, and no server resets the speed here
-            with pytest.raises(DeviceError, match="cannot be opened"):
-                await link.open()
-        else:
-            await link.open()
+        await link.open()
+        flags = termios.tcgetattr(far)[0]
+        assert flags & termios.INPCK
+        assert flags & termios.PARMRK
+        assert not flags & termios.IGNPAR
         await link.close()
     os.close(near)
     os.close(far)
+
+
+async def test_a_pseudo_terminal_that_refuses_parity_is_reported(fake):
+    port = fake(FakePort())
+
+    def refuse():
+        raise termios.error(errno.EINVAL, "Invalid argument")
+
+    port.open = refuse
+    link = SharedSerialPort("fake", {"bytesize": 7, "parity": "E", "stopbits": 2})
+    with pytest.raises(DeviceError, match="cannot be opened"):
+        await link.open()
+    await link.close()
 
 
 @pytest.mark.parametrize(

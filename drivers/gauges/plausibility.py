@@ -1,0 +1,75 @@
+"""Whether a displayed value can be one of this gauge: its decimals, and its distance from the others."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+from drivers.gauges.protocol import DisplayedValue
+from hexacell.cell.devices import GaugeSettings
+
+TRAVEL_MARGIN = 1.1
+"""Instruments travel a little farther than they are sold for."""
+
+AGREEMENT_MM = 0.05
+"""Of readings in a row, where nothing is known of the gauge."""
+
+ROUNDING_MM = 1e-9
+
+
+def decimals_of(resolution_mm: float) -> int:
+    """The decimals of a display in mm with this resolution: 3 for 0.001 and for 0.005."""
+    exponent = Decimal(str(resolution_mm)).normalize().as_tuple().exponent
+    return max(0, -int(exponent))
+
+
+class DisplayHistory:
+    """What one gauge has shown: every value must fit to the others.
+
+    The number of decimals holds from the first opening on, since only it tells inches from millimetres where
+    a protocol does not name the unit; the values hold from one opening to the next.
+    """
+
+    def __init__(self, settings: GaugeSettings) -> None:
+        self._travel_mm = settings.travel_mm
+        self._stated = settings.resolution_mm
+        self._decimals = None if self._stated is None else decimals_of(self._stated)
+        self._agreement_mm = settings.agreement_mm
+        self._range: tuple[float, float] | None = None
+
+    def agree(self, one: DisplayedValue, next_one: DisplayedValue) -> bool:
+        """Whether two readings in a row agree: within what the cell file says, or 0.05 mm."""
+        limit_mm = AGREEMENT_MM if self._agreement_mm is None else self._agreement_mm
+        return abs(next_one.value - one.value) <= limit_mm + ROUNDING_MM
+
+    def begin(self) -> None:
+        """The gauge was opened: its zero may be another one."""
+        self._range = None
+
+    def other_decimals(self, shown: DisplayedValue) -> str | None:
+        """Why a value has another unit or resolution, in words; none if it has not."""
+        if self._decimals is None or shown.decimals == self._decimals:
+            return None
+        if self._stated is None:
+            before = f"where it showed {self._decimals} when it was first opened"
+        else:
+            before = f"and its resolution of {self._stated:g} mm has {self._decimals}"
+        return f"shows {shown.decimals} decimals ({shown.text}), {before}"
+
+    def beyond_travel(self, shown: DisplayedValue) -> str | None:
+        """Why a value is farther from the others than the plunger travels, in words; none if it is not."""
+        lowest, highest = self._extended(shown)
+        if highest - lowest <= TRAVEL_MARGIN * self._travel_mm:
+            return None
+        return (
+            f"shows {shown.text}, and values {highest - lowest:.3f} mm apart do not fit into its travel of "
+            f"{self._travel_mm:g} mm"
+        )
+
+    def add(self, shown: DisplayedValue) -> None:
+        """Take a value that is possible as one that was shown."""
+        self._decimals = shown.decimals
+        self._range = self._extended(shown)
+
+    def _extended(self, shown: DisplayedValue) -> tuple[float, float]:
+        lowest, highest = self._range or (shown.value, shown.value)
+        return min(lowest, shown.value), max(highest, shown.value)

@@ -25,21 +25,25 @@ def decimals_of(resolution_mm: float) -> int:
 class DisplayHistory:
     """What one gauge has shown: every value must fit to the others.
 
-    The number of decimals holds from the first opening on, since only it tells inches from millimetres where
-    a protocol does not name the unit; the values hold from one opening to the next.
+    The number of decimals holds from the first opening on: where a protocol does not name the unit, only it
+    tells inches from millimetres. The values hold from one opening to the next.
     """
 
     def __init__(self, settings: GaugeSettings) -> None:
         self._travel_mm = settings.travel_mm
         self._stated = settings.resolution_mm
         self._decimals = None if self._stated is None else decimals_of(self._stated)
-        self._agreement_mm = settings.agreement_mm
+        self._agreement_mm = AGREEMENT_MM if settings.agreement_mm is None else settings.agreement_mm
         self._range: tuple[float, float] | None = None
 
     def agree(self, one: DisplayedValue, next_one: DisplayedValue) -> bool:
         """Whether two readings in a row agree: within what the cell file says, or 0.05 mm."""
-        limit_mm = AGREEMENT_MM if self._agreement_mm is None else self._agreement_mm
-        return abs(next_one.value - one.value) <= limit_mm + ROUNDING_MM
+        return abs(next_one.value - one.value) <= self._agreement_mm + ROUNDING_MM
+
+    @property
+    def limit(self) -> str:
+        """Within what readings agree, in words."""
+        return f" within {self._agreement_mm:g} mm"
 
     def begin(self) -> None:
         """The gauge was opened: its zero may be another one."""

@@ -111,7 +111,7 @@ class SerialGauge(ABC):
             if is_in_step and self._history.agree(*readings[-2:]):
                 return _reading(readings[-1])
         raise GaugeUnsteady(
-            f"readings do not agree: {', '.join(reading.text for reading in readings)}",
+            f"readings do not agree{self._history.limit}: {', '.join(one.text for one in readings)}",
             subject=self.subject,
             action="Wait until it is still; if it is, check its cable",
         )

@@ -8,9 +8,9 @@ damaged byte (PARMRK in termios(3)), and :class:`ParityInBit7` replaces it by ``
 from __future__ import annotations
 
 import termios
+from collections.abc import Mapping
 from contextlib import suppress
 from enum import StrEnum
-from typing import Any
 
 from hexacell.errors import FileError
 
@@ -53,7 +53,7 @@ class ParityInBit7:
         return (character.bit_count() + self._odd) % 2
 
 
-def in_software(settings: dict[str, Any]) -> ParityInBit7 | None:
+def in_software(settings: dict[str, object]) -> ParityInBit7 | None:
     """Take the parity out of the settings of a line, if it is to be checked in software.
 
     ``settings`` are those of pyserial and ``parity_check``, which is removed from them.
@@ -66,14 +66,14 @@ def in_software(settings: dict[str, Any]) -> ParityInBit7 | None:
         raise _refused(f"parity_check {word!r} is unknown", "Write 'terminal' or 'software'")
     if word == ParityCheck.TERMINAL:
         return None
-    odd = ODD_BITS.get(settings.get("parity", "N"))
+    odd = ODD_BITS.get(str(settings.get("parity", "N")))
     if odd is None or settings.get("bytesize") != 7:
         raise _refused("parity_check 'software' wants 7 bits and a parity", "Write bytesize and parity too")
     settings.update(bytesize=8, parity="N")
     return ParityInBit7(odd)
 
 
-def have_terminal_check(port: Any, settings: dict[str, Any]) -> None:
+def have_terminal_check(port: object, settings: Mapping[str, object]) -> None:
     """Have the terminal behind an opened port of pyserial mark bytes of wrong parity, if it is one."""
     descriptor = getattr(port, "fd", None)
     if descriptor is None or settings.get("parity", "N") not in ODD_BITS:

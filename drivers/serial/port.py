@@ -33,7 +33,9 @@ SILENCE_ATTEMPTS = 5  # a line may take this many times the required silence to 
 OPEN_TRIES = 5
 CAREFUL_EXCHANGES = 20  # after bytes that nobody asked for, so many wait whether a frame was the only one
 EXCHANGE_TRIES = 3
-WITHOUT_WRITE_TIMEOUT = "rfc2217://"  # pyserial has none there, and refuses to open with one (its issue 412)
+WITHOUT_WRITE_TIMEOUT = (
+    "rfc2217://"  # pyserial has none there, and refuses to open with one (its issue 412)
+)
 
 
 class NoAnswer(Exception):

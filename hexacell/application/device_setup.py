@@ -11,7 +11,9 @@ from drivers.interfaces import DeviceIdentity
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.stop_input import stop_input_of
 from drivers.wire_trace import WireTrace
+from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.loader import Cell
+from hexacell.cell.measuring import NoiseSettings
 from hexacell.cell.model import CellSettings
 from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
@@ -83,6 +85,10 @@ def _plugins(settings: CellSettings) -> Iterator[tuple[KeyPath, Group, str]]:
     yield ("robot", "mechanism"), Group.MECHANISMS, settings.robot.mechanism
 
 
+AGREEMENT_SIGMAS = 5.0
+AGREEMENT_STEPS = 2.5
+USUAL_RESOLUTION_MM = 0.001
+
 CONTROLLER_SCALES = "controller"
 """The protocol of encoders that the controller reads: their driver is given that of the controller."""
 
@@ -108,7 +114,10 @@ def devices_of(
         UsageError: a protocol has no driver.
     """
     gauges = tuple(
-        MountedGauge(load(Group.GAUGES, gauge.protocol)(gauge, links), gauge.mounting)
+        MountedGauge(
+            load(Group.GAUGES, gauge.protocol)(gauge_with_agreement(gauge, settings.noise), links),
+            gauge.mounting,
+        )
         for gauge in settings.gauges
     )
     controller = load(Group.CONTROLLERS, settings.controller.protocol)(settings.controller, trace=trace)
@@ -118,6 +127,20 @@ def devices_of(
         settings.encoders, **({"controller": controller} if of_controller else {"trace": trace})
     )
     return Devices(gauges, encoders, controller, stop_input_of(settings.guards, folder or Path()))
+
+
+def gauge_with_agreement(gauge: GaugeSettings, noise: NoiseSettings) -> GaugeSettings:
+    """The gauge with the largest difference of two readings in a row that agree, if it has none.
+
+    Five times its noise, but no less than its last digits differ by at rest: damage of a frame that is
+    larger is found before it enters a record.
+    """
+    if gauge.agreement_mm is not None:
+        return gauge
+    index = gauge.mounting.index
+    sigma_mm = noise.gauge_mm if noise.gauges_mm is None else noise.gauges_mm[index]
+    least_mm = AGREEMENT_STEPS * (gauge.resolution_mm or USUAL_RESOLUTION_MM)
+    return gauge.model_copy(update={"agreement_mm": max(AGREEMENT_SIGMAS * sigma_mm, least_mm)})
 
 
 @asynccontextmanager

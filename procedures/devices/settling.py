@@ -23,6 +23,11 @@ class NeverSettled(DeviceError):
     """The readings did not come to rest in the time allowed."""
 
 
+FEWEST_TO_TRIM = 3
+TRIMMED = 8
+"""Of so many readings one is left out at each end; at least one, where there are three."""
+
+
 @dataclass(frozen=True, slots=True)
 class DeviceSnapshot:
     """All devices read once, one after the other's question: gauges and encoders at ``at_s``."""
@@ -47,6 +52,18 @@ class Settled:
     def joints(self) -> Array:
         """Joint variables (n, 6), in their unit."""
         return np.array([one.encoders.positions for one in self.window])
+
+
+def trimmed_mean(readings: Array) -> Array:
+    """The mean of readings (n, k) without the largest and smallest of each of the k columns.
+
+    A damaged reading that agrees with its neighbour within the noise is not seen, but it is left out.
+    The mean of five undamaged readings scatters by 7 % more for it.
+    """
+    count = len(readings)
+    cut = max(1, count // TRIMMED) if count >= FEWEST_TO_TRIM else 0
+    mean: Array = np.sort(readings, axis=0)[cut : count - cut].mean(axis=0)
+    return mean
 
 
 async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:

@@ -27,7 +27,7 @@ from procedures.calibration.mounting import require_response, require_room
 from procedures.calibration.set_steps import check_reference, in_words
 from procedures.calibration.workflow import Calibration
 from procedures.devices.device_set import Devices, Thermometers, gather_errors
-from procedures.devices.settling import DeviceSnapshot, Settled, read_series, settle
+from procedures.devices.settling import DeviceSnapshot, Settled, read_series, settle, trimmed_mean
 from procedures.engine.computations import Computations
 from procedures.engine.config_edits import ConfigEdits
 from procedures.engine.config_transactions import ConfigTransactions
@@ -328,9 +328,9 @@ class StepExecutor:
 def _reading(
     devices: Devices, settled: Sequence[Settled], temperatures: tuple[events.Temperature, ...]
 ) -> events.Reading:
-    """The mean of settled windows, with the largest range within one of them."""
-    gauges = np.concatenate([one.gauges for one in settled]).mean(axis=0)
-    joints = np.concatenate([one.joints for one in settled]).mean(axis=0)
+    """The trimmed mean of settled windows, with the largest range within one of them."""
+    gauges = trimmed_mean(np.concatenate([one.gauges for one in settled]))
+    joints = trimmed_mean(np.concatenate([one.joints for one in settled]))
     spreads = np.max([np.ptp(one.gauges, axis=0) for one in settled], axis=0)
     return events.Reading(
         gauges_mm=deviation_of(_on_axes(devices, gauges)),

@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from drivers.encoders.cia406 import joint_variables
 from hexacell import __version__
 from hexacell.cell.devices import EncoderSettings
+from procedures.devices.settling import trimmed_mean
 from procedures.run.events import Reading
 
 TOLERANCE = 1e-9
@@ -111,12 +112,16 @@ def is_wording(change: Change) -> bool:
 
 
 def counts_mismatch(reading: Reading, encoders: EncoderSettings) -> Change | None:
-    """A difference of joint variables from their encoder counts by more than half a count."""
-    means = np.mean([joint_variables(counts, encoders) for counts in reading.counts], axis=0)
+    """A difference of joint variables from their encoder counts by more than half a count.
+
+    Journals before version 13 have the plain mean.
+    """
+    readings = np.array([joint_variables(counts, encoders) for counts in reading.counts])
+    mean = trimmed_mean(readings)
     half = 0.5 * encoders.step
-    if np.abs(means - reading.joints).max() <= half + TOLERANCE:
+    if any(np.abs(one - reading.joints).max() <= half + TOLERANCE for one in (mean, readings.mean(axis=0))):
         return None
-    return Change("reading.joints", reading.joints, tuple(means.tolist()))
+    return Change("reading.joints", reading.joints, tuple(mean.tolist()))
 
 
 def _changes(field: str, recorded: object, replayed: object, tolerance: float) -> Iterator[Change]:

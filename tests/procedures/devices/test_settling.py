@@ -10,7 +10,7 @@ import pytest
 from drivers.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady
 from hexacell.cell.measuring import TimingSettings
 from hexacell.errors import DeviceError, ExitCode, SeveralErrors
-from procedures.devices.settling import LEAST_WINDOWS, read_all, settle
+from procedures.devices.settling import LEAST_WINDOWS, read_all, settle, trimmed_mean
 
 TIMING = TimingSettings(
     window_s=0.6, interval_s=0.1, readings=5, spread_gauge_mm=0.06, spread_encoder_mm=0.05, give_up_s=20.0
@@ -213,3 +213,25 @@ async def test_a_snapshot_contains_raw_answers_counts_and_positions(bench) -> No
     assert [reading.raw for reading in look.gauges] == ["+0.000", "-1.250", "+0.000"]
     assert look.encoders.counts == (1, 0, 0, 0, 0, -2500)
     assert look.encoders.positions == (0.001, 0.0, 0.0, 0.0, 0.0, -2.5)
+
+
+@pytest.mark.parametrize("count", [3, 4, 5, 7, 12])
+@pytest.mark.parametrize("damage_mm", [-0.04, 0.04, 9.0])
+def test_one_damaged_reading_is_not_in_the_mean(count: int, damage_mm: float) -> None:
+    readings = np.tile([1.0, -2.0, 0.5], (count, 1))
+    for row in range(count):
+        damaged = readings.copy()
+        damaged[row, 1] += damage_mm
+        assert trimmed_mean(damaged) == pytest.approx([1.0, -2.0, 0.5])
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_of_one_or_two_readings_all_count(count: int) -> None:
+    readings = np.arange(3.0 * count).reshape(count, 3)
+    assert trimmed_mean(readings) == pytest.approx(readings.mean(axis=0))
+
+
+@pytest.mark.parametrize(("count", "more"), [(5, 0.07), (12, 0.03)])
+def test_a_trimmed_mean_scatters_little_more_than_a_mean(count: int, more: float) -> None:
+    readings = np.random.default_rng(7).normal(size=(count, 100_000))
+    assert trimmed_mean(readings).std() <= (1.0 + more) * readings.mean(axis=0).std()

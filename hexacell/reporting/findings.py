@@ -131,9 +131,11 @@ def _beyond_tolerance(violations: Sequence[ToleranceViolation], convention: Fram
         f"(tolerance {one.tolerance:g}, sigma {one.sigma:.2g})"
         for one in violations
     )
+    others = " or ".join(violations[0].instead)
+    instead = f"; {others} out of its tolerance would explain the records as well" if others else ""
     return (
-        f"Refused: {names}. A good residual is no proof: measure that on the machine, and correct the "
-        "drawing or its tolerance in the cell file, or find the other cause."
+        f"Refused: {names}{instead}. A good residual is no proof: measure that on the machine, and correct "
+        "the drawing or its tolerance in the cell file, or find the other cause."
     )
 
 

@@ -8,7 +8,7 @@ those that a run reacts to in a way of their own are in :mod:`drivers.errors`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol, TypeVar
 
@@ -20,12 +20,21 @@ Identity_co = TypeVar("Identity_co", covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class DeviceIdentity:
-    """The identity of a device: recorded with every run, compared after every reconnection."""
+    """The identity of a device: recorded with every run, compared after every reconnection.
+
+    Attributes:
+        settings: what is set in the device that changes the meaning of its readings, in words.
+        port: the place or the adapter that it is connected to, where the operating system tells.
+        remark: what a person should know of it now; not compared.
+    """
 
     name: str
     protocol: str
     description: str
     serial_number: str = ""
+    settings: str = ""
+    port: str = ""
+    remark: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, slots=True)

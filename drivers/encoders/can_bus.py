@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any
@@ -22,6 +23,9 @@ SEND_TIMEOUT_S = 0.2
 """Longest wait for an interface to accept a frame."""
 JOIN_TIMEOUT_S = 1.0
 """Longest wait for the receiving thread to end, for interfaces that ignore their time-out."""
+
+ERROR_FRAMES, ERROR_FRAMES_S = 20, 1.0
+"""So many error frames within this time are a failure; single ones are repeated by the adapter."""
 
 # Failures are raised as errors; without a handler canopen would also print them.
 logging.getLogger("canopen").addHandler(logging.NullHandler())
@@ -45,6 +49,7 @@ class EncoderBus:
         self._interrupted = interrupted
         self._trace = trace
         self._failure: Exception | None = None
+        self._error_frames: deque[float] = deque(maxlen=ERROR_FRAMES)
         self._closing = threading.Event()
         self._bus = self._connect(settings)
         self.network = _Network(self._bus, self._send)
@@ -97,12 +102,23 @@ class EncoderBus:
         try:
             while not self._closing.is_set():
                 message = self._bus.recv(SLICE_S)
-                if message is not None and _is_canopen(message):
+                if message is None:
+                    continue
+                if message.is_error_frame:
+                    self._count_error_frame()
+                elif _is_canopen(message):
                     self._deliver(message)
         except Exception as error:  # any error must reach the waiting thread
             with self.condition:
                 self._failure = error
                 self.condition.notify_all()
+
+    def _count_error_frame(self) -> None:
+        """Raise if there were too many lately: the receiving thread ends, and the bus has failed."""
+        self._error_frames.append(time.monotonic())
+        is_many = len(self._error_frames) == ERROR_FRAMES
+        if is_many and self._error_frames[-1] - self._error_frames[0] <= ERROR_FRAMES_S:
+            raise can.CanError(f"{ERROR_FRAMES} error frames within {ERROR_FRAMES_S:g} s")
 
     def _deliver(self, message: can.Message) -> None:
         with self.condition:
@@ -148,9 +164,7 @@ class _Network(canopen.Network):
 
 def _is_canopen(message: can.Message) -> bool:
     """Whether it is a data frame with an 11-bit id, sent by another participant."""
-    return message.is_rx and not (
-        message.is_error_frame or message.is_remote_frame or message.is_extended_id
-    )
+    return message.is_rx and not (message.is_remote_frame or message.is_extended_id)
 
 
 def _name_of(settings: Mapping[str, Any]) -> str:

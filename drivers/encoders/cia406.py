@@ -15,8 +15,10 @@ from drivers.encoders.node_identity import (
     read_identity,
 )
 from drivers.encoders.node_monitor import AlarmPoll, NodeMonitor, check_nodes
+from drivers.encoders.node_settings import switch_sync_counter_off
 from drivers.encoders.object_dictionary import DeviceType
 from drivers.encoders.pdo_configuration import configure_position_tpdo
+from drivers.encoders.plausibility import SampleHistory
 from drivers.encoders.sync_sampling import SyncSampler
 from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity, EncoderSample
@@ -94,6 +96,7 @@ class EncoderSession:
     ) -> None:
         self.bus = EncoderBus(_bus_settings(settings), closing, trace)
         self._settings = settings
+        self._history = SampleHistory(settings)
         try:
             self._start()
         except BaseException:
@@ -106,7 +109,10 @@ class EncoderSession:
         counts = self._sampler.sample(signed=self._settings.signed)
         self._alarms.check()
         self.bus.check()
-        return EncoderSample(counts, joint_variables(counts, self._settings), self._settings.unit)
+        self._history.check_signs(counts)
+        positions = joint_variables(counts, self._settings)
+        self._history.check_speed(positions)
+        return EncoderSample(counts, positions, self._settings.unit)
 
     def _start(self) -> None:
         settings = self._settings
@@ -135,6 +141,7 @@ class EncoderSession:
         check_step(node, self._settings)
         identity = read_identity(node, device_type)
         check_serial_number(node, identity, self._settings)
+        switch_sync_counter_off(node)
         return identity
 
 

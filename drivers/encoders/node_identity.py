@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, subject_of
+from drivers.encoders.node_settings import read_settings, read_warnings
 from drivers.encoders.object_dictionary import (
     DEVICE_TYPE,
     ENCODER_PROFILE,
@@ -25,9 +26,16 @@ from drivers.encoders.object_dictionary import (
 )
 from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity
-from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
+from hexacell.cell.devices import (
+    EncoderSettings,
+    LinearEncoderSettings,
+    RotaryEncoderSettings,
+)
 from hexacell.errors import DeviceError
 from hexacell.kinematics.parameters import JointUnit
+
+STEP_OBJECTS = {"6005h": MEASURING_STEP_SETTING, "6501h": MEASURING_STEP}
+"""Objects that a device may have its measuring step in."""
 
 SECOND_RESPONSE_S = 0.03
 """How long a second device may take to respond to the same request."""
@@ -62,7 +70,7 @@ def read_device_type(node: EncoderNode, unit: JointUnit = JointUnit.MM) -> Devic
 def check_step(node: EncoderNode, settings: EncoderSettings) -> None:
     """Compare what a count is with the cell file."""
     if isinstance(settings, LinearEncoderSettings):
-        _check_measuring_step(node, settings.measuring_step_nm)
+        _check_measuring_step(node, settings)
     elif isinstance(settings, RotaryEncoderSettings):
         _check_counts_per_turn(node, settings.counts_per_turn)
 
@@ -79,16 +87,32 @@ def _check_counts_per_turn(node: EncoderNode, counts: int) -> None:
         )
 
 
-def _check_measuring_step(node: EncoderNode, step_nm: float) -> None:
-    found = node.read_optional(MEASURING_STEP_SETTING)
-    if found is None:
-        found = node.read(MEASURING_STEP)
+def _check_measuring_step(node: EncoderNode, settings: LinearEncoderSettings) -> None:
+    step_nm, found = settings.measuring_step_nm, _measuring_step(node, settings.step_object)
     if not math.isclose(found, step_nm, rel_tol=1e-9):
         raise DeviceError(
             f"has a measuring step of {found} nm, the cell file says {step_nm:g} nm",
             subject=node.leg.subject,
             action="Correct `measuring_step_nm` under [encoders], or set the device with its vendor's tool",
         )
+
+
+def _measuring_step(node: EncoderNode, stated: str) -> int:
+    """The measuring step, nm, from the object that the cell file names, or the one that it has."""
+    if stated in STEP_OBJECTS:
+        return node.read(STEP_OBJECTS[stated])
+    setting, step = node.read_optional(MEASURING_STEP_SETTING), node.read_optional(MEASURING_STEP)
+    if setting is None:
+        return node.read(MEASURING_STEP)
+    if step is not None and step != setting:
+        raise DeviceError(
+            f"has two measuring steps: {setting} nm in {MEASURING_STEP_SETTING}, {step} nm in "
+            f"{MEASURING_STEP}",
+            subject=node.leg.subject,
+            action="Move the joint by a known length to see which holds, and name it: "
+            '`step_object = "6005h"` or "6501h" under [encoders]',
+        )
+    return setting
 
 
 def read_identity(node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
@@ -103,6 +127,8 @@ def read_identity(node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
         protocol="cia406",
         description=", ".join(words),
         serial_number="" if serial_number is None else str(serial_number),
+        settings=read_settings(node),
+        remark=read_warnings(node),
     )
 
 

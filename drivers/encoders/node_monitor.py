@@ -13,7 +13,7 @@ from canopen.emcy import EmcyError
 
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, silent_nodes, subject_of
-from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER
+from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, WARNINGS
 from drivers.errors import InvalidSampleError, RestartedNodeError
 
 HEARTBEAT = 0x700
@@ -24,12 +24,21 @@ BOOT_UP = 0x00
 OPERATIONAL = 0x05
 """The NMT state in the heartbeats of a started node."""
 
+_COMMUNICATION_CLASS = 0x8
+"""The first digit of the codes of communication errors (CiA 301, table of error codes)."""
+
 MAX_MISSED_HEARTBEATS = 3
 """So many consecutive missing heartbeats are a failure."""
 JITTER_S = 0.2
 """Scheduling delay that is tolerated on the PC."""
 
-_KNOWN_EMERGENCIES = {0xFF00: "no magnet", 0x8130: "its heartbeat monitoring tripped"}
+_KNOWN_EMERGENCIES = {
+    0xFF00: "no magnet",
+    0x8130: "its heartbeat monitoring tripped",
+    0x8240: "it expects another length of SYNC",
+}
+_CHECK_DEVICE = "Remove the cause (magnet, distance, temperature), then measure again"
+_CHECK_BUS = "Open the encoders again; if it stays so, set the node with its vendor's tool"
 
 
 class NodeMonitor:
@@ -38,6 +47,7 @@ class NodeMonitor:
     Attributes:
         restarted: the node has booted or left OPERATIONAL; remains set.
         emergency: the reported error, until the node reports that it is gone.
+        is_about_the_bus: whether that error is one of communication.
         emergencies: the number of reported errors.
     """
 
@@ -45,6 +55,7 @@ class NodeMonitor:
         self.leg = leg
         self.restarted = False
         self.emergency: str | None = None
+        self.is_about_the_bus = False
         self.emergencies = 0
         self.timeout_s = MAX_MISSED_HEARTBEATS * heartbeat_ms / 1000 + JITTER_S
         self._heartbeat_ms = heartbeat_ms
@@ -82,6 +93,7 @@ class NodeMonitor:
             return
         self.emergencies += 1
         self.emergency = _text(code, register)
+        self.is_about_the_bus = code >> 12 == _COMMUNICATION_CLASS
         self._condition.notify_all()
 
 
@@ -96,16 +108,13 @@ def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
         raise silent_nodes(what, [monitor.leg for monitor in silent], all_legs=len(silent) == len(monitors))
     for monitor in monitors:
         if monitor.emergency is not None:
-            raise invalid_sample(f"reports {monitor.emergency}", monitor.leg)
+            action = _CHECK_BUS if monitor.is_about_the_bus else _CHECK_DEVICE
+            raise invalid_sample(f"reports {monitor.emergency}", monitor.leg, action)
 
 
-def invalid_sample(what: str, leg: Leg) -> InvalidSampleError:
-    """The error for positions that the device itself reports as invalid."""
-    return InvalidSampleError(
-        f"{what}; its position cannot be trusted",
-        subject=leg.subject,
-        action="Remove the cause (magnet, distance, temperature), then measure again",
-    )
+def invalid_sample(what: str, leg: Leg, action: str = _CHECK_DEVICE) -> InvalidSampleError:
+    """The error for positions that the device itself reports as invalid, or that cannot be."""
+    return InvalidSampleError(f"{what}; its position cannot be trusted", subject=leg.subject, action=action)
 
 
 def _restarted(legs: Sequence[Leg]) -> RestartedNodeError:
@@ -124,6 +133,9 @@ def _text(code: int, register: int) -> str:
 ALARM_POLL_S = 0.1
 """Period at which the alarm entries are read."""
 
+WARNINGS_EVERY = 10
+"""Warnings are read at each such reading only: an SDO takes as long as a position."""
+
 _COMMUNICATION = 0x10
 """Bit of the error register for communication errors, which do not concern positions."""
 
@@ -134,13 +146,18 @@ class AlarmPoll:
     def __init__(self, nodes: Sequence[EncoderNode], monitors: Sequence[NodeMonitor]) -> None:
         self._monitors = monitors
         self._emergencies_seen = -1
+        self._polls = 0
         self._due = 0.0
         self._entries = [
             (node, entry)
             for node in nodes
-            for entry in (ERROR_REGISTER, ALARMS)
+            for entry in (ERROR_REGISTER, ALARMS, WARNINGS)
             if node.read_optional(entry) is not None
         ]
+        # A warning from before is told when the encoders are opened, and need not end every run.
+        self._known = {
+            (node, entry): node.read(entry) for node, entry in self._entries if entry is WARNINGS
+        }
         self.check()
 
     def check(self) -> None:
@@ -148,11 +165,15 @@ class AlarmPoll:
         emergencies = sum(monitor.emergencies for monitor in self._monitors)
         if time.monotonic() < self._due and emergencies == self._emergencies_seen:
             return
+        self._polls += 1
         for node, entry in self._entries:
+            if entry is WARNINGS and self._polls % WARNINGS_EVERY:
+                continue
             value = node.read(entry)
             if entry is ERROR_REGISTER:
                 value &= ~_COMMUNICATION
-            if value:
-                raise invalid_sample(f"has an alarm ({entry} is {value:#06x})", node.leg)
+            if value & ~self._known.get((node, entry), 0):
+                word = "a warning" if entry is WARNINGS else "an alarm"
+                raise invalid_sample(f"has {word} ({entry} is {value:#06x})", node.leg)
         self._emergencies_seen = emergencies
         self._due = time.monotonic() + ALARM_POLL_S

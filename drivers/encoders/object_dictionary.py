@@ -54,12 +54,16 @@ ENCODER_PROFILE = 406
 
 DEVICE_TYPE = ObjectEntry(0x1000, 0, 4)
 ERROR_REGISTER = ObjectEntry(0x1001, 0, 1)
+SYNC_COUNTER = ObjectEntry(0x1019, 0, 1)
+"""At what a counter in the SYNC overflows; 0: the SYNC has none (CiA 301)."""
 PRODUCER_HEARTBEAT = ObjectEntry(0x1017, 0, 2)
 VENDOR = ObjectEntry(0x1018, 1, 4)
 PRODUCT = ObjectEntry(0x1018, 2, 4)
 REVISION = ObjectEntry(0x1018, 3, 4)
 SERIAL_NUMBER = ObjectEntry(0x1018, 4, 4)
 
+OPERATING_PARAMETERS = ObjectEntry(0x6000, 0, 2)
+PRESET = ObjectEntry(0x6003, 0, 4)
 POSITION = ObjectEntry(0x6004, 0, 4)
 POSITION_OF_MAGNET_1 = ObjectEntry(0x6020, 1, 4)
 UNITS_PER_TURN = ObjectEntry(0x6001, 0, 4)
@@ -68,6 +72,9 @@ MEASURING_STEP = ObjectEntry(0x6501, 0, 4)
 RESOLUTION = ObjectEntry(0x6501, 0, 4)
 """Of a rotary encoder, whose counts a turn object 6001h may divide."""
 ALARMS = ObjectEntry(0x6503, 0, 2)
+WARNINGS = ObjectEntry(0x6505, 0, 2)
+OFFSET = ObjectEntry(0x6509, 0, 4)
+"""What the device subtracts, computed from its preset."""
 
 TPDO_COUNT = 4
 """TPDOs whose COB-IDs are predefined: 180h, 280h, 380h and 480h plus the node id (CiA 301)."""

@@ -11,7 +11,7 @@ from drivers.interfaces import DeviceIdentity
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.stop_input import stop_input_of
 from drivers.wire_trace import WireTrace
-from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.devices import EncoderSettings, GaugeSettings
 from hexacell.cell.loader import Cell
 from hexacell.cell.measuring import NoiseSettings
 from hexacell.cell.model import CellSettings
@@ -88,6 +88,7 @@ def _plugins(settings: CellSettings) -> Iterator[tuple[KeyPath, Group, str]]:
 AGREEMENT_SIGMAS = 5.0
 AGREEMENT_STEPS = 2.5
 USUAL_RESOLUTION_MM = 0.001
+JUMP_SPEEDS = 10.0
 
 CONTROLLER_SCALES = "controller"
 """The protocol of encoders that the controller reads: their driver is given that of the controller."""
@@ -124,7 +125,7 @@ def devices_of(
     factory = load(Group.ENCODERS, settings.encoders.protocol)
     of_controller = settings.encoders.protocol == CONTROLLER_SCALES
     encoders = factory(
-        settings.encoders, **({"controller": controller} if of_controller else {"trace": trace})
+        encoders_with_speed(settings), **({"controller": controller} if of_controller else {"trace": trace})
     )
     return Devices(gauges, encoders, controller, stop_input_of(settings.guards, folder or Path()))
 
@@ -141,6 +142,18 @@ def gauge_with_agreement(gauge: GaugeSettings, noise: NoiseSettings) -> GaugeSet
     sigma_mm = noise.gauge_mm if noise.gauges_mm is None else noise.gauges_mm[index]
     least_mm = AGREEMENT_STEPS * (gauge.resolution_mm or USUAL_RESOLUTION_MM)
     return gauge.model_copy(update={"agreement_mm": max(AGREEMENT_SIGMAS * sigma_mm, least_mm)})
+
+
+def encoders_with_speed(settings: CellSettings) -> EncoderSettings:
+    """The encoders with the largest speed of a joint, if the cell file has none.
+
+    Ten times that of a run, as the robot may be moved by others, in the time that its devices live in.
+    """
+    encoders, speed = settings.encoders, settings.speed
+    if encoders.largest_speed is not None:
+        return encoders
+    fastest = JUMP_SPEEDS * settings.timing.clock_factor * max(speed.joint, speed.joint_at_gauges)
+    return encoders.model_copy(update={"largest_speed": fastest})
 
 
 @asynccontextmanager

@@ -106,6 +106,11 @@ class EncoderSettings(Section, ABC):
     )
     timeout_s: Positive = Field(0.5, description="longest wait for a complete round or an SDO answer")
     heartbeat_ms: int = Field(500, ge=0, le=65535, description="heartbeat period written to the nodes, ms")
+    largest_speed: Positive | None = Field(
+        None,
+        alias="largest_speed_mm_s",
+        description="a joint that goes faster between two samples jumped; by default from [speed]",
+    )
     certificate: CertificateSettings | None = Field(None, description="of the calibration of all six")
 
     @field_validator("nodes")
@@ -130,6 +135,9 @@ class LinearEncoderSettings(EncoderSettings):
     """The bank of six encoders of joints that slide, or of legs."""
 
     measuring_step_nm: Positive = Field(1000, description="one count, nm; must be what the device reports")
+    step_object: Literal["any", "6005h", "6501h"] = Field(
+        "any", description="the object with the measuring step, where a device has both and they differ"
+    )
 
     @property
     def unit(self) -> JointUnit:

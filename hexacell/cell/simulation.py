@@ -31,7 +31,9 @@ FaultKind = Literal[
     "in inches",
     "exchanged",
     "frozen",
+    "jumped",
     "alarm",
+    "warning",
     "forward kinematics",
     "old config",
 ]

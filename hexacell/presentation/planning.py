@@ -112,9 +112,10 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
 
 
 def device_line(identity: DeviceIdentity) -> str:
-    """Which device answered, with its protocol and serial number."""
+    """Which device answered, with its protocol and serial number, where it is, and what is to be known."""
     serial = f", serial number {identity.serial_number}" if identity.serial_number else ""
-    return f"{identity.name}, {identity.protocol}{serial}: {identity.description}"
+    words = (identity.description, identity.settings, identity.port, identity.remark)
+    return f"{identity.name}, {identity.protocol}{serial}: {'; '.join(word for word in words if word)}"
 
 
 def preflight_lines(devices: Sequence[DeviceIdentity]) -> Iterator[str]:

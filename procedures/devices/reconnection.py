@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from drivers.controllers.errors import ConnectionLost
 from drivers.errors import (
@@ -58,12 +59,18 @@ def require_known(found: Iterable[DeviceIdentity], known: Sequence[DeviceIdentit
     before = {identity.name: identity for identity in known}
     for now in found:
         then = before.get(now.name, now)
-        if then != now:
+        if _differs(then, now):
             raise DeviceReplaced(
                 f"{_words(now)} answers where the run was begun with {_words(then)}",
                 subject=now.name,
                 action="Connect the one that was there, or begin a new run",
             )
+
+
+def _differs(then: DeviceIdentity, now: DeviceIdentity) -> bool:
+    """Whether it is another device; journals of before do not tell settings and port."""
+    told = {name: getattr(now, name) for name in ("settings", "port") if not getattr(then, name)}
+    return replace(then, **told) != now
 
 
 def _concerns(mounted: MountedGauge, errors: Sequence[HexacellError]) -> bool:
@@ -85,4 +92,5 @@ def _gauge_names(subject: str) -> list[str]:
 
 def _words(device: DeviceIdentity) -> str:
     number = f", serial number {device.serial_number}" if device.serial_number else ""
-    return f"{device.protocol} {device.description}{number}"
+    more = "".join(f", {words}" for words in (device.settings, device.port) if words)
+    return f"{device.protocol} {device.description}{number}{more}"

@@ -21,6 +21,8 @@ Positions = Callable[[], Sequence[float]]
 _SYNC = 0x080
 _ALL_BITS = 1 << 32
 FIRST_SERIAL_NUMBER = 1001
+JUMP = 400.0
+"""By how much an encoder that jumps shows more, in the unit of the joint variables."""
 
 
 class SimulatedEncoderBank(Closeable):
@@ -69,7 +71,14 @@ class SimulatedEncoderBank(Closeable):
             "unplugged": partial(self._set_fault, encoder.set_unplugged),
             "silent": partial(self._set_fault, encoder.set_silent),
             "alarm": partial(self._set_fault, encoder.set_alarm),
+            "warning": partial(self._set_fault, encoder.set_warning),
+            "frozen": partial(self._set_fault, encoder.set_frozen),
+            "jumped": partial(self._set_fault, partial(encoder.set_shifted, self._jump_counts)),
         }
+
+    @property
+    def _jump_counts(self) -> int:
+        return round(JUMP / self._settings.step)
 
     def _set_fault(self, switch: Switch, *, on: bool) -> None:
         with self.bus.lock:
@@ -107,7 +116,7 @@ class SimulatedEncoderBank(Closeable):
     def _sample(self) -> None:
         positions = self._positions()
         for leg, (encoder, position) in enumerate(zip(self._encoders, positions, strict=True), 1):
-            encoder.counts = self._counts(leg, position)
+            encoder.sample(self._counts(leg, position))
 
     def _counts(self, leg: int, position: float) -> int:
         """The counts at a position; they wrap around at 32 bits."""

@@ -22,6 +22,8 @@ _NMT = 0x000
 _RESET_COMMANDS = (0x81, 0x82)
 _SYNCHRONOUS = range(1, 241)
 NO_MAGNET = 0xFF00
+DIRTY_SCALE = 0x02
+"""Bit of the warnings: the light of the scale is at its limit."""
 POSITION_ERROR = 0x21
 """Error register: generic and device profile specific."""
 
@@ -38,7 +40,8 @@ class SimulatedEncoder:
     ) -> None:
         self.data = data
         self.counts = 0
-        self._is_silent = False
+        self._is_silent = self._is_frozen = False
+        self._shift = 0
         self._bus = bus
         self._vendor = vendor
         self._real_seconds = real_seconds
@@ -68,6 +71,23 @@ class SimulatedEncoder:
     def set_silent(self, *, on: bool) -> None:
         """Respond to SYNC no longer, or again; the node responds to everything else."""
         self._is_silent = on
+
+    def set_frozen(self, *, on: bool) -> None:
+        """Send the position of the last sample from now on, or the present one again."""
+        self._is_frozen = on
+
+    def set_shifted(self, counts: int, *, on: bool) -> None:
+        """Count so much more, as after a lost revolution, or as before."""
+        self._shift = counts if on else 0
+
+    def set_warning(self, *, on: bool) -> None:
+        """Set a warning, as of a dirty scale, or clear it; nothing is sent."""
+        self._node.set_data(object_dictionary.WARNINGS, 0, bytes((DIRTY_SCALE * on, 0)))
+
+    def sample(self, counts: int) -> None:
+        """Take the present position."""
+        if not self._is_frozen:
+            self.counts = counts + self._shift
 
     def set_alarm(self, *, on: bool) -> None:
         """Report that there is no magnet, or that it is back, and set the error register."""

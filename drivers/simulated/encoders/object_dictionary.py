@@ -73,6 +73,7 @@ POSITION = 0x6004
 POSITION_OF_MAGNET = 0x6020
 ERROR_REGISTER = 0x1001
 ALARMS = 0x6503
+WARNINGS = 0x6505
 TPDO_OFF = 1 << 31
 MAPPING_SLOTS = 8
 
@@ -130,7 +131,7 @@ def _profile(vendor: Vendor, step: int, position: int) -> Iterator[_Row]:
     yield _Row(0x6501, 0, "measuring step", UNSIGNED32, step)
     yield _Row(ALARMS, 0, "alarms", UNSIGNED16, 0)
     yield _Row(0x6504, 0, "supported alarms", UNSIGNED16, 1)
-    yield _Row(0x6505, 0, "warnings", UNSIGNED16, 0)
+    yield _Row(WARNINGS, 0, "warnings", UNSIGNED16, 0)
 
 
 def _tpdo(number: int, tpdo: TpdoDefaults, node: int) -> Iterator[_Row]:

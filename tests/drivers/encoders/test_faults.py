@@ -7,8 +7,10 @@ from typing import Any
 import pytest
 
 from drivers.encoders import node_monitor
+from drivers.encoders.can_bus import ERROR_FRAMES
 from drivers.encoders.cia406 import Cia406Bank
-from drivers.errors import InvalidSampleError, RestartedNodeError, SilentNodeError
+from drivers.errors import BusError, InvalidSampleError, RestartedNodeError, SilentNodeError
+from tests.waiting import until
 
 NO_MAGNET = bytes.fromhex("00ff210000000000")
 CLEARED = bytes(8)
@@ -192,3 +194,43 @@ async def test_without_heartbeats_silence_is_no_fault(bank, heartbeats):
     heartbeats.beating.clear()
     await heartbeats.advance(bank, 3600.0 * PERIOD_S)
     await bank.read()
+
+
+async def test_a_warning_that_comes_during_a_run_makes_samples_invalid(raw, bank, monkeypatch):
+    monkeypatch.setattr(node_monitor, "ALARM_POLL_S", 0.0)
+    monkeypatch.setattr(node_monitor, "WARNINGS_EVERY", 1)
+    for node in raw.nodes.values():
+        node.objects[0x6505, 0] = b"\x01\0"  # told at opening
+    await bank.open()
+    await bank.read()
+    raw.nodes[2].objects[0x6505, 0] = b"\x05\0"
+    with pytest.raises(InvalidSampleError, match=r"leg 2 .*has a warning \(object 6505h:0 is 0x0005\)"):
+        await bank.read()
+
+
+async def test_a_node_that_wants_another_sync_is_not_a_matter_of_magnets(raw, bank):
+    await bank.open()
+    raw.send(0x82, bytes.fromhex("4082110000000000"))
+    await raw.delivered_to(bank)
+    with pytest.raises(InvalidSampleError, match="it expects another length of SYNC") as caught:
+        await bank.read()
+    assert "magnet" not in str(caught.value.action)
+
+
+async def test_many_error_frames_are_a_failed_bus(raw, bank):
+    await bank.open()
+    for _ in range(ERROR_FRAMES - 1):
+        raw.send(0x20, bytes(8), is_error_frame=True)
+    await raw.delivered_to(bank)
+    await bank.read()
+    raw.send(0x20, bytes(8), is_error_frame=True)
+    await until(lambda: has_failed(bank))
+    with pytest.raises(BusError, match=r"has failed: 20 error frames within 1 s.*termination"):
+        await bank.read()
+    await bank.open()
+    await bank.read()
+
+
+def has_failed(bank: Cia406Bank) -> bool:
+    assert bank._session is not None
+    return bank._session.bus._failure is not None

@@ -16,10 +16,16 @@ DIALOGUE_WITH_NODE_4 = """
     4000100000000000    device type: probe
     4000100000000000    device type
     4005600100000000    measuring step
+    4001650000000000    the same elsewhere (not there)
     4018100100000000    vendor
     4018100200000000    product (not there)
     4018100300000000    revision (not there)
     4018100400000000    serial number
+    4000600000000000    operating parameters (not there)
+    4003600000000000    preset (not there)
+    4009650000000000    offset (not there)
+    4005650000000000    warnings (not there)
+    4019100000000000    SYNC with a counter (not there)
     4000180100000000    TPDO1: COB-ID
     40001a0000000000           mapped entries: none
     4000180200000000           transmission type
@@ -39,6 +45,7 @@ DIALOGUE_WITH_NODE_4 = """
     2b171000fa000000    heartbeat every 250 ms
     4001100000000000    error register (not there)
     4003650000000000    alarms (not there)
+    4005650000000000    warnings (not there)
     0104                start
 """
 
@@ -130,6 +137,62 @@ async def test_the_step_may_be_kept_in_6501(raw, bank, step, fits):
     else:
         with pytest.raises(DeviceError, match="has a measuring step of 100 nm"):
             await bank.open()
+
+
+async def test_two_steps_that_differ_are_refused_until_the_cell_file_names_one(raw, settings):
+    for node in raw.nodes.values():
+        node.objects[0x6501, 0] = (5000).to_bytes(4, "little")
+    words = r"leg 1.*1000 nm in object 6005h:1, 5000 nm in object 6501h:0.*step_object"
+    for choice, error in (("any", words), ("6501h", "has a measuring step of 5000 nm"), ("6005h", None)):
+        bank = Cia406Bank(settings.model_copy(update={"step_object": choice}))
+        if error is None:
+            await bank.open()
+        else:
+            with pytest.raises(DeviceError, match=error):
+                await bank.open()
+        await bank.close()
+
+
+async def test_two_steps_that_are_the_same_need_no_choice(raw, bank):
+    for node in raw.nodes.values():
+        node.objects[0x6501, 0] = (1000).to_bytes(4, "little")
+    await bank.open()
+
+
+async def test_settings_that_shift_or_turn_counts_belong_to_the_identity(raw, bank):
+    node = raw.nodes[4]
+    assert (await bank.open())[3].settings == ""
+    node.objects[0x6000, 0] = b"\x0c\0"
+    node.objects[0x6003, 0] = (500).to_bytes(4, "little")
+    node.objects[0x6509, 0] = (-20).to_bytes(4, "little", signed=True)
+    found = (await bank.open())[3]
+    assert found.settings == "operating parameters reversed, 0x000c, preset 500, offset -20"
+    node.objects[0x6000, 0] = b"\x04\0"
+    again = (await bank.open())[3]
+    assert again.settings == "operating parameters 0x0004, preset 500, offset -20"
+    assert again != found
+
+
+async def test_a_warning_is_told_and_is_no_part_of_the_identity(raw, bank):
+    before = await bank.open()
+    raw.nodes[2].objects[0x6505, 0] = b"\x04\0"
+    now = await bank.open()
+    assert now[1].remark == "it reports a warning: object 6505h:0 is 0x0004"
+    assert now == before
+    await bank.read()
+
+
+async def test_a_sync_with_a_counter_is_switched_off(raw, bank):
+    raw.nodes[5].objects[0x1019, 0] = b"\xf0"
+    await bank.open()
+    assert raw.nodes[5].objects[0x1019, 0] == b"\0"
+
+
+async def test_a_node_that_insists_on_a_sync_with_a_counter_is_named(raw, bank):
+    raw.nodes[5].objects[0x1019, 0] = b"\xf0"
+    raw.nodes[5].refuses[0x1019, 0] = 0x0800_0022
+    with pytest.raises(DeviceError, match=r"leg 5.*refuses to set object 1019h:0 to 0x0.*vendor's tool"):
+        await bank.open()
 
 
 async def test_a_device_that_does_not_report_its_step_is_refused(raw, bank):
@@ -274,7 +337,7 @@ def turned_into_rotary(raw, counts: int) -> None:
 
 
 def rotary_bank(raw, settings) -> Cia406Bank:
-    kept = settings.model_dump(exclude={"measuring_step_nm", "offset", "signed"})
+    kept = settings.model_dump(exclude={"measuring_step_nm", "step_object", "offset", "signed"})
     return Cia406Bank(RotaryEncoderSettings(**kept, counts_per_turn=3600))
 
 

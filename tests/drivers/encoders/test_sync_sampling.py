@@ -10,7 +10,7 @@ import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.sync_sampling import MAX_SYNCS
-from drivers.errors import BusError, SilentNodeError
+from drivers.errors import BusError, InvalidSampleError, SilentNodeError, WrongSetting
 from drivers.wire_trace import TraceEntry, TrafficDirection
 from hexacell.errors import DeviceError
 from tests.drivers.short_timeout import short_timeout
@@ -58,10 +58,37 @@ async def test_counts_become_millimetres_by_direction_step_and_offset(raw, setti
 
 
 async def test_unsigned_positions_do_not_turn_negative(raw, settings):
-    raw.nodes[1].counts = -1
     bank = Cia406Bank(settings.model_copy(update={"signed": False}))
     await bank.open()
-    assert (await bank.read()).counts[0] == 2**32 - 1
+    raw.nodes[1].counts = 2**31 - 1
+    assert (await bank.read()).counts[0] == 2**31 - 1
+    raw.nodes[1].counts = -1
+    with pytest.raises(WrongSetting, match=r"leg 1.*shows 4294967295 counts.*signed = true"):
+        await bank.read()
+    await bank.close()
+
+
+@pytest.mark.parametrize("jump_counts", [400_000, -400_000])
+async def test_a_joint_that_jumps_farther_than_it_can_go_is_an_error(raw, settings, jump_counts):
+    bank = Cia406Bank(settings.model_copy(update={"largest_speed": 1e-3}))
+    await bank.open()
+    await bank.read()
+    raw.nodes[3].counts += 900  # less than a millimetre, which is no jump
+    await bank.read()
+    raw.nodes[3].counts += jump_counts
+    with pytest.raises(InvalidSampleError, match=r"leg 3 .*jumped from 3.900 to -?\d+\.[19]00 mm in"):
+        await bank.read()
+    await bank.close()
+
+
+async def test_a_joint_may_be_anywhere_after_the_encoders_were_opened_again(raw, settings):
+    bank = Cia406Bank(settings.model_copy(update={"largest_speed": 1e-3}))
+    await bank.open()
+    await bank.read()
+    await bank.close()
+    raw.nodes[3].counts += 400_000
+    await bank.open()
+    assert (await bank.read()).counts[2] == 403_000
     await bank.close()
 
 

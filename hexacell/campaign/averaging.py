@@ -49,7 +49,7 @@ class AveragingForecaster:
         """The predicted error at the worst task pose once all is measured, one standard deviation, mm."""
         belief = replace(self.plan.robot.belief(), noise=noise)
         after = self.plan.forecaster.predicted_belief(belief, CampaignState())
-        return self.plan.forecaster.worst_error(after)
+        return self.plan.forecaster.worst_error(CampaignState(), after)
 
 
 def perfect_encoders(noise: Noise) -> Noise:

@@ -208,7 +208,9 @@ def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
     found = estimate.identification
     if found is None or not is_determined(found.problem):
         return None
-    budget = plan.task.budget(found, estimate.belief, plan.robot.effects)
+    zeros, belief = plan.robot.identified_zeros(found), estimate.belief
+    belief = belief if zeros is None else replace(belief, covariance=zeros.free_covariance)
+    budget = plan.task.budget(found, belief, plan.robot.effects, zeros=zeros)
     return _Outcome(campaign, forecast, budget, predicted_verdicts(plan, found, budget))
 
 

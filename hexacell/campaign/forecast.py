@@ -11,7 +11,7 @@ complement:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +27,7 @@ from hexacell.experiment_design.pose_selection import SelectedPose
 from hexacell.experiment_design.predicted_records import position_derivatives
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 
 SET_SIZES = (1, 2, 4, 8, 16, 32)
@@ -56,6 +56,7 @@ class Forecaster:
     Attributes:
         sizes: gives how many records each point gets at most, by what is known in a state.
         planned_sets: gives a set of poses at each point, which represent those not selected yet.
+        from_commands: gives commanded poses in the frame convention.
         systematic_mm: gives the standard uncertainty by the systematic effects at the end, if it is known.
     """
 
@@ -63,18 +64,19 @@ class Forecaster:
     budget: Budget
     task: Task
     planned_sets: Callable[[], Sequence[PoseBatch]]
+    from_commands: Callable[[Iterable[Pose]], PoseBatch]
     systematic_mm: Callable[[], float | None] = lambda: None
 
-    def worst_error(self, belief: RobotBelief) -> float | None:
+    def worst_error(self, state: CampaignState, belief: RobotBelief) -> float | None:
         """The error at the worst task pose now, 1 sigma, mm; none without task poses."""
-        error = self.task.error(belief)
+        error = self._error(state, belief)
         return None if error is None else error.worst(belief.covariance)
 
     def forecast(
         self, state: CampaignState, belief: RobotBelief, selected: SelectedPose | None = None
     ) -> Forecast | None:
         """The effect of a selected record and of completing the plan; None without task poses."""
-        error = self.task.error(belief)
+        error = self._error(state, belief)
         if error is None:
             return None
         now = after = error.worst(belief.covariance)
@@ -96,6 +98,15 @@ class Forecaster:
             minutes=self.budget.time_model.minutes(records, begun_later),
             systematic_mm=self.systematic_mm(),
         )
+
+    def _error(self, state: CampaignState, belief: RobotBelief) -> TaskError | None:
+        """At the end, with zeros alone by the records that there are and those that are planned."""
+        if self.task.held is None:
+            return self.task.error(belief)
+        sets = self.planned_sets()
+        planned = [sets[point - 1][:more] for point, more in self.planned(state).items()]
+        measured = self.from_commands(record.pose for record in state.measurements.records)
+        return self.task.error(belief, PoseBatch.concatenate([measured, *planned]))
 
     def planned(self, state: CampaignState) -> dict[int, int]:
         """How many more records each point will get, as far as the budget goes."""

@@ -27,11 +27,9 @@ def predicted_verdicts(
 ) -> VerdictForecast | None:
     """What a run will say of healthy machines with this geometry; none where nothing can be said.
 
-    ``budget`` is that of the identification. With zeros alone the verdict is one on what is held, of which
-    nobody knows more than its tolerances.
+    ``budget`` is that of the identification. With zeros alone what is held is as wrong as its
+    tolerances say.
     """
-    if plan.robot.held is not None:
-        return None
     try:
         updated = with_held_out_records(plan, found)
     except HexacellError:
@@ -40,7 +38,7 @@ def predicted_verdicts(
     if budget is None or after is None or len(after.jacobian) != len(budget.jacobian):
         return None
     limits = ErrorLimits.of(plan.settings.acceptance)
-    stated = stated_errors(found, updated, budget, after)
+    stated = stated_errors(found, updated, budget, after, plan.robot.identified_zeros(found))
     return forecast_verdicts(stated, after, limits)
 
 
@@ -53,7 +51,8 @@ def with_held_out_records(plan: Plan, found: Identification) -> Identification:
     Raises:
         LimitError: no point has enough of them.
     """
-    robot = plan.robot.with_controller(plan.robot.for_controller(found.geometry))
+    written = (plan.robot.identified_zeros(found) or found).geometry
+    robot = plan.robot.with_controller(plan.robot.for_controller(written))
     records = tuple(_records(plan, robot, found))
     if not records:
         raise LimitError("the robot takes too few poses at each of the held-out points")

@@ -194,7 +194,12 @@ class Plan:
     def forecaster(self) -> Forecaster:
         """Forecasts what further records gain."""
         return Forecaster(
-            self.sizes, self.budget, self.task, lambda: self.planned_sets, lambda: self.systematic_mm
+            self.sizes,
+            self.budget,
+            self.task,
+            lambda: self.planned_sets,
+            self.robot.from_commands,
+            lambda: self.systematic_mm,
         )
 
     @cached_property

@@ -91,7 +91,7 @@ class StoppingRules:
         estimate = self.estimator.estimate(state.measurements)
         if estimate.identification is None or not is_determined(estimate.identification.problem):
             return None
-        worst = self.forecaster.worst_error(estimate.belief)
+        worst = self.forecaster.worst_error(state, estimate.belief)
         if worst is None or worst > target:
             return None
         return f"the predicted error at the task poses is {worst:.3f} mm, within {target:g}"

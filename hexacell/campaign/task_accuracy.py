@@ -28,7 +28,7 @@ class TaskError:
     Attributes:
         jacobian: (n, 3, p) of positions, mm, without what another choice of frames would explain.
         held: parameters that are not identified, if any: their tolerances are part of every error.
-        gain: with which the others are then identified (p, p), for poses all over the workspace.
+        gain: with which the others are then identified (p, p).
     """
 
     jacobian: Array
@@ -118,18 +118,22 @@ class Task:
             zeros=zeros,
         )
 
-    def error(self, belief: RobotBelief) -> TaskError | None:
-        """How the error depends on the parameters; none if the estimated robot can take no task pose."""
+    def error(self, belief: RobotBelief, recorded: PoseBatch | None = None) -> TaskError | None:
+        """How the error depends on the parameters; none if the estimated robot can take no task pose.
+
+        Zeros alone are those with which the ``recorded`` poses will err least; without them, those of the
+        workspace.
+        """
         jacobian = self.jacobian(belief)
         if jacobian is None:
             return None
-        return TaskError(jacobian[:, :3], self.held, self._gain(belief))
+        return TaskError(jacobian[:, :3], self.held, self._gain(belief, recorded))
 
-    def _gain(self, belief: RobotBelief) -> Array | None:
-        """As :class:`IdentifiedZeros` has it of records, which are all over the workspace too."""
+    def _gain(self, belief: RobotBelief, recorded: PoseBatch | None) -> Array | None:
+        """As :class:`IdentifiedZeros` has it of records."""
         if self.held is None:
             return None
-        poses = _reachable(belief, self.workspace)
+        poses = _reachable(belief, self.workspace if recorded is None else recorded)
         radius = float(belief.mechanism.platform_radius(belief.estimate))
         errors = np.repeat([1.0, radius], 3)[:, None] * error_jacobian(belief, poses, poses)
         return self.held.gain(errors.reshape(-1, errors.shape[-1]))

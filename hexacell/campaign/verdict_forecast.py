@@ -5,10 +5,16 @@ as well. If the model is right, that differs from the identification by
 
     d,   covariance  C - C',      C, C' the covariances before and after the held-out records,
 
-and by what the systematic effects do to the one and not to the other. Machines are drawn: what is stated of
-each is the largest error J d over the task poses, and its U is the 95 % quantile by draws of all that is
-not known of it, as in a run. The decision rule gives the verdict. The tests of the model fail a healthy
-machine with a probability of 0.1 % each.
+and by what the systematic effects do to the one and not to the other. With zeros alone, that are written as
+G of the estimate, what is held errs as its tolerances say, with their covariance C0, and is seen to err by
+
+    d - H (x - h),    covariance  (C - C') + H (C0 - C) H^T,    H = 1 - G,
+
+x the identification and h what is held (the errors of Bayesian estimates do not depend on them).
+
+Machines are drawn: what is stated of each is the largest error J d over the task poses, and its U is the
+95 % quantile by draws of all that is not known of it, as in a run. The decision rule gives the verdict. The
+tests of the model fail a healthy machine with a probability of 0.1 % each.
 """
 
 from __future__ import annotations
@@ -19,6 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.decision import ErrorLimits, Verdict
+from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.rotations import Array
@@ -108,7 +115,11 @@ def forecast_verdicts(stated: Array, budget: UncertaintyBudget, limits: ErrorLim
 
 
 def stated_errors(
-    found: Identification, updated: Identification, first: UncertaintyBudget, second: UncertaintyBudget
+    found: Identification,
+    updated: Identification,
+    first: UncertaintyBudget,
+    second: UncertaintyBudget,
+    zeros: IdentifiedZeros | None = None,
 ) -> Array:
     """How the error that will be stated changes (t, 6, k) by one standard deviation of each cause.
 
@@ -117,8 +128,16 @@ def stated_errors(
         updated: the same by the held-out records as well.
         first: the budget of ``found``.
         second: that of ``updated``.
+        zeros: what is written of ``found``, where that is not all of it.
     """
-    columns = [covariance_factor(found.free_covariance - updated.free_covariance)]
+    held = np.zeros_like(found.free_covariance)
+    if zeros is not None:
+        held = np.eye(len(held)) - zeros.projector
+    of_held = zeros.kept.tolerances - found.free_covariance if zeros else held
+    columns = [
+        covariance_factor(found.free_covariance - updated.free_covariance),
+        held @ covariance_factor(of_held),
+    ]
     before = {line.effect.name: line for line in first.lines}
     for line in second.lines:
         effect, earlier = line.effect, before[line.effect.name]
@@ -128,8 +147,10 @@ def stated_errors(
             # Other stops: what they do to the two estimates differs as their covariances do.
             old, new = (one.parameter_columns for one in (earlier, line))
             columns.append(effect.size * covariance_factor(old @ old.T - new @ new.T))
+            columns.append(effect.size * held @ old)
         elif effect.occurrence.is_in_records:
-            columns.append(effect.size * (earlier.parameter_columns - line.parameter_columns))
+            old, new = earlier.parameter_columns, line.parameter_columns
+            columns.append(effect.size * (old - new - held @ old))
     return np.asarray(second.jacobian @ np.concatenate(columns, axis=1))
 
 

@@ -16,6 +16,10 @@ class GaugeSilent(DeviceError):
     """No answer."""
 
 
+class EmptyChannel(GaugeSilent):
+    """A multiplexer answers that no instrument does."""
+
+
 class WrongAnswer(DeviceError):
     """An answer that does not conform to the protocol."""
 

@@ -14,7 +14,7 @@ import re
 from dataclasses import dataclass
 from typing import ClassVar
 
-from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer
+from drivers.errors import EmptyChannel, GaugeAtEnd, GaugeSilent, WrongAnswer
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, GaugeState, LineSettings, ProtocolSpec
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.interfaces import GaugeReading
@@ -112,7 +112,7 @@ class Mux10Gauge(SerialGauge):
             raise MultiplexerBusy
         displayed = frame.decode("ascii").strip()
         if answer.code == NO_GAUGE:
-            raise GaugeSilent(
+            raise EmptyChannel(
                 f"does not answer its multiplexer ({displayed})",
                 subject=self.subject,
                 action="Switch it on, check its cable, and channel in the cell file",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from contextlib import suppress
@@ -22,6 +23,7 @@ from drivers.gauges.protocol import (
     unexpected_answer,
 )
 from drivers.interfaces import DeviceIdentity, GaugeReading
+from drivers.serial.adapters import adapter_at
 from drivers.serial.port import NoAnswer
 from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
@@ -95,7 +97,8 @@ class SerialGauge(ABC):
             raise
         self._state = state
         description = state.identification or self.spec.vendors
-        return DeviceIdentity(self.name, self.spec.protocol, description)
+        adapter = await asyncio.to_thread(adapter_at, self.settings.port or "")
+        return DeviceIdentity(self.name, self.spec.protocol, description, port=adapter)
 
     async def read(self) -> GaugeReading:
         """The displayed value, mm, as soon as two consecutive readings agree.

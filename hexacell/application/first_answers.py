@@ -122,10 +122,11 @@ def _put_sliders(document: Document, given: str) -> None:
 
 
 def _put_bus(document: Document, given: str) -> None:
-    interface, _, channel = given.strip().partition(" ")
-    if not channel.strip():
+    interface, channel, *bitrate = given.split() if len(given.split()) > 1 else (given, "")
+    if not channel or len(bitrate) > 1:
         raise ValueError("name the interface and the channel, such as: socketcan can0")
-    document["encoders"]["bus"] = {"interface": interface, "channel": channel.strip(), "bitrate": 500000}
+    rate = _whole(bitrate[0]) if bitrate else 500_000
+    document["encoders"]["bus"] = {"interface": interface, "channel": channel, "bitrate": rate}
 
 
 def _put_points(document: Document, given: str) -> None:

@@ -31,17 +31,29 @@ from hexacell.plugins import Group, load
 from hexacell.storage.atomic_files import write_atomically
 from hexacell.storage.toml_document import TomlDocument
 
-HEADER = "# Made from the answers to `hexacell tui`. `hexacell cell show` prints it with every default.\n\n"
+HEADER = "# Made from a few answers. `hexacell cell show` prints it with every default.\n\n"
 KEPT_SECTIONS = ("robot", "limits", "speed")
 """Of the simulated cell: where every answer has a place, and limits that are stated with care."""
 
 
+@dataclass(frozen=True)
+class FoundKeys:
+    """Keys of a cell file whose values devices told."""
+
+    gauges: tuple[Document, ...] = ()
+    encoders: Document = field(default_factory=dict)
+
+
 @dataclass
 class CellDraft:
-    """A cell file that is being made at ``path``; ``given`` are the answers so far, by name."""
+    """A cell file that is being made at ``path``; ``given`` are the answers so far, by name.
+
+    ``found`` is what devices told that nobody is asked: keys of the gauges, in order, and of the encoders.
+    """
 
     path: Path
     given: dict[str, str] = field(default_factory=dict)
+    found: FoundKeys = field(default_factory=FoundKeys)
 
     def answers(self) -> tuple[CellAnswer, ...]:
         """All that is asked, in order."""
@@ -86,6 +98,9 @@ class CellDraft:
     def _text(self, given: dict[str, str]) -> str:
         """The file; raises ``ValueError`` where an answer cannot be read."""
         document = _beginning()
+        for gauge, keys in zip(document["gauges"], self.found.gauges, strict=False):
+            gauge.update(keys)
+        document["encoders"] |= self.found.encoders
         for answer in self.answers():
             if answer.name in given:
                 answer.put(document, given[answer.name])

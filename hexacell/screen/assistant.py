@@ -11,15 +11,15 @@ from hexacell.presentation.screens.views import FirstQuestionView
 
 
 class FirstCellAssistant:
-    """Makes the cell file at a path.
+    """Makes the cell file at a path, from a draft where something is known already.
 
     Attributes:
         is_done: whether the file is there.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, draft: CellDraft | None = None) -> None:
         self.is_done = False
-        self._draft = CellDraft(path)
+        self._draft = CellDraft(path) if draft is None else draft
         self._number = 0
         self._problem = ""
 

@@ -29,6 +29,7 @@ COMMANDS = (
     "rollback",
     "history",
     "report",
+    "devices",
     "schedule",
     "status",
     "notify",

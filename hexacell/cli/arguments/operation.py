@@ -18,11 +18,52 @@ from hexacell.cli.arguments.commands import (
 
 def add_operation_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
     """Add those to the commands of a parser."""
+    _devices(commands)
     _schedule(commands)
     _status(commands)
     _notify(commands)
     _serve(commands)
     _cell(commands)
+
+
+def _devices(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(
+        commands, "devices", "find gauges, encoders and the controller, as text for a cell file"
+    )
+    parser.add_argument(
+        "ports", nargs="*", metavar="PORT", help="serial ports or URLs (default: all of this computer)"
+    )
+    parser.add_argument(
+        "--can",
+        action="append",
+        default=[],
+        metavar="BUS",
+        help="a CAN bus, such as interface=slcan,channel=/dev/ttyACM0,bitrate=500000",
+    )
+    parser.add_argument(
+        "--bitrate",
+        type=int,
+        default=500_000,
+        metavar="BIT/S",
+        help="of CAN adapters that are found (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--controller",
+        default="127.0.0.1:5007",
+        metavar="HOST:PORT",
+        help="where LinuxCNC's server may be (default: %(default)s)",
+    )
+    add_file(parser, "--write", "write a cell file: what was found, and your answers to the rest")
+    parser.add_argument("--diagnose", metavar="NAME", help="watch a gauge, or encoders, of --cell")
+    parser.add_argument("--cell", type=Path, metavar="CELL", help="the cell file (TOML) of --diagnose")
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=10.0,
+        metavar="S",
+        help="how long --diagnose watches (default: %(default)s)",
+    )
+    add_json(parser)
 
 
 def _schedule(commands: Any) -> None:  # noqa: ANN401

@@ -32,7 +32,7 @@ QUESTIONS = {
     ),
     "bus": (
         "Where is the CAN bus of the encoders?",
-        "Interface and channel, such as: socketcan can0, or: slcan /dev/ttyACM0.",
+        "Interface, channel and bit/s, such as: socketcan can0 500000, or: slcan /dev/ttyACM0 500000.",
     ),
     "nodes": ("Which nodes are the encoders of legs 1 to 6?", "Six numbers, in the order of the legs."),
     "plates": (

@@ -1,0 +1,103 @@
+"""Which CAN adapters are there, and which nodes answer on a bus: one question to each of 127 node ids."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drivers.encoders.can_bus import EncoderBus
+from drivers.encoders.canopen_node import EncoderNode, Leg
+from drivers.encoders.object_dictionary import (
+    DEVICE_TYPE,
+    ENCODER_PROFILE,
+    MEASURING_STEP,
+    MEASURING_STEP_SETTING,
+    SERIAL_NUMBER,
+    UNITS_PER_TURN,
+    DeviceType,
+)
+from drivers.serial.port import NoAnswer, SerialPort
+from hexacell.errors import HexacellError
+from hexacell.kinematics.parameters import JointUnit
+
+TIMEOUT_S = 0.5
+SLCAN_LINE = {"baudrate": 115200}
+SLCAN_VERSION = re.compile(rb"V[0-9A-Fa-f]{4}\r")
+NETWORK_DEVICES = Path("/sys/class/net")
+ARPHRD_CAN = "280"
+"""The type of a CAN interface (linux/if_arp.h)."""
+
+
+@dataclass(frozen=True, slots=True)
+class FoundNode:
+    """A CANopen node that answers. ``step``: nm a count, or counts a turn; none if it does not tell."""
+
+    node: int
+    description: str
+    serial_number: int | None = None
+    step: int | None = None
+    unit: JointUnit | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BusFindings:
+    """What is on a bus, or why it could not be opened."""
+
+    bus: Mapping[str, Any]
+    nodes: tuple[FoundNode, ...] = ()
+    problem: str = ""
+
+
+def socketcan_interfaces() -> tuple[str, ...]:
+    """The CAN interfaces of the kernel."""
+    found = []
+    for device in sorted(NETWORK_DEVICES.glob("*")):
+        with suppress(OSError):
+            if (device / "type").read_text().strip() == ARPHRD_CAN:
+                found.append(device.name)
+    return tuple(found)
+
+
+def speaks_slcan(port: str) -> bool:
+    """Whether a CAN adapter with the slcan protocol answers on a serial port; it is asked its version."""
+    line = SerialPort(port, SLCAN_LINE, threading.Event())
+    with closing(line), suppress(HexacellError, NoAnswer):
+        line.open()
+        return SLCAN_VERSION.fullmatch(line.exchange(b"V\r", b"\r", TIMEOUT_S)) is not None
+    return False
+
+
+def search_bus(bus: Mapping[str, Any]) -> BusFindings:
+    """The nodes that answer on a bus, by node id."""
+    try:
+        with _opened(bus) as opened:
+            opened.network.scanner.search()
+            opened.listen(TIMEOUT_S)
+            ids = sorted(set(opened.network.scanner.nodes))
+            return BusFindings(bus, tuple(_described(opened, node) for node in ids))
+    except HexacellError as error:
+        return BusFindings(bus, problem=str(error))
+
+
+@contextmanager
+def _opened(bus: Mapping[str, Any]) -> Iterator[EncoderBus]:
+    with closing(EncoderBus(bus, threading.Event())) as opened:
+        yield opened
+
+
+def _described(bus: EncoderBus, number: int) -> FoundNode:
+    node = EncoderNode(Leg(0, number), bus, TIMEOUT_S)
+    kind = node.read_optional(DEVICE_TYPE)
+    if kind not in set(DeviceType):
+        profile = "" if kind is None else f", profile {kind & 0xFFFF}; encoders are {ENCODER_PROFILE}"
+        return FoundNode(number, f"no encoder that is known{profile}")
+    device = DeviceType(kind)
+    entries = [UNITS_PER_TURN] if device.unit is JointUnit.DEG else [MEASURING_STEP_SETTING]
+    steps = (node.read_optional(entry) for entry in (*entries, MEASURING_STEP))
+    step = next((value for value in steps if value is not None), None)
+    return FoundNode(number, device.description, node.read_optional(SERIAL_NUMBER), step, device.unit)

@@ -1,0 +1,103 @@
+"""Which dial indicators answer on a serial port: each protocol asks as it does when it is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from drivers.errors import (
+    EmptyChannel,
+    GaugeAtEnd,
+    GaugeSilent,
+    PortLost,
+    WrongAnswer,
+    WrongSetting,
+    ZeroVoid,
+)
+from drivers.interfaces import Gauge
+from drivers.serial.shared_port import SharedSerialPorts
+from hexacell.cell.devices import GaugeSettings
+from hexacell.errors import DeviceError, HexacellError
+
+TIMEOUT_S = 0.5
+CHANNELS = range(1, 5)
+"""Inputs of a multiplexer that are tried."""
+
+GaugeFactory = Callable[[GaugeSettings, SharedSerialPorts], Gauge]
+
+
+@dataclass(frozen=True, slots=True)
+class FoundGauge:
+    """A gauge that answers.
+
+    Attributes:
+        channel: its input of a multiplexer; none if it has the port alone.
+        shown: what it shows, as it sent it; empty if it cannot be used as it is.
+        problem: why it cannot be used as it is, with what to do.
+    """
+
+    protocol: str
+    port: str
+    description: str
+    channel: int | None = None
+    shown: str = ""
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PortFindings:
+    """What is on a port: its gauges, or why it could not be opened."""
+
+    port: str
+    gauges: tuple[FoundGauge, ...] = ()
+    problem: str = ""
+
+
+async def search_port(port: str, factories: Mapping[str, GaugeFactory]) -> PortFindings:
+    """Ask in every protocol; the first that is answered is the port's."""
+    for protocol, factory in factories.items():
+        try:
+            found = await _channels(protocol, factory, port)
+        except HexacellError as error:
+            return PortFindings(port, problem=f"{error.problem}. {error.action}")
+        if found:
+            return PortFindings(port, tuple(found))
+    return PortFindings(port)
+
+
+async def _channels(protocol: str, factory: GaugeFactory, port: str) -> list[FoundGauge]:
+    """The gauges that answer in one protocol; raises ``PortLost`` where the port cannot be used."""
+    found = []
+    for channel in CHANNELS:
+        try:
+            gauge = await _ask(protocol, factory, port, channel)
+        except EmptyChannel:
+            continue
+        except (GaugeSilent, WrongAnswer):
+            break
+        found.append(gauge)
+        if gauge.channel is None:
+            break
+    return found
+
+
+async def _ask(protocol: str, factory: GaugeFactory, port: str, channel: int) -> FoundGauge:
+    settings = GaugeSettings(
+        name="x", axis="x", protocol=protocol, port=port, channel=channel, timeout_s=TIMEOUT_S
+    )
+    ports = SharedSerialPorts(worst_latency_s=TIMEOUT_S)
+    gauge = factory(settings, ports)
+    its_channel = getattr(gauge, "channel", None)
+    try:
+        identity = await gauge.open()
+        shown = (await gauge.read_once()).raw
+    except (WrongSetting, GaugeAtEnd, ZeroVoid) as error:  # it answered
+        return FoundGauge(protocol, port, "", its_channel, problem=f"{error.problem}. {error.action}")
+    except (GaugeSilent, WrongAnswer, PortLost):
+        raise
+    except DeviceError as error:
+        raise WrongAnswer(error.problem) from error
+    finally:
+        await gauge.close()
+        await ports.close()
+    return FoundGauge(protocol, port, identity.description, its_channel, shown)

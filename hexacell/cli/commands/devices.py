@@ -1,0 +1,101 @@
+"""``hexacell devices``: what is connected, as text for a cell file; and one device watched for a while."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import sys
+from pathlib import Path
+from typing import Any
+
+from hexacell.application.device_diagnosis import diagnose
+from hexacell.application.device_search import SearchFindings, SearchRequest, search_devices
+from hexacell.application.found_cell import draft_of
+from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.console import Console
+from hexacell.cli.terminal import is_interactive
+from hexacell.errors import AnswerNeeded, ExitCode, FileError, UsageError
+from hexacell.presentation.device_diagnosis import diagnosis_document, diagnosis_lines
+from hexacell.presentation.found_devices import cell_lines, search_document, search_lines
+from hexacell.presentation.layout import wrapped
+from hexacell.screen.assistant import FirstCellAssistant
+
+
+def main(options: argparse.Namespace) -> ExitCode:
+    """Search, or watch one device of a cell; nothing moves, and no device is set."""
+    console = Console(options.json)
+    return _watch(options, console) if options.diagnose is not None else _search(options, console)
+
+
+def _search(options: argparse.Namespace, console: Console) -> ExitCode:
+    if options.write is not None:
+        _require_new(options.write)
+    request = SearchRequest(
+        tuple(options.ports),
+        tuple(_bus(words) for words in options.can),
+        options.bitrate,
+        _address(options.controller),
+    )
+    found = asyncio.run(search_devices(request))
+    console.document(search_document(found))
+    for line in search_lines(found):
+        console.print(wrapped(line))
+    if options.write is not None:
+        return _write(found, options.write, console)
+    if text := "\n".join(cell_lines(found)):
+        console.print(f"\nFor your cell file:\n\n{text}")
+    return ExitCode.DONE
+
+
+def _require_new(path: Path) -> None:
+    if path.exists():
+        raise FileError("is there already", subject=path, action="Name a new file, or remove it")
+    if not is_interactive():
+        raise AnswerNeeded("--write asks what no device tells", action="Start it at a terminal")
+
+
+def _write(found: SearchFindings, path: Path, console: Console) -> ExitCode:
+    """Ask for the rest, question by question; an empty answer takes what stands in brackets."""
+    assistant = FirstCellAssistant(path, draft_of(found, path))
+    while not assistant.is_done:
+        view = assistant.view()
+        if view.problem:
+            console.error(view.problem)
+        console.print(f"\n{view.progress}: {view.text}\n  {view.hint}")
+        console.prompt(f"[{view.answer}] ")
+        typed = sys.stdin.readline()
+        if not typed:
+            raise AnswerNeeded("the questions were not all answered", action="No file was written")
+        assistant.answer(typed.strip() or view.answer)
+    console.print(f"\n{path} is written. Next: hexacell preflight {path}")
+    return ExitCode.DONE
+
+
+def _watch(options: argparse.Namespace, console: Console) -> ExitCode:
+    if options.cell is None:
+        raise UsageError("--diagnose wants the cell of the device", action="Add --cell CELL")
+    cell = cell_at(options.cell, console)
+    found = asyncio.run(diagnose(cell, options.diagnose, options.seconds))
+    console.document(diagnosis_document(found))
+    for line in diagnosis_lines(found):
+        console.print(wrapped(line))
+    return ExitCode.DONE if found.is_usable else ExitCode.HARDWARE
+
+
+def _bus(words: str) -> dict[str, Any]:
+    """Settings of a bus from ``interface=slcan,channel=/dev/ttyACM0,bitrate=500000``."""
+    pairs = [word.partition("=") for word in words.split(",")]
+    if not all(name and value for name, _, value in pairs):
+        raise UsageError(
+            f"--can {words} does not say what the bus is",
+            action="Write it like interface=slcan,channel=/dev/ttyACM0,bitrate=500000",
+        )
+    return {name.strip(): int(value) if value.isdigit() else value for name, _, value in pairs}
+
+
+def _address(words: str) -> tuple[str, int]:
+    """Host and port from ``HOST:PORT``."""
+    host, _, port = words.rpartition(":")
+    if not host or not port.isdigit():
+        raise UsageError(f"--controller {words} is no address", action="Write it like 127.0.0.1:5007")
+    return host, int(port)

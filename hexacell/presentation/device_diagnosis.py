@@ -1,0 +1,56 @@
+"""A device that was watched: figures, and what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+from hexacell.application.device_diagnosis import Diagnosis, SeriesFigures
+from hexacell.presentation.planning import device_line
+
+NOISY = 3.0
+"""A scatter of so many times what the cell file states is told."""
+
+
+def diagnosis_document(found: Diagnosis) -> dict[str, Any]:
+    """All figures."""
+    return {**asdict(found), "is_usable": found.is_usable}
+
+
+def diagnosis_lines(found: Diagnosis) -> Iterator[str]:
+    """The figures in words, then what is wrong."""
+    for identity in found.identities:
+        yield device_line(identity)
+    rate = found.readings / found.seconds if found.seconds else 0.0
+    yield f"{found.readings} readings in {found.seconds:.1f} s, {rate:.1f} a second"
+    for series in found.series:
+        yield _series_line(series)
+    for problem, count in found.failures.items():
+        yield f"{count} times instead of a reading: {problem}"
+    yield from _meaning(found)
+
+
+def _series_line(series: SeriesFigures) -> str:
+    scatter = "" if series.scatter is None else f", scatter {_micro(series.scatter, series.unit)}"
+    span = f"{series.lowest:.4f} to {series.highest:.4f} {series.unit}"
+    return f"{series.name}: {span}, {series.distinct} distinct values{scatter}"
+
+
+def _meaning(found: Diagnosis) -> Iterator[str]:
+    if found.problem:
+        yield f"It cannot be used like this: {found.problem}"
+    if found.failures:
+        yield "Answers are missing or damaged: check its cable and its serial settings."
+    for series in found.series:
+        if series.distinct == 1 and found.readings > 1:
+            yield f"{series.name} showed one value only: move it by hand to see that it follows."
+        elif series.scatter is not None and series.scatter > NOISY * found.stated_noise:
+            stated = _micro(found.stated_noise, series.unit)
+            yield f"{series.name} scatters more than the {stated} that [noise] states, or it moved."
+    if found.is_usable and not found.failures:
+        yield "It can be used."
+
+
+def _micro(value: float, unit: str) -> str:
+    return f"{1000.0 * value:.2g} um" if unit == "mm" else f"{value:.2g} {unit}"

@@ -1,0 +1,120 @@
+"""Devices that were found: in words, and as text for a cell file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from typing import Any
+
+import tomlkit
+
+from drivers.discovery.encoders import BusFindings, FoundNode
+from drivers.discovery.gauges import FoundGauge, PortFindings
+from drivers.serial.adapters import SerialPortFound
+from hexacell.application.device_search import SearchFindings
+from hexacell.application.found_cell import LEGS, encoder_keys, found_bank, found_gauges, gauge_keys
+from hexacell.kinematics.parameters import JointUnit
+
+AXES = "xyz"
+
+
+def search_document(found: SearchFindings) -> dict[str, Any]:
+    """All that was found, and ``cell``: the text for a cell file."""
+    return {
+        "ports": [asdict(port) for port in found.ports],
+        "gauges": [asdict(one) for one in found.gauges],
+        "buses": [asdict(bus) for bus in found.buses],
+        "controller": None if found.controller is None else asdict(found.controller),
+        "cell": "\n".join(cell_lines(found)),
+    }
+
+
+def search_lines(found: SearchFindings) -> Iterator[str]:
+    """What was found, in words."""
+    if not found.ports:
+        yield "No serial port: plug a gauge's cable or adapter in, or name a port."
+    for port, on_it in zip(found.ports, found.gauges, strict=True):
+        yield from _port_lines(port, on_it, found.buses)
+    if not found.buses:
+        yield "No CAN adapter: plug it in, or name a bus with --can."
+    for bus in found.buses:
+        yield from _bus_lines(bus)
+    if found.controller is None:
+        yield "No controller: LinuxCNC answers if linuxcncrsh is its display (--controller)."
+    else:
+        yield f"Controller at {found.controller.host}:{found.controller.port}: {found.controller.greeting}"
+
+
+def cell_lines(found: SearchFindings) -> Iterator[str]:
+    """The sections of a cell file for what was found; the axes are guesses, as nothing tells them."""
+    for axis, gauge in zip(AXES, found_gauges(found), strict=False):
+        yield from _gauge_section(axis, gauge)
+    if bank := found_bank(found):
+        yield from _encoder_section(*bank)
+    if found.controller is not None:
+        address = {"host": found.controller.host, "port": found.controller.port}
+        yield from ("[controller]", *_keys({"protocol": "linuxcncrsh", **address}), "")
+
+
+def _port_lines(
+    port: SerialPortFound, on_it: PortFindings, buses: tuple[BusFindings, ...]
+) -> Iterator[str]:
+    name = port.port if port.port == port.device else f"{port.port} (now {port.device})"
+    adapter = f", {port.adapter}" if port.adapter else ""
+    if on_it.problem:
+        yield f"{name}{adapter}: {on_it.problem}"
+    elif any(bus.bus.get("channel") == port.port for bus in buses):
+        yield f"{name}{adapter}: a CAN adapter"
+    elif not on_it.gauges:
+        yield f"{name}{adapter}: nothing answers; is the gauge on, and is its cable a duplex one?"
+    for gauge in on_it.gauges:
+        where = "" if gauge.channel is None else f", channel {gauge.channel}"
+        what = f"{gauge.description}, shows {gauge.shown}" if gauge.shown else gauge.problem
+        yield f"{name}{adapter}{where}: {gauge.protocol}: {what}"
+
+
+def _bus_lines(bus: BusFindings) -> Iterator[str]:
+    name = " ".join(str(bus.bus[key]) for key in ("interface", "channel", "bitrate") if key in bus.bus)
+    if bus.problem:
+        yield f"CAN {name}: {bus.problem}"
+    elif not bus.nodes:
+        yield f"CAN {name}: no node answers; check supply and termination, or try another --bitrate"
+    for node in bus.nodes:
+        yield f"CAN {name}, node {node.node}: {_node_words(node)}"
+
+
+def _node_words(node: FoundNode) -> str:
+    words = [node.description]
+    if node.step is not None:
+        words.append(
+            f"{node.step} counts a turn" if node.unit is JointUnit.DEG else f"{node.step} nm a count"
+        )
+    if node.serial_number is not None:
+        words.append(f"serial number {node.serial_number}")
+    return ", ".join(words)
+
+
+def _gauge_section(axis: str, gauge: FoundGauge) -> Iterator[str]:
+    yield "[[gauges]]"
+    yield from _keys({"name": axis})
+    yield f'axis = "{axis}"  # the base axis along which its plunger moves: press it, and correct this'
+    yield "sign = 1    # -1 if it shows less when the ball moves along that axis"
+    yield from _keys({"protocol": gauge.protocol, "port": gauge.port, **gauge_keys(gauge)})
+    yield ""
+
+
+def _encoder_section(bus: BusFindings, encoders: tuple[FoundNode, ...]) -> Iterator[str]:
+    shown = ", ".join(_keys(bus.bus))
+    nodes = [node.node for node in encoders]
+    needed = "" if len(nodes) == LEGS else ": six are needed"
+    yield from ("[encoders]", *_keys({"protocol": "cia406"}))
+    yield f"bus = {{ {shown} }}"
+    yield f"nodes = {nodes}  # of legs 1 to 6{needed}"
+    yield from _keys(encoder_keys(encoders))
+    yield ""
+
+
+def _keys(values: Mapping[str, Any]) -> Iterator[str]:
+    """Lines of a TOML file."""
+    for name, value in values.items():
+        yield f"{name} = {tomlkit.item(value).as_string()}"

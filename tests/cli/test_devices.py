@@ -1,0 +1,180 @@
+"""``hexacell devices``: on an empty machine, with every protocol on pseudo-terminals, watching one."""
+
+from __future__ import annotations
+
+import os
+import pty
+import tomllib
+from pathlib import Path
+
+import pytest
+from serial.tools import list_ports
+
+from hexacell.cell.loader import load_cell
+from tests.cli.test_run_answers import Terminal, ended, start_at
+
+CELL = "simulated-hexaglide.toml"
+NOBODY = "127.0.0.1:1"
+"""A port where no server listens."""
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory, processes):
+    """A cell that another process serves: its folder, and the cell file that reaches it."""
+    folder = tmp_path_factory.mktemp("served")
+    with processes(folder) as start:
+        process = start("simulate", folder / CELL)
+        process.wait_for("serving", lambda: process.err)
+        cell = folder / "served.toml"
+        cell.write_text(process.out)
+        yield cell
+
+
+@pytest.fixture
+def addresses(served: Path):
+    """Where its devices are: the gauges' ports, the CAN adapter, and the controller."""
+    settings = tomllib.loads(served.read_text())
+    controller = settings["controller"]
+    return (
+        [gauge["port"] for gauge in settings["gauges"]],
+        settings["encoders"]["bus"]["channel"],
+        f"{controller['host']}:{controller['port']}",
+    )
+
+
+@pytest.fixture
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(list_ports, "comports", list)
+    monkeypatch.setattr("drivers.discovery.encoders.NETWORK_DEVICES", Path("/nowhere"))
+
+
+@pytest.mark.usefixtures("no_ports")
+def test_a_machine_without_devices_is_told_what_to_plug_in(typed_here) -> None:
+    outcome = typed_here("devices", "--controller", NOBODY)
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "No serial port: plug a gauge's cable" in outcome.out
+    assert "No CAN adapter: plug it in" in outcome.out
+    assert "No controller: LinuxCNC answers if" in outcome.out
+    assert "For your cell file" not in outcome.out
+
+
+@pytest.mark.usefixtures("no_ports")
+def test_every_protocol_is_found_and_the_text_is_that_of_a_cell_file(typed_here, served, addresses) -> None:
+    gauges, adapter, controller = addresses
+    outcome = typed_here("devices", *gauges, adapter, "--controller", controller, "--json")
+    assert outcome.code == 0, outcome.err
+    found = outcome.document
+    assert [one["gauges"][0]["protocol"] for one in found["gauges"][:3]] == ["sylvac", "mux10", "cdi"]
+    assert [node["serial_number"] for node in found["buses"][0]["nodes"]] == list(range(1001, 1007))
+    words = " ".join(outcome.err.split())
+    for text in ("sylvac: SY276, shows", "channel 1: mux10: MUX-10F", "a CAN adapter", "HELLO ACK"):
+        assert text in words
+
+    told = tomllib.loads(found["cell"])
+    real = tomllib.loads(served.read_text())
+    assert [gauge["port"] for gauge in told["gauges"]] == gauges
+    assert [gauge["resolution_mm"] for gauge in told["gauges"]] == [0.001, 0.001, 0.0001]
+    assert told["encoders"]["nodes"] == real["encoders"]["nodes"]
+    assert told["encoders"]["measuring_step_nm"] == real["encoders"]["measuring_step_nm"]
+    assert told["encoders"]["bus"]["channel"] == adapter
+    assert f"{told['controller']['host']}:{told['controller']['port']}" == controller
+
+
+@pytest.mark.usefixtures("no_ports")
+def test_ports_of_nothing_and_of_nobody_are_told(typed_here, tmp_path) -> None:
+    near, far = os.openpty()
+    name = os.ttyname(far)
+    outcome = typed_here("devices", name, tmp_path / "gone", "--controller", NOBODY)
+    os.close(near)
+    os.close(far)
+    assert outcome.code == 0
+    said = " ".join(outcome.out.split())
+    assert f"{name}: nothing answers; is the gauge on, and is its cable a duplex one?" in said
+    assert f"{tmp_path / 'gone'}: port {tmp_path / 'gone'} is absent" in said
+
+
+@pytest.mark.usefixtures("no_ports")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--can", "slcan"), "--can slcan does not say what the bus is"),
+        (("--controller", "robot"), "--controller robot is no address"),
+        (("--diagnose", "x"), "--diagnose wants the cell"),
+    ],
+)
+def test_arguments_that_say_too_little_are_refused(typed_here, arguments, words) -> None:
+    outcome = typed_here("devices", *arguments)
+    assert outcome.code == 2
+    assert words in outcome.err
+
+
+@pytest.mark.parametrize(("device", "rows"), [("x", 1), ("y", 1), ("encoders", 6)])
+def test_one_device_is_watched(typed_here, served, device, rows) -> None:
+    outcome = typed_here("devices", "--diagnose", device, "--cell", served, "--seconds", "0.3", "--json")
+    assert outcome.code == 0, outcome.err
+    found = outcome.document
+    assert found["readings"] > 0
+    assert len(found["series"]) == rows
+    assert all(series["lowest"] <= series["highest"] for series in found["series"])
+    assert found["failures"] == {}
+    assert "It can be used." in outcome.err
+
+
+def test_a_device_that_the_cell_has_not_is_refused(typed_here, served) -> None:
+    outcome = typed_here("devices", "--diagnose", "w", "--cell", served)
+    assert outcome.code == 2
+    assert "the cell has no device 'w'. Name one of x, y, z, encoders" in outcome.err
+
+
+def test_a_gauge_in_inches_is_watched_and_named(typed_here, cell_folder) -> None:
+    with cell_folder.cell.open("a") as cell:
+        cell.write('\n[[simulation.faults]]\nkind = "in inches"\ndevice = "x"\n')
+    outcome = typed_here("devices", "--diagnose", "x", "--cell", cell_folder.cell, "--seconds", "0.1")
+    assert outcome.code == 3
+    assert "gauge x: answers in inch" in outcome.err
+
+
+def test_questions_want_a_terminal_and_a_new_file(typed_here, cell_folder, monkeypatch) -> None:
+    outcome = typed_here("devices", "--write", cell_folder.cell)
+    assert outcome.code == 2
+    assert "is there already" in outcome.err
+    monkeypatch.setattr("hexacell.cli.commands.devices.is_interactive", lambda: False)
+    outcome = typed_here("devices", "--write", "new.toml")
+    assert outcome.code == 4
+    assert "asks what no device tells" in outcome.err
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("TERM", "dumb")
+    master, slave = pty.openpty()
+    yield Terminal(master, slave)
+    os.close(master)
+    os.close(slave)
+
+
+def test_a_cell_file_is_written_from_what_was_found_and_answers(
+    start, cell_folder, terminal, addresses
+) -> None:
+    gauges, adapter, controller = addresses
+    process = start_at(
+        terminal, start, "devices", *gauges, adapter, "--controller", controller, "--write", "cell/new.toml"
+    )
+    answers = {
+        "What is this cell called?": "press 3",
+        "in which file": "simulated-hexaglide.controller.toml",
+    }
+    for number in range(1, 20):
+        terminal.read_until("] ")
+        asked = process.out.rpartition("Question ")[2]
+        given = next((text for words, text in answers.items() if words.lower() in asked.lower()), "")
+        terminal.type(f"{given}\n")
+        if f"Question {number} of {number}:" in process.out:
+            break
+    assert ended(process, terminal) == 0
+    written = load_cell(cell_folder.path / "new.toml").settings
+    assert written.name == "press 3"
+    assert [gauge.port for gauge in written.gauges] == gauges
+    assert [gauge.resolution_mm for gauge in written.gauges] == [0.001, 0.001, 0.0001]
+    assert written.encoders.serial_numbers == tuple(range(1001, 1007))
+    assert f"{written.controller.host}:{written.controller.port}" == controller

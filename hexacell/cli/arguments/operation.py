@@ -27,9 +27,7 @@ def add_operation_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's 
 
 
 def _devices(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands, "devices", "find gauges, encoders and the controller, as text for a cell file"
-    )
+    parser = add_command(commands, "devices", "find gauges, encoders, a controller; text for a cell file")
     parser.add_argument(
         "ports", nargs="*", metavar="PORT", help="serial ports or URLs (default: all of this computer)"
     )

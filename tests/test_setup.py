@@ -16,6 +16,9 @@ MARKED = "not slow and not benchmark and not linuxcnc"
 THE_TESTS = f"-m pytest -n 4 --dist loadfile --no-loadscope-reorder -m {MARKED}"
 """The arguments that ``make test`` gives to Python."""
 
+AT_LINUXCNC = "-m pytest tests/linuxcnc --timeout=1200 -m not slow"
+"""Those of ``make test-linuxcnc``."""
+
 FAKE_PYTHON = """\
 #!/bin/sh
 lacks() { case " $LACKING " in *" $1 "*) true ;; *) false ;; esac; }
@@ -216,16 +219,54 @@ def test_python_environment_variables_are_not_passed_on(settled: Newcomer, name:
     assert set(settled.printed) == {"[]"}
 
 
-def test_ci_lints_and_tests_even_if_lint_fails(settled: Newcomer) -> None:
-    python = settled.checkout / ".venv/bin/python"
-    python.write_text('#!/bin/sh\necho "$CI $*"\n[ "$2" != ruff ]\n')
-    command = ["bash", "-c", ".ci/run 2>&1"]
-    done = subprocess.run(
-        command, cwd=settled.checkout, env=settled.environment, capture_output=True, text=True, check=False
+NOT_RUN = "LinuxCNC could not be installed: make test-linuxcnc was not run"
+
+
+def ci(newcomer: Newcomer, lint: int = 0, linuxcnc: int | None = None) -> tuple[int, list[str]]:
+    """Status and lines of ``.ci/run``, where lint and the tests at LinuxCNC end as told; none: there is none."""
+    (newcomer.checkout / ".venv/bin/python").write_text(
+        '#!/bin/sh\necho "$CI $*"\n'
+        f'case "$*" in *ruff*) exit {lint} ;; *tests/linuxcnc*) exit {linuxcnc} ;; esac\n'
     )
-    assert done.returncode != 0
-    assert "true -m ruff check" in done.stdout
-    assert done.stdout.splitlines()[-2:] == [
-        f"true {THE_TESTS}",
-        "make lint failed, see above",
-    ]
+    lints = newcomer.checkout / ".venv/bin/lint-imports"
+    lints.write_text("#!/bin/sh\n")
+    lints.chmod(0o755)
+    path = newcomer.checkout.parent / "bin"
+    path.mkdir()
+    replaced = {"linuxcnc", "halcompile", "apt-get"}
+    for folder in os.environ["PATH"].split(os.pathsep):
+        for program in Path(folder).glob("*"):
+            if program.name not in replaced and not (path / program.name).is_symlink():
+                (path / program.name).symlink_to(program)
+    for name in replaced if linuxcnc is not None else {"apt-get"}:
+        (path / name).write_text("#!/bin/sh\nexit 100\n")
+        (path / name).chmod(0o755)
+    done = subprocess.run(
+        ["bash", "-c", ".ci/run 2>&1"],
+        cwd=newcomer.checkout,
+        env=newcomer.environment | {"PATH": str(path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return done.returncode, done.stdout.splitlines()
+
+
+def test_ci_lints_and_tests_even_if_lint_fails(settled: Newcomer) -> None:
+    status, said = ci(settled, lint=1)
+    assert status != 0
+    assert "true -m ruff check" in said
+    assert said[-3:] == [f"true {THE_TESTS}", "make lint failed, see above", NOT_RUN]
+
+
+@pytest.mark.parametrize("status", [0, 1])
+def test_ci_runs_the_tests_at_linuxcnc_last_and_fails_if_they_do(settled: Newcomer, status: int) -> None:
+    found, said = ci(settled, linuxcnc=status)
+    tests = [line for line in said if line.startswith("true -m pytest")]
+    assert tests == [f"true {THE_TESTS}", f"true {AT_LINUXCNC}"]
+    assert (found != 0, NOT_RUN in said) == (status != 0, False)
+
+
+def test_ci_says_where_linuxcnc_cannot_be_installed(settled: Newcomer) -> None:
+    status, said = ci(settled)
+    assert (status, said[-1]) == (0, NOT_RUN)

@@ -12,7 +12,8 @@ import numpy as np
 from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry, JointRanges
+from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry, ControllerLimits
+from hexacell.controller_config.linuxcnc_limits import limits_of_ini
 from hexacell.errors import FileError, UsageError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
@@ -27,7 +28,7 @@ from hexacell.identification.problem.problem import Noise, Prior, Problem, Toler
 from hexacell.identification.solver.result import GeometryEstimate, Identification
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array
@@ -184,11 +185,28 @@ class Robot:
             self,
             controller=written,
             frames=frames,
-            limits=replace(self.limits, frames=frames),
+            limits=replace(self.limits_with(written), frames=frames),
             provisional=(),
             uses_provisional=False,
             earlier=(*before, *self.earlier),
         )
+
+    def with_provisional(self, geometry: Geometry, *, is_used: bool = True) -> Robot:
+        """The robot once its controller was given a geometry in the convention's frames for a while.
+
+        It commands with it, unless it has its own back (``is_used`` is false).
+        """
+        commanding = self.for_controller(geometry) if is_used else self.controller
+        return replace(
+            self,
+            provisional=(geometry,),
+            uses_provisional=is_used,
+            limits=self.limits_with(commanding),
+        )
+
+    def limits_with(self, commanding: Geometry) -> Limits:
+        """The limits where the controller has a geometry, in its own frames."""
+        return self.limits.with_zeros(joint_zeros(self.mechanism, commanding))
 
     def from_commands(self, commands: Iterable[Pose]) -> PoseBatch:
         """Poses (n) commanded in the controller's frames, in the convention's frames."""
@@ -211,14 +229,27 @@ def config_format(settings: CellSettings) -> ConfigFormat:
     return made
 
 
+def controller_geometry(cell: Cell, path: Path | None = None) -> ControllerGeometry:
+    """What a cell's config states, or a copy of it; with the limits of the INI file that the cell names.
+
+    Raises:
+        FileError: one of the files is absent, or does not hold what it should.
+    """
+    found = config_format(cell.settings).read(path or cell.config_path)
+    ini, controller = cell.settings.limits.ini, cell.settings.controller
+    if ini is None:
+        return found
+    limits = limits_of_ini(cell.path.parent / ini, controller.unit_mm, controller.joint_unit_mm)
+    return replace(found, limits=found.limits.narrowed(limits))
+
+
 def robot_of(cell: Cell) -> Robot:
     """The robot of a cell, with the geometry its controller's config holds now.
 
     Raises:
         FileError: the config, or that of the time of teaching, is absent or does not hold a geometry.
     """
-    configs = config_format(cell.settings)
-    controller, taught = configs.read(cell.config_path), configs.read(cell.taught_path)
+    controller, taught = controller_geometry(cell), config_format(cell.settings).read(cell.taught_path)
     if taught.branch != controller.branch:
         raise FileError(
             "its branch is not that of the controller's config, so it is not of this robot",
@@ -276,11 +307,11 @@ def robot_of_start(
     controller: GeometryDocument,
     branch: Branch,
     taught: GeometryDocument | None,
-    joint_ranges: JointRanges | None = None,
+    limits: ControllerLimits,
 ) -> Robot:
     """The robot of a cell's settings and of what its controller had at the start of a run."""
     parameters = settings.mechanism.parameters
-    commanding = ControllerGeometry(Geometry.of(parameters, controller), branch, joint_ranges)
+    commanding = ControllerGeometry(Geometry.of(parameters, controller), branch, limits)
     return make_robot(
         settings, commanding, taught=None if taught is None else Geometry.of(parameters, taught)
     )

@@ -7,14 +7,15 @@ from numpy.typing import ArrayLike
 
 from hexacell.cell.limits import LimitSettings
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.interface import ControllerGeometry, JointRanges
+from hexacell.controller_config.interface import ControllerGeometry, ControllerLimits
 from hexacell.errors import ReachError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.legs import Legs
-from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.gauge_travel import GaugeTravel
+from hexacell.limits.joint_ranges import ZeroedRanges
 from hexacell.limits.leg_limits import LegLimits
 from hexacell.limits.limits import AxisLimits, Limits
 
@@ -24,10 +25,10 @@ NO_CONE_DEG = 180.0
 def stated_limits(settings: CellSettings, controller: ControllerGeometry, frames: FrameTransform) -> Limits:
     """The limits of a cell; ``frames`` are from the controller's to the convention's.
 
-    Joint ranges that the controller's config states hold as well.
+    Those that the controller's config states hold as well.
     """
     limits = settings.limits
-    lowest, highest = _joint_ranges(limits, controller.joint_ranges)
+    lowest, highest, told = _joint_ranges(settings, controller)
     return Limits(
         limits.gauge_travel_mm,
         float(np.radians(limits.tilt_deg)),
@@ -36,9 +37,10 @@ def stated_limits(settings: CellSettings, controller: ControllerGeometry, frames
         limits.singularity_margin,
         frames,
         float(np.radians(limits.turn_deg)),
-        _axis_limits(limits),
+        _axis_limits(limits, controller.limits),
         _leg_limits(settings, controller),
         gauge_travel_of(settings),
+        told_joints=told,
     )
 
 
@@ -53,18 +55,26 @@ def gauge_travel_of(settings: CellSettings) -> GaugeTravel:
     )
 
 
-def _joint_ranges(limits: LimitSettings, of_controller: JointRanges | None) -> tuple[Array, Array]:
-    """The narrowest of the stated ranges: (6,) lowest and (6,) highest, in their unit."""
+def _joint_ranges(
+    settings: CellSettings, controller: ControllerGeometry
+) -> tuple[Array, Array, ZeroedRanges | None]:
+    """The narrowest of the stated ranges, (6,) lowest and (6,) highest, and what depends on the zeros."""
+    limits, told = settings.limits, controller.limits.joints
     lowest, highest = np.full(6, limits.joint_min), np.full(6, limits.joint_max)
-    for ranges in (limits.joints, of_controller):
-        if ranges is not None:
-            low, high = np.transpose(ranges)
-            lowest, highest = np.maximum(lowest, low), np.minimum(highest, high)
-    return lowest, highest
+    if limits.joints is not None:
+        low, high = np.transpose(limits.joints)
+        lowest, highest = np.maximum(lowest, low), np.minimum(highest, high)
+    if told is None:
+        return lowest, highest, None
+    zeroed = ZeroedRanges(lowest, highest, *np.transpose(told))
+    if not settings.controller.joints_include_zeros:
+        return *zeroed.at(np.zeros(6)), None
+    return *zeroed.at(joint_zeros(settings.mechanism, controller.geometry)), zeroed
 
 
-def _axis_limits(limits: LimitSettings) -> AxisLimits:
-    ranges = [(-np.inf, np.inf) if axis is None else axis for axis in limits.axes.ranges]
+def _axis_limits(limits: LimitSettings, of_controller: ControllerLimits) -> AxisLimits:
+    both = of_controller.narrowed(ControllerLimits(axes=limits.axes.ranges))
+    ranges = [axis or (-np.inf, np.inf) for axis in both.axes or ()]
     lowest, highest = zip(*ranges, strict=True)
     return AxisLimits(lowest, highest)
 

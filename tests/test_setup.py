@@ -223,7 +223,7 @@ NOT_RUN = "LinuxCNC could not be installed: make test-linuxcnc was not run"
 
 
 def ci(newcomer: Newcomer, lint: int = 0, linuxcnc: int | None = None) -> tuple[int, list[str]]:
-    """Status and lines of ``.ci/run``, where lint and the tests at LinuxCNC end as told; none: there is none."""
+    """Status and lines of ``.ci/run``, where lint and the tests at LinuxCNC end as told; or without it."""
     (newcomer.checkout / ".venv/bin/python").write_text(
         '#!/bin/sh\necho "$CI $*"\n'
         f'case "$*" in *ruff*) exit {lint} ;; *tests/linuxcnc*) exit {linuxcnc} ;; esac\n'

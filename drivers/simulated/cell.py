@@ -47,7 +47,14 @@ class SimulatedCell(Closeable):
         self.physics = RobotPhysics(mechanism, simulation, clock, commanding, home, fixture)
         soft_limits = simulation.soft_limits
         self.machine = SimulatedMachine(
-            mechanism, config_format, config, self.physics, clock, home, soft_limits
+            mechanism,
+            config_format,
+            config,
+            self.physics,
+            clock,
+            home,
+            soft_limits,
+            includes_zeros=settings.controller.joints_include_zeros,
         )
         with ExitStack() as served:
             stop_file = _stop_file(settings, served)

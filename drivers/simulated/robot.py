@@ -15,7 +15,7 @@ from hexacell.controller_config.interface import ConfigFormat, ControllerGeometr
 from hexacell.errors import FileError
 from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import continue_solution
-from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.mechanism import Mechanism, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.motion.trajectory import interpolate_line
@@ -41,7 +41,10 @@ class SimulatedMachine:
         clock: CellClock,
         home: Pose,
         soft_limits: SoftLimits | None = None,
+        *,
+        includes_zeros: bool = False,
     ) -> None:
+        self._includes_zeros = includes_zeros
         self._soft_limits = soft_limits or SoftLimits()
         self._mechanism = mechanism
         self._format = config_format
@@ -101,9 +104,12 @@ class SimulatedMachine:
             return self._home if self.fails_forward else self._pose_now().pose(0)
 
     def joints(self) -> tuple[float, ...]:
-        """The commanded slider positions (6,), mm."""
+        """The joints (6,), mm, that the controller tells: as commanded."""
         with self._lock:
-            return tuple(float(value) for value in self._joints(self._pose_now())[0])
+            told = self._joints(self._pose_now())[0]
+            if self._includes_zeros:
+                told = told + joint_zeros(self._mechanism, self._geometry.geometry)
+            return tuple(float(value) for value in told)
 
     def set_failing_forward(self, *, on: bool) -> None:
         """Let the forward kinematics fail, or no more."""

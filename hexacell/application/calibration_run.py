@@ -21,7 +21,7 @@ from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
 from hexacell.controller_config.current import CurrentConfig
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
-from hexacell.robot_model import config_format, robot_of
+from hexacell.robot_model import config_format, controller_geometry, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
 from hexacell.storage.cell_lock import cell_lock
@@ -240,6 +240,7 @@ def run_started(
         taught=None if robot.taught is None else robot.taught.document(),
         accepted=calibration.accepted,
         joint_ranges=robot.limits.joint_ranges,
+        limits=controller_geometry(cell).limits,
         length_check=calibration.length_check,
         removed=calibration.removed,
         expired=cell.settings.expired_on(datetime.now(UTC).date()),

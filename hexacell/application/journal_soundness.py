@@ -18,10 +18,11 @@ import numpy as np
 from hexacell.cell.fields import LARGEST_NUMBER, GeometryDocument, SixNumbers
 from hexacell.cell.measuring import MOST_POINTS, MOST_POSES
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.interface import JointRanges
+from hexacell.controller_config.interface import ControllerLimits, JointRanges
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.pose import AXES
 from procedures.journal.line_format import RESTORE
 from procedures.run import events
 from procedures.run.state import RunState, apply
@@ -150,6 +151,7 @@ class _Event:
             case events.RunStarted() as started:
                 yield from self._geometries(started.controller, started.taught)
                 yield from _joint_range_problems(started.joint_ranges)
+                yield from _limit_problems(started.limits)
                 if started.accepted is not None:
                     yield from self._covariance(started.accepted.covariance)
                     yield from _out_of_range(started.accepted.model_dump(exclude={"at"}), LARGEST_VARIANCE)
@@ -230,6 +232,16 @@ def _joint_range_problems(ranges: JointRanges | None) -> Iterator[str]:
     if len(ranges) != LEGS:
         yield "there are six joint ranges"
     yield from _out_of_range(ranges, LARGEST_NUMBER)
+
+
+def _limit_problems(limits: ControllerLimits | None) -> Iterator[str]:
+    if limits is None:
+        return
+    yield from _joint_range_problems(limits.joints)
+    if limits.axes is not None:
+        if len(limits.axes) != len(AXES):
+            yield "there are six axes"
+        yield from _out_of_range([one for one in limits.axes if one is not None], LARGEST_NUMBER)
 
 
 def _noise_problems(measured: events.NoiseMeasured) -> Iterator[str]:

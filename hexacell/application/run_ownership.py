@@ -22,7 +22,7 @@ from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.limits.limits import SAME_FRAMES
-from hexacell.robot_model import Robot, config_format
+from hexacell.robot_model import Robot, controller_geometry
 from hexacell.runs.run_folder import RunFolder
 from hexacell.stated_limits import stated_limits
 from hexacell.storage import atomic_files
@@ -81,13 +81,13 @@ def _require_own_geometry(
                 "the config of before the run is not in it", subject=folder.path, action=RESTORE
             )
         return
-    found = config_format(cell.settings).read(path)
+    found = controller_geometry(cell, path)
     stated = Geometry.of(cell.settings.mechanism.parameters, started.controller)
     if not _is_same(found, stated, started):
         raise _differs(folder, f"another geometry than {path}")
     own = stated_limits(cell.settings, found, SAME_FRAMES).joint_ranges
-    if started.joint_ranges != own:
-        raise _differs(folder, f"other joint ranges than the cell file and {path}")
+    if started.joint_ranges != own or started.limits != found.limits:
+        raise _differs(folder, f"other limits than the cell file, {path} and [limits] ini, if one is named")
 
 
 def _differs(folder: RunFolder, what: str) -> FileError:
@@ -117,7 +117,7 @@ def _require_own_poses(cell: Cell, folder: RunFolder, state: RunState, started: 
     reached = np.zeros(len(poses), dtype=bool)
     for geometry in _commanding(robot, state):
         joints = robot.mechanism.inverse(geometry, robot.branch, batch)
-        reached |= robot.limits.allow_joints(joints)
+        reached |= robot.limits_with(geometry).allow_joints(joints)
     allowed = reached & robot.limits.allow_commands(robot.frames.poses(batch))
     if not allowed.all():
         wrong = poses[int(np.flatnonzero(~allowed)[0])]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hexacell.cell.model import CellSettings
+from hexacell.controller_config.interface import ControllerLimits
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot_model import Robot, robot_of_start
 from procedures.run.events import RunStarted
@@ -10,9 +11,8 @@ from procedures.run.events import RunStarted
 
 def started_robot(settings: CellSettings, started: RunStarted) -> Robot:
     """From a cell's settings, which may be newer, and what its controller had then."""
-    return robot_of_start(
-        settings, started.controller, started.branch, started.taught, started.joint_ranges
-    )
+    limits = started.limits or ControllerLimits(joints=started.joint_ranges)
+    return robot_of_start(settings, started.controller, started.branch, started.taught, limits)
 
 
 def geometry_before(settings: CellSettings, started: RunStarted) -> Geometry:

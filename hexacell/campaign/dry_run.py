@@ -117,7 +117,7 @@ class VirtualCampaign:
             return
         if plan.allows_provisional(self.state):
             geometry = plan.estimate(self.state).belief.estimate
-            robot = replace(plan.robot, provisional=(geometry,), uses_provisional=True)
+            robot = plan.robot.with_provisional(geometry)
             self.virtual_robot.load(robot)
             self.plan = replace(plan, robot=robot)
 

@@ -212,6 +212,11 @@ class ControllerSettings(Section):
     unit_mm: Positive = Field(
         1.0, description="one unit of the positions that it tells; of an inch machine 25.4"
     )
+    joints_include_zeros: bool = Field(
+        False,
+        description="the joints that it tells, and their limits in its config, include the zeros of its "
+        "geometry: whole leg lengths, as LinuxCNC's genhexkins has them",
+    )
     position_tolerance_mm: Positive = Field(0.01, description="arrival: largest position difference")
     angle_tolerance_deg: Positive = Field(0.01, description="arrival: largest angle difference")
     move_timeout_s: Positive | None = Field(

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from hexacell.cell.fields import InRange, NotNegative, PointInRange, Positive, Section, broken_rule
+from hexacell.cell.fields import InRange, NotNegative, PointInRange, Positive, Section, Text, broken_rule
 
 SHORTEST_AXIS = 1e-6
 
@@ -96,6 +96,12 @@ class LimitSettings(Section):
         "hold as well",
     )
     axes: AxisLimitSettings = AxisLimitSettings()
+    ini: Text | None = Field(
+        None,
+        min_length=1,
+        description="LinuxCNC's INI file, relative to the cell file: its limits of axes and joints hold as "
+        "well",
+    )
     passive_joints: PassiveJointSettings = PassiveJointSettings()
     leg_distance_mm: NotNegative = Field(
         0.0, description="smallest distance of two legs, from middle line to middle line; 0: any"

@@ -2,29 +2,58 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+from hexacell.cell.fields import Frozen
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 
 LARGEST_CONFIG_BYTES = 1_000_000
 """Of a file, which usually has a few thousand."""
 
-JointRanges = tuple[tuple[float, float], ...]
+Range = tuple[float, float]
+JointRanges = tuple[Range, ...]
+AxisRanges = tuple[Range | None, ...]
+
+
+class ControllerLimits(Frozen):
+    """What a controller may be commanded to, by its own configuration.
+
+    Attributes:
+        joints: smallest and largest joint of each leg as the controller tells it; none: any.
+        axes: smallest and largest command of x, y, z, mm, and of a, b, c, deg; none: any.
+    """
+
+    joints: JointRanges | None = None
+    axes: AxisRanges | None = None
+
+    def narrowed(self, other: ControllerLimits) -> ControllerLimits:
+        """What both allow."""
+        joints, axes = self.joints or other.joints, self.axes or other.axes
+        if self.joints and other.joints:
+            joints = tuple(map(_both, self.joints, other.joints))
+        if self.axes and other.axes:
+            pairs = zip(self.axes, other.axes, strict=True)
+            axes = tuple(_both(one, two) if one and two else one or two for one, two in pairs)
+        return ControllerLimits(joints=joints, axes=axes)
+
+
+def _both(one: Range, other: Range) -> Range:
+    return max(one[0], other[0]), min(one[1], other[1])
 
 
 @dataclass(frozen=True, slots=True)
 class ControllerGeometry:
     """The geometry that a controller uses, as its config states it, and the branch of the robot if any.
 
-    ``joint_ranges`` are the smallest and largest joint variable of each leg, mm, where the config has them.
+    ``limits`` are those that the config has, if any.
     """
 
     geometry: Geometry
     branch: Branch
-    joint_ranges: JointRanges | None = None
+    limits: ControllerLimits = field(default=ControllerLimits())
 
 
 class ConfigFormat(Protocol):

@@ -23,9 +23,10 @@ from typing import Any, Protocol, Self, TypeVar, cast
 from pydantic import Field, ValidationError
 
 from hexacell.cell.fields import Positive, Section, Text, first_mistake
-from hexacell.controller_config.interface import LARGEST_CONFIG_BYTES, ControllerGeometry, JointRanges
+from hexacell.controller_config.interface import LARGEST_CONFIG_BYTES, ControllerGeometry, ControllerLimits
 from hexacell.controller_config.number_tokens import (
     NumberToken,
+    number_of,
     replace_tokens,
     require_physical,
     token_error,
@@ -54,8 +55,7 @@ class NumberLookup(Protocol):
 
 OpenText = Callable[[str, Path | None], NumberLookup]
 DefaultKey = Callable[[GeometricParameter], str]
-RangeKeys = tuple[tuple[str, str], ...]
-"""Keys of the smallest and largest joint variable of each leg."""
+ReadLimits = Callable[[NumberLookup, Path], ControllerLimits]
 
 
 class KeyedOptions(Section):
@@ -176,9 +176,9 @@ class KeyedConfig:
         keys: NumberKeys,
         open_text: OpenText,
         unit_mm: float,
-        range_keys: RangeKeys = (),
+        read_limits: ReadLimits = lambda _, __: ControllerLimits(),
     ) -> None:
-        self._range_keys = range_keys
+        self._read_limits = read_limits
         self._parameters = parameters
         self._keys = keys
         self._open = open_text
@@ -189,8 +189,8 @@ class KeyedConfig:
         text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
         lookup = self._open(text, path)
         values = [self._value(lookup, one, path) for one in self._parameters.parameters]
-        ranges = joint_ranges(lookup, self._range_keys, self._unit_mm, path)
-        return ControllerGeometry(Geometry(self._parameters, values), self._branch(lookup, path), ranges)
+        geometry, branch = Geometry(self._parameters, values), self._branch(lookup, path)
+        return ControllerGeometry(geometry, branch, self._read_limits(lookup, path))
 
     def rewrite(self, text: str, geometry: Geometry) -> str:
         """``text`` with ``geometry`` in it, to 1 nm; a number that agrees to half of that is kept.
@@ -210,7 +210,7 @@ class KeyedConfig:
             if abs(difference) > 0.5 * _resolution(parameter):
                 token = lookup.number(self._written_key(parameter))
                 unit = self._unit(parameter)
-                value = _number(token, None) + difference / unit
+                value = number_of(token, None) + difference / unit
                 yield token, write_number(value, parameter.kind.unit.decimals + _more_decimals(unit))
 
     def _require_kept(self, lookup: NumberLookup, geometry: Geometry) -> None:
@@ -224,7 +224,7 @@ class KeyedConfig:
     def _value(self, lookup: NumberLookup, parameter: GeometricParameter, source: Path | None) -> float:
         keys = (self._keys.values[parameter.name], self._keys.corrections.get(parameter.name))
         tokens = [lookup.number(key) for key in keys if key is not None]
-        value = self._unit(parameter) * sum(_number(token, source) for token in tokens)
+        value = self._unit(parameter) * sum(number_of(token, source) for token in tokens)
         if parameter.kind.is_positive and value <= 0.0:
             problem = f"{parameter.name} is {value:g}, but must be above zero"
             raise token_error(tokens[-1], problem, source, "Correct it")
@@ -243,34 +243,9 @@ class KeyedConfig:
         if isinstance(key, int):
             return key
         token = lookup.number(key)
-        if (value := _number(token, source)) not in {1.0, -1.0}:
+        if (value := number_of(token, source)) not in {1.0, -1.0}:
             raise token_error(token, f"{key} is {token.text}", source, "It must be 1 or -1")
         return int(value)
-
-
-def joint_ranges(lookup: NumberLookup, keys: RangeKeys, unit_mm: float, source: Path) -> JointRanges | None:
-    """Smallest and largest joint variable of each leg, mm; none where the config has not all of them.
-
-    Raises:
-        FileError: a smallest one is not below the largest.
-    """
-    if not keys or not all(lookup.has(key) for pair in keys for key in pair):
-        return None
-    found = []
-    for low_key, high_key in keys:
-        low, high = lookup.number(low_key), lookup.number(high_key)
-        if _number(low, source) >= _number(high, source):
-            problem = f"{high_key} is not above {low_key}, {low.text}"
-            raise token_error(high, problem, source, "Correct one of them")
-        found.append((unit_mm * low.value, unit_mm * high.value))
-    return tuple(found)
-
-
-def _number(token: NumberToken, source: Path | None) -> float:
-    try:
-        return token.value
-    except ValueError as error:
-        raise token_error(token, str(error), source, "Write a plain number there") from error
 
 
 def _resolution(parameter: GeometricParameter) -> float:

@@ -77,3 +77,11 @@ def require_physical(geometry: Geometry) -> None:
 def token_error(token: NumberToken, problem: str, source: Path | None, action: str) -> FileError:
     """What is wrong with a number, with its line."""
     return FileError(problem, subject=source, line=token.line, action=action)
+
+
+def number_of(token: NumberToken, source: Path | None) -> float:
+    """Its value; raises ``FileError`` with its line if it is no number."""
+    try:
+        return token.value
+    except ValueError as error:
+        raise token_error(token, str(error), source, "Write a plain number there") from error

@@ -25,7 +25,12 @@ from typing import Any, cast
 import numpy as np
 
 from hexacell.cell.fields import LARGEST_NUMBER
-from hexacell.controller_config.interface import LARGEST_CONFIG_BYTES, ControllerGeometry, JointRanges
+from hexacell.controller_config.interface import (
+    LARGEST_CONFIG_BYTES,
+    ControllerGeometry,
+    ControllerLimits,
+    JointRanges,
+)
 from hexacell.controller_config.number_tokens import require_physical, write_number
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
@@ -56,7 +61,8 @@ class NativeToml:
         """The geometry and the branch in the file; raises ``FileError`` with file and line."""
         text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
         content = _Content(TomlDocument.parse(text, path), self._parameters)
-        return ControllerGeometry(content.geometry(), content.branch(), content.joint_ranges())
+        limits = ControllerLimits(joints=content.joint_ranges())
+        return ControllerGeometry(content.geometry(), content.branch(), limits)
 
     def rewrite(self, text: str, geometry: Geometry) -> str:
         """``text`` with ``geometry`` in it, with as many decimals as the unit has (1 nm), no exponent.

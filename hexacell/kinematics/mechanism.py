@@ -253,6 +253,16 @@ class Mechanism(Protocol):
         ...
 
 
+def joint_zeros(mechanism: Mechanism, geometry: Geometry) -> Array:
+    """Where a geometry has the encoders' zeros (6,), in the unit of the joint variables.
+
+    A joint variable and the zero together are what does not depend on the encoder: the whole length of a
+    Gough-Stewart platform's leg, the place of a slider in the base frame.
+    """
+    zeros: Array = mechanism.encoder_zeros(geometry).T @ geometry.vector
+    return zeros
+
+
 def inverse_kinematics(mechanism: Mechanism, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
     """Joint variables (n, 6), in their unit, of n poses.
 

@@ -11,6 +11,7 @@ from hexacell.kinematics.mechanism import FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.limits.gauge_travel import GaugeRoom, GaugeTravel
+from hexacell.limits.joint_ranges import ZeroedRanges
 from hexacell.limits.leg_limits import ROUNDING, LegLimits
 
 SAME_FRAMES = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
@@ -51,6 +52,7 @@ class Limits:
         legs: what passive joints and legs allow; none where that is not known.
         gauges: travels and plungers; without them the ball may go as far to all sides.
         zeroed: the room of the gauges as they were zeroed; none where that is not known yet.
+        told_joints: what joint_min and joint_max follow from, where they depend on the encoders' zeros.
     """
 
     gauge_travel_mm: float
@@ -64,6 +66,14 @@ class Limits:
     legs: LegLimits | None = None
     gauges: GaugeTravel | None = None
     zeroed: GaugeRoom | None = None
+    told_joints: ZeroedRanges | None = None
+
+    def with_zeros(self, zeros: Array) -> Limits:
+        """The same where the controller's geometry has these zeros (6,) of the encoders."""
+        if self.told_joints is None:
+            return self
+        lowest, highest = self.told_joints.at(zeros)
+        return replace(self, joint_min=lowest, joint_max=highest)
 
     @property
     def room(self) -> GaugeRoom:

@@ -327,11 +327,8 @@ class Calibration:
         if state.provisional is None:
             return self._at_start
         if state.provisional_active not in self._with_provisional:
-            robot = replace(
-                self.robot,
-                provisional=(geometry_of(state.provisional, self.robot),),
-                uses_provisional=state.provisional_active,
-            )
+            geometry = geometry_of(state.provisional, self.robot)
+            robot = self.robot.with_provisional(geometry, is_used=state.provisional_active)
             plan = self._calibrating(robot)
             self._with_provisional[state.provisional_active] = Measuring(plan)
         return self._with_provisional[state.provisional_active]

@@ -14,6 +14,7 @@ from drivers.interfaces import EncoderSample
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
 from hexacell.controller_config.current import CurrentConfig
+from hexacell.kinematics.mechanism import joint_zeros
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.position_agreement import (
     AgreementTolerances,
@@ -22,6 +23,7 @@ from hexacell.kinematics.position_agreement import (
     PositionSource,
     position_mismatch,
 )
+from hexacell.kinematics.rotations import Array
 from procedures.devices.device_set import Devices
 from procedures.guards.polling import POLL_PAUSE_S
 from procedures.run.trips import Guard, Trip
@@ -81,8 +83,14 @@ class PositionCheck:
         reported = await self.devices.controller.position()
         if reported is None:
             return None
-        joints = None if reported.joints is None else np.array(reported.joints)
+        joints = None if reported.joints is None else np.array(reported.joints) - self._zeros_told()
         return PositionReports(reported.pose, joints, np.array(encoders.positions))
+
+    def _zeros_told(self) -> Array:
+        """What the joints that the controller tells are more than the joint variables (6,)."""
+        if not self.settings.controller.joints_include_zeros:
+            return np.zeros(6)
+        return joint_zeros(self.settings.mechanism, self.config.geometry().geometry)
 
     def _mismatch(self, reports: PositionReports) -> PositionMismatch | None:
         commanding = self.config.geometry()

@@ -16,7 +16,7 @@ from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.robot_model import Robot, robot_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-NAMES = ["gough-stewart", "linapod", "rotary-cranks"]
+NAMES = ["gough-stewart", "linapod", "rotary-cranks", "linuxcnc-hexapod/cell"]
 NOT_THEIRS = re.compile(r"\b(slider|rail|hexaglide)", re.IGNORECASE)
 
 

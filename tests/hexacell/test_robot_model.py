@@ -105,6 +105,42 @@ def test_limits_are_in_millimetres_and_radians(robot):
     assert robot.limits.singularity_margin == 0.03
 
 
+@pytest.fixture
+def beside_linuxcnc(copied):
+    """The same cell, whose [limits] name an INI file with other limits of axes and joints."""
+    (copied.path.parent / "machine.ini").write_text(
+        "\n".join(
+            ["[AXIS_A]", "MIN_LIMIT = -45", "MAX_LIMIT = 40"]
+            + [f"[JOINT_{n}]\nMIN_LIMIT = -900\nMAX_LIMIT = {100 + n}" for n in range(6)]
+        )
+    )
+    (copied.path.parent / "robot-taught.toml").write_bytes(copied.config_path.read_bytes())
+    limits = copied.settings.limits.model_copy(update={"ini": "machine.ini"})
+    return replace(copied, settings=copied.settings.model_copy(update={"limits": limits}))
+
+
+def test_limits_of_the_ini_file_hold_as_well(robot, beside_linuxcnc):
+    found = robot_of(beside_linuxcnc).limits
+    assert (found.axes.lowest[3], found.axes.highest[3]) == (-45.0, 40.0)
+    expected = [(low, min(high, 100.0 + n)) for n, (low, high) in enumerate(robot.limits.joint_ranges)]
+    assert found.joint_ranges == tuple(expected)
+
+
+def test_ranges_of_joints_that_include_zeros_follow_the_zeros(beside_linuxcnc, paper):
+    settings = beside_linuxcnc.settings
+    controller = settings.controller.model_copy(update={"joints_include_zeros": True})
+    cell = replace(beside_linuxcnc, settings=settings.model_copy(update={"controller": controller}))
+    robot = robot_of(cell)
+    shifted = robot.mechanism.change_frames(
+        robot.controller, FrameTransform(np.eye(3), np.array([30.0, 0.0, 0.0]), np.eye(3))
+    )
+    assert robot.limits.joint_ranges[5][1] == pytest.approx(105.0 - robot.controller["S"][5, 0])
+    assert robot.with_controller(shifted).limits.joint_ranges[5][1] == pytest.approx(135.0)
+    lent = robot.with_provisional(robot.mechanism.normalize_frames(paper.actual)[0])
+    written = robot.for_controller(lent.provisional[0])
+    assert lent.limits.joint_ranges[5][1] == pytest.approx(105.0 - written["S"][5, 0])
+
+
 @given(poses)
 def test_a_command_brings_the_controllers_own_robot_to_the_pose(on_floor, hexaglide, paper, pose):
     command = PoseBatch.of([on_floor.to_command(pose)])

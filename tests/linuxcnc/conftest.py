@@ -1,4 +1,4 @@
-"""A real LinuxCNC without a screen, of the configuration in ``configs/linuxcnc-hexaglide``.
+"""A real LinuxCNC without a screen, of the configurations in ``configs/linuxcnc-...``.
 
 Only one can run on a machine: a second one would end the first.
 """
@@ -21,7 +21,8 @@ import pytest
 from tests.linuxcnc.server_client import ServerClient
 from tests.waiting import wait_until
 
-CONFIGURATION = Path(__file__).parents[2] / "configs" / "linuxcnc-hexaglide"
+CONFIGURATIONS = Path(__file__).parents[2] / "configs"
+LOCK = Path("/tmp/linuxcnc.lock")
 ENDED_S, ANSWER_S = 20.0, 30.0
 NOBODY = "65534"
 
@@ -34,10 +35,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 class LinuxCNC:
-    """One in a folder of its own, started and ended as often as a test likes."""
+    """One in a folder of its own, started and ended as often as a test likes.
 
-    def __init__(self, folder: Path, port: int) -> None:
+    Attributes:
+        folder: of the configuration.
+        ini: its INI file.
+        port: where its server listens.
+    """
+
+    def __init__(self, folder: Path, ini: str, port: int) -> None:
         self.folder = folder
+        self.ini = folder / ini
         self.port = port
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -50,9 +58,9 @@ class LinuxCNC:
 
     def start(self) -> None:
         """Start it and wait until its server answers."""
-        with (self.folder / "linuxcnc.log").open("ab") as log:
+        with (self.folder / "started.log").open("ab") as log:
             self._process = subprocess.Popen(
-                ["linuxcnc", "-r", "hexaglide.ini"],
+                ["linuxcnc", "-r", self.ini.name],
                 cwd=self.folder,
                 env=self.environment,
                 stdin=subprocess.DEVNULL,
@@ -67,6 +75,7 @@ class LinuxCNC:
         with suppress(OSError), self.connect() as client:
             client.send("shutdown")
         self._wait()
+        wait_until(lambda: not LOCK.exists())  # hexacell may have started it again
 
     def kill(self) -> None:
         """Its task and its server at once, as in a crash."""
@@ -74,22 +83,36 @@ class LinuxCNC:
             subprocess.run(["pkill", "-KILL", "-x", name], check=False)
         self._wait()
 
-    def signal_server(self, name: str) -> None:
-        """Send a signal to linuxcncrsh alone: ``STOP`` freezes it, ``CONT`` lets it go on."""
-        subprocess.run(["pkill", f"-{name}", "-x", "linuxcncrsh"], check=True)
+    def signal(self, name: str, program: str) -> None:
+        """Send a signal to one of its programs: ``STOP`` freezes it, ``CONT`` lets it go on."""
+        subprocess.run(["pkill", f"-{name}", "-x", program], check=True)
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it was started, and not killed or shut down since."""
+        return self._process is not None
 
     @property
     def log(self) -> str:
         """All that it printed."""
-        return (self.folder / "linuxcnc.log").read_text(errors="replace")
+        return (self.folder / "started.log").read_text(errors="replace")
 
     def connect(self) -> ServerClient:
         """A connection that may command."""
-        return ServerClient(socket.create_connection(("127.0.0.1", self.port), timeout=ANSWER_S))
+        connection = socket.create_connection(("127.0.0.1", self.port), timeout=ANSWER_S)
+        try:
+            return ServerClient(connection)
+        except BaseException:
+            connection.close()
+            raise
 
     def pin(self, name: str) -> str:
         """What a pin has, with the seven digits that LinuxCNC tells."""
         return self._run("halcmd", "getp", name).stdout.strip()
+
+    def set_pin(self, name: str, value: str) -> None:
+        """Set a pin that nothing else drives."""
+        self._run("halcmd", "setp", name, value)
 
     def hexacell(self, *arguments: str, timeout_s: float = 900.0) -> subprocess.CompletedProcess[str]:
         """Run the program in the folder of the configuration."""
@@ -129,20 +152,31 @@ class LinuxCNC:
 
 @pytest.fixture(scope="session")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """The kinematics of the configuration, for the LinuxCNC of this machine."""
+    """The kinematics of the Hexaglide, for the LinuxCNC of this machine."""
     if shutil.which("linuxcnc") is None or shutil.which("halcompile") is None:
         pytest.skip("there is no LinuxCNC here; docs/linuxcnc.md says how to install it")
-    source = shutil.copy(CONFIGURATION / "hexaglidekins.comp", tmp_path_factory.mktemp("kinematics"))
+    component = CONFIGURATIONS / "linuxcnc-hexaglide" / "hexaglidekins.comp"
+    source = shutil.copy(component, tmp_path_factory.mktemp("kinematics"))
     subprocess.run(["halcompile", "--install", Path(source).name], cwd=Path(source).parent, check=True)
 
 
 @pytest.fixture
 def linuxcnc(installed: None, tmp_path: Path) -> Iterator[LinuxCNC]:
-    """A copy of the configuration; it is running."""
-    folder = tmp_path / "linuxcnc-hexaglide"
-    shutil.copytree(CONFIGURATION, folder)
+    """A copy of the Hexaglide's configuration; it is running."""
+    yield from _running("hexaglide", tmp_path)
+
+
+@pytest.fixture
+def hexapod(installed: None, tmp_path: Path) -> Iterator[LinuxCNC]:
+    """A copy of the stock hexapod's configuration; it is running."""
+    yield from _running("hexapod", tmp_path)
+
+
+def _running(machine: str, tmp_path: Path) -> Iterator[LinuxCNC]:
+    folder = tmp_path / f"linuxcnc-{machine}"
+    shutil.copytree(CONFIGURATIONS / folder.name, folder)
     port = _free_port()
-    for name, pattern in (("hexaglide.ini", r"--port \d+"), ("cell.toml", r"port = \d+")):
+    for name, pattern in ((f"{machine}.ini", r"--port \d+"), ("cell.toml", r"port = \d+")):
         text = (folder / name).read_text()
         words = re.search(pattern, text)
         assert words is not None
@@ -152,10 +186,10 @@ def linuxcnc(installed: None, tmp_path: Path) -> Iterator[LinuxCNC]:
     for parent in tmp_path.parents:
         with suppress(PermissionError):
             parent.chmod(parent.stat().st_mode | 0o011)
-    machine = LinuxCNC(folder, port)
-    machine.start()
-    yield machine
-    machine.shut_down()
+    running = LinuxCNC(folder, f"{machine}.ini", port)
+    running.start()
+    yield running
+    running.shut_down()
 
 
 def _free_port() -> int:

@@ -1,69 +1,169 @@
-"""The whole job at the real LinuxCNC; gauges and encoders follow its joints, under a hidden geometry."""
+"""The whole job at the real LinuxCNC; gauges and encoders follow its motors, under a hidden geometry."""
 
 from __future__ import annotations
 
 import json
 import subprocess
+from collections.abc import Callable
 
 import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.robot_model import config_format
+from tests.linuxcnc.conftest import LinuxCNC
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.timeout(1200)
 
 RUN = ("run", "cell.toml", "--mode", "optimise", "--unattended", "--json")
+STOPPED = 3
+"""The exit status of a run that a device ended."""
+
+Fault = Callable[[LinuxCNC], None]
 
 
-def pins(linuxcnc) -> list[float]:
-    """The geometry that runs."""
-    names = [f"{part}.{leg}.{axis}" for part in "sb" for leg in range(6) for axis in "xyz"]
-    names += [f"l.{leg}" for leg in range(6)]
-    return [float(linuxcnc.pin(f"hexaglidekins.{name}")) for name in names]
+@pytest.fixture(params=["linuxcnc", "hexapod"])
+def machine(request: pytest.FixtureRequest) -> LinuxCNC:
+    """Both, one after the other; they are running."""
+    found: LinuxCNC = request.getfixturevalue(request.param)
+    return found
 
 
-def written(linuxcnc) -> list[float]:
-    """The geometry of the config."""
-    cell = load_cell(linuxcnc.folder / "cell.toml")
-    vector: list[float] = config_format(cell.settings).read(cell.config_path).geometry.vector.tolist()
-    return vector
+def kill(machine: LinuxCNC) -> None:
+    """As in a crash."""
+    machine.kill()
 
 
-def test_a_calibration_passes_and_its_geometry_runs(linuxcnc) -> None:
+def freeze_server(machine: LinuxCNC) -> None:
+    """It answers no more; the motion goes on."""
+    machine.signal("STOP", "linuxcncrsh")
+
+
+def freeze_task(machine: LinuxCNC) -> None:
+    """What is behind the server does nothing any more."""
+    machine.signal("STOP", "milltask")
+
+
+def press_emergency_stop(machine: LinuxCNC) -> None:
+    """As another client does."""
+    with machine.connect() as client:
+        client.send("set estop on")
+
+
+def fault_joint(machine: LinuxCNC) -> None:
+    """Its drive says so."""
+    machine.set_pin("joint.2.amp-fault-in", "1")
+
+
+def go_on(machine: LinuxCNC) -> None:
+    """What a person does at LinuxCNC after any of these."""
+    if not machine.is_running:
+        machine.start()
+        return
+    for name in ("linuxcncrsh", "milltask"):
+        machine.signal("CONT", name)
+    machine.set_pin("joint.2.amp-fault-in", "0")
+    with machine.connect() as client:
+        client.send("set estop off")
+
+
+def test_a_hexaglide_is_calibrated_and_its_geometry_runs(linuxcnc: LinuxCNC) -> None:
     before = written(linuxcnc)
-    done = linuxcnc.hexacell(*RUN)
-    result = json.loads(done.stdout)
-    assert (done.returncode, result["verdict"]) == (0, "pass"), done.stderr
+    require_passed(linuxcnc.hexacell(*RUN))
     after = written(linuxcnc)
     assert after != before
-    assert pins(linuxcnc) == pytest.approx(after, rel=1e-6)
+    assert pins_of_hexaglide(linuxcnc) == pytest.approx(after, rel=1e-6)
+    shown = linuxcnc.hexacell("rollback", "cell.toml", "--json")
+    assert shown.returncode == 0, shown.stderr
+    assert written(linuxcnc) == before
 
 
-def test_a_calibration_goes_on_where_linuxcnc_was_killed(linuxcnc) -> None:
-    running = subprocess.Popen(
+def test_a_stock_hexapod_is_calibrated_through_a_crash_of_linuxcnc(hexapod: LinuxCNC) -> None:
+    before = written(hexapod)
+    require_stopped_and_resumed(hexapod, kill)
+    after = written(hexapod)
+    assert after != before
+    assert pins_of_hexapod(hexapod) == pytest.approx(after[:36], rel=1e-6)
+    with hexapod.connect() as client:
+        lengths = client.get("joint_pos")
+    motors = [float(hexapod.pin(f"joint.{leg}.motor-pos-fb")) for leg in range(6)]
+    zeros = [length - motor for length, motor in zip(lengths, motors, strict=True)]
+    assert zeros == pytest.approx(after[36:], abs=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", [kill, freeze_server, freeze_task, press_emergency_stop, fault_joint])
+def test_a_run_stops_at_a_fault_and_ends_the_same_once_resumed(machine: LinuxCNC, fault: Fault) -> None:
+    shorten(machine)
+    require_stopped_and_resumed(machine, fault)
+
+
+def require_stopped_and_resumed(machine: LinuxCNC, fault: Fault) -> None:
+    """A fault in the middle of a run ends it; nothing moves until it is resumed, and then it passes."""
+    with subprocess.Popen(
         ["hexacell", *RUN],
-        cwd=linuxcnc.folder,
-        env=linuxcnc.environment,
+        cwd=machine.folder,
+        env=machine.environment,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-    )
-    wait_until(lambda: sampled(linuxcnc) >= 14 or running.poll() is not None)
-    linuxcnc.kill()
-    said = running.communicate()
-    assert running.returncode == 3, said
-    linuxcnc.start()
-    done = linuxcnc.hexacell(*RUN, "--resume")
-    assert (done.returncode, json.loads(done.stdout)["verdict"]) == (0, "pass"), done.stderr
-    assert pins(linuxcnc) == pytest.approx(written(linuxcnc), rel=1e-6)
+    ) as running:
+        wait_until(lambda: sampled(machine) >= 14 or running.poll() is not None)
+        fault(machine)
+        said = running.communicate()
+    assert running.returncode == STOPPED, said
+    at_the_fault = sampled(machine)
+    go_on(machine)
+    assert sampled(machine) == at_the_fault
+    require_passed(machine.hexacell(*RUN, "--resume"))
 
 
-def sampled(linuxcnc) -> int:
+def require_passed(done: subprocess.CompletedProcess[str]) -> None:
+    """Verdict pass: the error at the task poses with its uncertainty is within the limit."""
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["verdict"] == "pass"
+
+
+def shorten(machine: LinuxCNC) -> None:
+    """Fewer orientations, and a limit that they reach."""
+    cell = machine.folder / "cell.toml"
+    text = cell.read_text()
+    for old, new in (
+        ("orientations = 11", "orientations = 7"),
+        ("orientations = 6", "orientations = 3"),
+        ("position_mm = 0.25", "position_mm = 0.5"),
+        ("orientation_deg = 0.08", "orientation_deg = 0.2"),
+    ):
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    cell.write_text(text)
+
+
+def pins_of_hexaglide(machine: LinuxCNC) -> list[float]:
+    """The geometry that runs."""
+    names = [f"{part}.{leg}.{axis}" for part in "sb" for leg in range(6) for axis in "xyz"]
+    names += [f"l.{leg}" for leg in range(6)]
+    return [float(machine.pin(f"hexaglidekins.{name}")) for name in names]
+
+
+def pins_of_hexapod(machine: LinuxCNC) -> list[float]:
+    """The same of a hexapod, but for its zeros."""
+    names = [f"{part}.{leg}.{axis}" for part in ("base", "platform") for leg in range(6) for axis in "xyz"]
+    return [float(machine.pin(f"genhexkins.{name}")) for name in names]
+
+
+def written(machine: LinuxCNC) -> list[float]:
+    """The geometry of the config."""
+    cell = load_cell(machine.folder / "cell.toml")
+    vector: list[float] = config_format(cell.settings).read(cell.config_path).geometry.vector.tolist()
+    return vector
+
+
+def sampled(machine: LinuxCNC) -> int:
     """Records so far."""
     return sum(
         json.loads(line)["event"]["kind"] == "sampled"
-        for path in linuxcnc.folder.glob("runs/*/*/journal.jsonl")
+        for path in machine.folder.glob("runs/*/*/journal.jsonl")
         for line in path.read_text().split("\n")[:-1]
     )

@@ -114,13 +114,13 @@ async def test_a_frozen_server_is_told_and_it_goes_on_when_it_answers_again(linu
     moving = asyncio.create_task(driver.move(THERE, 5.0))
     while (await driver.status()).heartbeat == standing:
         pass
-    linuxcnc.signal_server("STOP")
+    linuxcnc.signal("STOP", "linuxcncrsh")
     try:
         with pytest.raises(DeviceError, match="Press the emergency stop") as caught:
             await driver.stop()
         assert "could not be stopped" in caught.value.problem
     finally:
-        linuxcnc.signal_server("CONT")
+        linuxcnc.signal("CONT", "linuxcncrsh")
     await asyncio.wait([moving])  # LinuxCNC itself was not frozen: it may have arrived
     await driver.prepare(ALL)
     await driver.move(Pose(0.0, 0.0, 550.0), MOVE_S)

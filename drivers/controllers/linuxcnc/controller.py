@@ -210,7 +210,9 @@ class LinuxcncrshController:
             await self._start_up(commands, action, stops)
         self._session.machine_is_enabled()
         if self._joints_before_reload is not None:
-            self._require_unmoved(self._joints_before_reload, await commands.joints())
+            # With other zeros it tells other joints where it stands: encoders then show whether it moved.
+            if not self._settings.joints_include_zeros:
+                self._require_unmoved(self._joints_before_reload, await commands.joints())
             self._joints_before_reload = None
         await startup.enter_mdi_mode(commands, self._timeouts)
 

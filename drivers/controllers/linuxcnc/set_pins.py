@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from hexacell.controller_config.hal_pins import SETP
-from hexacell.controller_config.linuxcnc_ini import IniText
+from hexacell.controller_config.ini_text import IniText
 from hexacell.errors import HexacellError, UsageError
 from hexacell.storage.atomic_files import read_text
 

@@ -9,6 +9,7 @@ from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
+from hexacell.controller_config.interface import ControllerLimits
 from hexacell.kinematics.mechanism import Branch
 from hexacell.reporting.result import AcceptedResult
 from procedures.run.steps import Step
@@ -23,6 +24,7 @@ class RunStarted(Frozen):
     quick level or a length check starts from, if there is one. ``length_check`` is whether a calibration
     has one.
     ``joint_ranges`` are those of cell file and config together, mm; none in runs of older versions.
+    ``limits`` are what the controller's config and its INI file state; none in runs of older versions, too.
     ``removed`` is what a person took out of the plan: it is neither measured nor commanded.
     ``expired`` are the instruments whose certificate had expired on the day it began.
     """
@@ -42,6 +44,7 @@ class RunStarted(Frozen):
     accepted: AcceptedResult | None = None
     length_check: bool = False
     joint_ranges: tuple[tuple[float, float], ...] | None = None
+    limits: ControllerLimits | None = None
     removed: RemovedPoses = RemovedPoses()
     expired: tuple[str, ...] = ()
 

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from hexacell.application.replay_run import replay
+from hexacell.controller_config.interface import ControllerLimits
 from hexacell.errors import FileError, HexacellError
 from procedures.journal.journal import Journal
 from procedures.run import events
@@ -48,11 +49,19 @@ FORGERIES: dict[str, tuple[Callable[[History], None], str]] = {
     ),
     "wider joint ranges": (
         lambda h: changed(h, events.RunStarted, joint_ranges=((-800.0, 800.0),) * 6),
-        "states other joint ranges than",
+        "states other limits than",
     ),
     "no joint ranges": (
         lambda h: changed(h, events.RunStarted, joint_ranges=None),
-        "states other joint ranges than",
+        "states other limits than",
+    ),
+    "wider limits of the controller": (
+        lambda h: changed(h, events.RunStarted, limits=ControllerLimits(axes=((-1e3, 1e3),) * 6)),
+        "states other limits than",
+    ),
+    "limits of five axes": (
+        lambda h: changed(h, events.RunStarted, limits=ControllerLimits(axes=((-1.0, 1.0),) * 5)),
+        "there are six axes",
     ),
     "five joint ranges": (
         lambda h: changed(h, events.RunStarted, joint_ranges=((-800.0, 200.0),) * 5),

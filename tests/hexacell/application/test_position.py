@@ -105,3 +105,16 @@ async def test_a_controller_that_keeps_its_old_config_gets_the_file_back(finishe
     assert undone.value.exit_code is ExitCode.WRITE_BACK_UNDONE
     assert site.config == finished.config_before
     assert site.simulated.schedule.move_count == 0
+
+
+async def test_joints_that_include_the_zeros_agree_before_and_after_the_geometry_is_written(
+    make_site,
+) -> None:
+    site = make_site(**{"controller.joints_include_zeros": True})
+    assert (await site.calibrate()).exit_code == ExitCode.DONE
+    located = site.happened(events.Located)[-1]
+    assert located.joints == pytest.approx(located.encoders, abs=0.1)
+    cell = site.order().cell
+    plain = changed(cell.settings, {"controller.joints_include_zeros": False})
+    with pytest.raises(GuardTripped, match="where its pose has it at"):
+        await preflight(replace(cell, settings=plain), Mode.OPTIMISE, unattended=True)

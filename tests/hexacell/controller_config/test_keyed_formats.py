@@ -266,10 +266,10 @@ def test_limits_of_the_joints_in_the_same_ini_file_are_read(written) -> None:
     rows = write_ini(lambda _: "1.5", " ")
     form = LinuxcncIni(HEXAGLIDE_PARAMETERS, INI | {"unit_mm": 25.4})
     found = form.read(written("\n".join([*rows, *limits(-10.0, 20.0)])))
-    assert found.joint_ranges is not None
-    assert found.joint_ranges[5] == pytest.approx((-254.0, 635.0))
-    assert form.read(written("\n".join([*rows, *limits(-10.0, 20.0)[:5]]))).joint_ranges is None
-    with pytest.raises(FileError, match="JOINT_0/MAX_LIMIT is not above"):
+    assert found.limits.joints is not None
+    assert found.limits.joints[5] == pytest.approx((-254.0, 635.0))
+    assert form.read(written("\n".join([*rows, *limits(-10.0, 20.0)[:5]]))).limits.joints is None
+    with pytest.raises(FileError, match=r"MAX_LIMIT of \[JOINT_0\] is not above"):
         form.read(written("\n".join([*rows, *limits(30.0, 20.0)])))
 
 

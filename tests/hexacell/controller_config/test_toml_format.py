@@ -325,13 +325,13 @@ RANGES = "".join(f"[[axes]]\nmin = {-100.0 * (1 + leg)}\nmax = {50.0}\n" for leg
 
 def test_joint_ranges_are_read_where_all_six_axes_state_them(config: Path) -> None:
     text = config.read_text()
-    assert FORMAT.read(config).joint_ranges is None
+    assert FORMAT.read(config).limits.joints is None
     config.write_text(text + RANGES)
-    assert FORMAT.read(config).joint_ranges == tuple((-100.0 * (1 + leg), 50.0) for leg in range(6))
+    assert FORMAT.read(config).limits.joints == tuple((-100.0 * (1 + leg), 50.0) for leg in range(6))
     config.write_text(text + RANGES.replace("max = 50.0\n", "", 1))
-    assert FORMAT.read(config).joint_ranges is None
+    assert FORMAT.read(config).limits.joints is None
     config.write_text(text + RANGES.removeprefix(RANGES[: RANGES.index("[[axes]]", 1)]))
-    assert FORMAT.read(config).joint_ranges is None
+    assert FORMAT.read(config).limits.joints is None
 
 
 @pytest.mark.parametrize(("max_", "problem"), [("-100.0", "is not above its min"), ("'x'", "a number")])

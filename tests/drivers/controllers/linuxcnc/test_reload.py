@@ -176,3 +176,8 @@ async def test_a_controller_that_does_not_restart_is_reported(play):
     play.servers[0].stop_listening()
     with pytest.raises(ConnectionLost, match="cannot be reached: Connection refused"):
         await driver.reload(RESTARTED)
+
+
+async def test_joints_that_include_zeros_are_not_compared_with_those_of_other_zeros(play):
+    driver = await play.opened([IS_ON, BEFORE, *OFF, *ON, HOMED, *MDI], joints_include_zeros=True)
+    await driver.reload(RESTARTED)

@@ -1,0 +1,109 @@
+"""The text of a LinuxCNC INI file, as LinuxCNC reads it.
+
+LinuxCNC looks for a variable in the first section of that name alone and takes the first one there; names
+are case-sensitive; what stands behind the number belongs to the value, comments too (seen with ``inivar``
+of LinuxCNC 2.9). What LinuxCNC would not see, or see otherwise than a person, is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from hexacell.controller_config.number_tokens import NumberToken
+from hexacell.errors import FileError
+
+SEPARATOR = "/"
+"""Between a section and a variable in a key; without it the variable is in the section of the options."""
+
+_SECTION = re.compile(r"[ \t]*\[(?P<name>[^\]\n]*)\]")
+_VARIABLE = re.compile(r"[ \t]*(?P<name>[^=\s#;\[][^=\n]*?)[ \t]*=[ \t]*(?P<value>.*?)[ \t\r]*(?:\n|\Z)")
+_NUMBER_AND_MORE = re.compile(r"(?P<number>[-+.\deE]+)[ \t]+(?P<more>.+)")
+
+
+@dataclass(frozen=True, slots=True)
+class _Variable:
+    section: str
+    is_first_section: bool
+    name: str
+    token: NumberToken
+
+
+@dataclass(frozen=True)
+class IniText:
+    """A :class:`~hexacell.controller_config.keyed_config.NumberLookup` in an INI text."""
+
+    text: str
+    source: Path | None
+    section: str
+
+    def number(self, key: str) -> NumberToken:
+        """The value of ``VARIABLE``, or of ``SECTION/VARIABLE``.
+
+        Raises:
+            FileError: LinuxCNC does not find it, or it is there twice, or more than a number.
+        """
+        section, _, name = key.rpartition(SEPARATOR)
+        section = section or self.section
+        found = [one for one in self._variables if (one.section, one.name) == (section, name)]
+        seen = [one.token for one in found if one.is_first_section]
+        if not seen:
+            raise self._missing(section, name, found)
+        if len(seen) > 1:
+            raise self._error(
+                seen[1],
+                f"[{section}] has {name} a second time; LinuxCNC takes the one of line {seen[0].line}",
+                "Remove one",
+            )
+        if more := _NUMBER_AND_MORE.fullmatch(seen[0].text):
+            raise self._error(
+                seen[0],
+                f"behind {name} stands {more['more']!r}, which LinuxCNC takes for a part of the value",
+                "Put it into a line of its own",
+            )
+        return seen[0]
+
+    def has(self, key: str) -> bool:
+        """Whether there is such a variable, wherever."""
+        section, _, name = key.rpartition(SEPARATOR)
+        return any((one.section, one.name) == (section or self.section, name) for one in self._variables)
+
+    def has_section(self, name: str) -> bool:
+        """Whether there is such a section with a variable in it."""
+        return any(one.section == name for one in self._variables)
+
+    def _missing(self, section: str, name: str, found: list[_Variable]) -> FileError:
+        if found:
+            problem = (
+                f"[{section}] is there twice, and {name} in the second one, where LinuxCNC does not look"
+            )
+            return self._error(found[0].token, problem, "Move it to the first one")
+        return FileError(
+            f"there is no {name} in a section [{section}]",
+            subject=self.source,
+            action="Name the file that holds it, or correct [controller.config_options]",
+        )
+
+    def _error(self, token: NumberToken, problem: str, action: str) -> FileError:
+        return FileError(problem, subject=self.source, line=token.line, action=action)
+
+    @cached_property
+    def _variables(self) -> tuple[_Variable, ...]:
+        return tuple(self._each_variable())
+
+    def _each_variable(self) -> Iterator[_Variable]:
+        section, seen, start = "", set[str](), 0
+        is_first = True
+        for line, content in enumerate(self.text.split("\n"), start=1):
+            if header := _SECTION.match(content):
+                section = header["name"]
+                is_first = section not in seen
+                seen.add(section)
+            elif variable := _VARIABLE.fullmatch(content):
+                first, end = (start + place for place in variable.span("value"))
+                token = NumberToken(variable["value"], first, end, line)
+                yield _Variable(section, is_first, variable["name"], token)
+            start += len(content) + 1

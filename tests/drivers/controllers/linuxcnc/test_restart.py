@@ -1,0 +1,129 @@
+"""``hexacell-restart-linuxcnc`` against a ``linuxcnc`` that notes when it begins and ends."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from drivers.controllers.linuxcnc import restart as command
+from drivers.controllers.linuxcnc.restart import restart
+from hexacell.errors import UsageError
+
+LINUXCNC = """#!{python}
+import socket, sys
+from pathlib import Path
+
+lock, notes, ini = Path("lock"), Path("notes"), Path(sys.argv[-1]).read_text()
+note = lambda word: notes.write_text(notes.read_text() + word + "\\n")
+if "broken" in ini:
+    sys.exit("machine.ini: no such kinematics")
+lock.touch()
+note("begin")
+asked = 0
+with socket.create_server(("127.0.0.1", {port})) as server:
+    while True:
+        connection, _ = server.accept()
+        with connection, connection.makefile("rb") as lines:
+            if lines.readline().split()[:2] != [b"hello", b"open"]:
+                connection.sendall(b"HELLO NAK\\r\\n")
+                continue
+            connection.sendall(b"HELLO ACK EMCNETSVR 1.1\\r\\n")
+            said = [lines.readline().strip(), lines.readline().strip()]
+        asked += said == [b"set enable sesame", b"shutdown"]
+        if asked > ini.count("garbled"):
+            break
+note("end")
+lock.unlink()
+"""
+INIVAR = "#!/bin/sh\nsed -n 's/^DISPLAY = //p' \"$2\"\n"
+
+
+class Machine:
+    """The folder of one; ``ini`` is its INI file, ``notes`` when it began and ended."""
+
+    def __init__(self, folder: Path, port: int) -> None:
+        self.folder, self.port = folder, port
+        self.started: list[subprocess.Popen[bytes]] = []
+        self.ini = folder / "machine.ini"
+        (folder / "notes").write_text("")
+        self.display()
+
+    def display(self, *more: str, program: str = "linuxcncrsh") -> None:
+        options = f"-p {self.port} --connectpw open --enablepw=sesame -- -ini x"
+        self.ini.write_text("\n".join([f"DISPLAY = {program} {options}", *more]))
+
+    def restart(self) -> None:
+        self.started.append(restart(self.ini))
+
+    @property
+    def notes(self) -> list[str]:
+        return (self.folder / "notes").read_text().split()
+
+
+@pytest.fixture
+def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Machine]:
+    with socket.create_server(("127.0.0.1", 0)) as found:
+        port = found.getsockname()[1]
+    for name, text in (("linuxcnc", LINUXCNC.format(python=sys.executable, port=port)), ("inivar", INIVAR)):
+        (tmp_path / name).write_text(text)
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setattr(command, "LOCK", tmp_path / "lock")
+    monkeypatch.setattr(command, "POLL_S", 0.01)
+    made = Machine(tmp_path, port)
+    yield made
+    for process in made.started[:-1]:
+        process.wait()
+    for process in made.started[-1:]:
+        process.kill()
+        process.wait()
+
+
+def test_one_that_does_not_run_is_started(machine: Machine) -> None:
+    machine.restart()
+    assert machine.notes == ["begin"]
+
+
+@pytest.mark.parametrize("how", ["", "garbled once"])
+def test_one_that_runs_has_ended_before_it_is_started_again(machine: Machine, how: str) -> None:
+    machine.display(how)
+    machine.restart()
+    machine.restart()
+    assert machine.notes == ["begin", "end", "begin"]
+
+
+def test_one_that_does_not_start_is_shown_with_what_it_said(machine: Machine) -> None:
+    machine.display("broken")
+    with pytest.raises(UsageError, match=r"ended at once: machine\.ini: no such kinematics"):
+        restart(machine.ini)
+
+
+def test_one_that_does_not_end_is_not_started_a_second_time(machine: Machine, monkeypatch) -> None:
+    (machine.folder / "lock").touch()
+    monkeypatch.setattr(command, "ENDED_S", 0.0)
+    with pytest.raises(UsageError, match="LinuxCNC does not end within 0 s"):
+        restart(machine.ini)
+    assert machine.notes == []
+
+
+def test_another_display_is_refused(machine: Machine) -> None:
+    machine.display(program="axis")
+    with pytest.raises(UsageError, match=r"machine\.ini is not linuxcncrsh"):
+        restart(machine.ini)
+
+
+def test_the_command_says_in_one_line_what_is_wrong(machine: Machine) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "drivers.controllers.linuxcnc.restart"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("hexacell-restart-linuxcnc: no INI file is named")

@@ -11,7 +11,9 @@ import os
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing import get_context
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,7 +29,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import Robot, make_robot, robot_of
+from hexacell.robot_model import Robot, controller_geometry, make_robot, robot_of
 from hexacell.study import data_sets
 from hexacell.study.simulated_campaign import SimulatedCampaign
 from procedures.calibration.held_out_poses import HeldOutPoses
@@ -63,8 +65,13 @@ class Outcome:
     reason: str = ""
 
 
-def bundled() -> tuple[Cell, Robot]:
-    cell = load_cell(bundled_config("simulated-hexaglide"))
+BUNDLED = bundled_config("simulated-hexaglide")
+AT_LINUXCNC = Path(__file__).parents[2] / "configs" / "linuxcnc-hexaglide" / "cell.toml"
+"""Whose axes turn by 45 deg, as the INI file says."""
+
+
+def cell_at(path: Path = BUNDLED) -> tuple[Cell, Robot]:
+    cell = load_cell(path)
     return cell, robot_of(cell)
 
 
@@ -101,8 +108,8 @@ def visit_held_out(
     return visited
 
 
-def outcome(number: int) -> Outcome:
-    cell, robot = bundled()
+def outcome(number: int, path: Path = BUNDLED) -> Outcome:
+    cell, robot = cell_at(path)
     random = np.random.default_rng([11, number])
     truth = robot_at_first(cell, robot, random)
     campaign = SimulatedCampaign(cell.settings, robot, truth, random)
@@ -113,7 +120,8 @@ def outcome(number: int) -> Outcome:
         sigma = task_sigma(cell, robot, found)
         held_out = visit_held_out(cell, robot, found, truth, watched.seen, number)
         written = as_written(cell.settings, robot, found.geometry).geometry
-        after = make_robot(cell.settings, ControllerGeometry(written, robot.branch), taught=written)
+        limits = controller_geometry(cell).limits
+        after = make_robot(cell.settings, ControllerGeometry(written, robot.branch, limits), taught=written)
         held_out += visit_held_out(cell, after, found, truth, watched.seen, number)
     except HexacellError as error:
         return Outcome(number, watched.seen, reason=str(error))
@@ -128,14 +136,15 @@ def outcome(number: int) -> Outcome:
     )
 
 
-def outcomes(numbers: range) -> list[Outcome]:
+def outcomes(numbers: range, path: Path) -> list[Outcome]:
     with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
-        return list(pool.map(outcome, numbers, chunksize=1))
+        return list(pool.map(partial(outcome, path=path), numbers, chunksize=1))
 
 
-def test_no_command_leaves_the_limits(say):
-    cell, robot = bundled()
-    found = outcomes(range(CAMPAIGNS))
+@pytest.mark.parametrize("path", [BUNDLED, AT_LINUXCNC], ids=["bundled", "limits of an INI file"])
+def test_no_command_leaves_the_limits(say, path: Path):
+    cell, robot = cell_at(path)
+    found = outcomes(range(CAMPAIGNS), path)
     limits = robot.limits
     assert limits.legs is not None
     cone = float(np.degrees(limits.legs.platform_cones.min()))
@@ -145,6 +154,9 @@ def test_no_command_leaves_the_limits(say):
     largest = max(one.tilt for one in seen), max(one.turn for one in seen)
     say("  largest tilt of a command", f"{largest[0]:.1f} deg", f"at most {np.degrees(limits.tilt):g}")
     say("  largest turn of a command", f"{largest[1]:.1f} deg", f"at most {np.degrees(limits.turn):g}")
+    axes = np.max([one.largest for one in seen], axis=0)
+    of_axes = np.minimum(-np.array(limits.axes.lowest), limits.axes.highest)
+    say("  largest command of a, b, c", f"{axes[3:].round(1)} deg", f"at most {of_axes[3:]}")
     turned = np.array([cone - one.spare for one in seen])
     say("  largest angle of a passive joint", f"{turned.max():.1f} deg", f"at most {cone:g}")
     near = np.array([one.distance_mm for one in seen])
@@ -164,7 +176,7 @@ def test_no_command_leaves_the_limits(say):
     say("  sigma at the worst task pose, median", f"{np.nanmedian(sigmas):.3f} mm", "")
     assert largest[0] <= np.degrees(limits.tilt) + 1e-6
     assert largest[1] <= np.degrees(limits.turn) + 1e-6
-    assert all(one.axis_is_kept and one.joint_is_kept for one in seen)
+    assert all(one.axis_is_kept and one.joint_is_kept and one.way_is_kept for one in seen)
     assert not beyond
     assert not close
     assert not given_up
@@ -191,7 +203,7 @@ def best_fixed(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Gene
 
 def compared(number: int) -> tuple[float, float]:
     """The predicted error of a campaign, and of the best fixed design, on one robot."""
-    cell, robot = bundled()
+    cell, robot = cell_at()
     random = np.random.default_rng([12, number])
     truth = robot_at_first(cell, robot, np.random.default_rng([11, number]))
     return outcome(number).sigma_mm, best_fixed(cell, robot, truth, random)

@@ -9,19 +9,29 @@ import numpy as np
 from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.motion.trajectory import interpolate_line
 from hexacell.robot_model import Robot
 from hexacell.virtual_robot import VirtualRobot
+
+PIECES = 24
+"""Of a way, at whose ends a stop is tried."""
 
 
 @dataclass
 class Seen:
-    """The worst at all ends of moves: of commands, and of the real robot. Angles in deg."""
+    """The worst at all ends of moves: of commands, and of the real robot. Angles in deg.
+
+    ``way_is_kept`` is whether a stop on a way between two ends that keep tilt, turn, axes and joints would
+    keep them too; ``largest`` is the largest command of each axis.
+    """
 
     moves: int = 0
     tilt: float = 0.0
     turn: float = 0.0
     axis_is_kept: bool = True
     joint_is_kept: bool = True
+    way_is_kept: bool = True
+    largest: tuple[float, ...] = (0.0,) * 6
     spare: float = np.inf
     distance_mm: float = np.inf
 
@@ -40,8 +50,16 @@ class WatchedRobot(VirtualRobot):
         self._note()
 
     def move(self, command: Pose) -> None:
+        start = self.command
         super().move(command)
         self._note()
+        self._note_way(PoseBatch.of([start]), PoseBatch.of([command]))
+
+    def _note_way(self, start: PoseBatch, end: PoseBatch) -> None:
+        line = self.model.frames.poses(interpolate_line(start, end, PIECES))
+        limits = self.model.limits
+        kept = limits.allow_commands(line) & limits.allow_joints(self._joints(line))
+        self.seen.way_is_kept &= bool(kept.all() or not kept[[0, -1]].all())
 
     def _note(self) -> None:
         model, seen, limits = self.model, self.seen, self.model.limits
@@ -50,6 +68,7 @@ class WatchedRobot(VirtualRobot):
         assert limits.legs is not None
         legs = model.mechanism.legs(self.truth, self._actual_pose, joints)
         seen.moves += 1
+        seen.largest = tuple(np.maximum(seen.largest, np.abs(command.numbers()[0])).tolist())
         seen.tilt = max(seen.tilt, float(np.degrees(command.tilts()[0])))
         seen.turn = max(seen.turn, float(np.degrees(np.abs(command.turns()[0]))))
         seen.axis_is_kept &= bool(limits.axes.allow(command)[0])

@@ -59,7 +59,17 @@ def motors(hexapod: LinuxCNC, tmp_path: Path) -> Iterator[Motors]:
     sampling.wait()
 
 
-async def test_other_zeros_are_read_by_a_restart_in_which_no_motor_moves(hexapod, motors) -> None:
+@pytest.fixture
+def in_its_folder(hexapod: LinuxCNC, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the program is started there."""
+    monkeypatch.chdir(hexapod.folder)
+    for name, value in hexapod.environment.items():
+        monkeypatch.setenv(name, value)
+
+
+async def test_other_zeros_are_read_by_a_restart_in_which_no_motor_moves(
+    hexapod, motors, in_its_folder
+) -> None:
     cell = load_cell(hexapod.folder / "cell.toml")
     config, form, mechanism = cell.config_path, config_format(cell.settings), cell.settings.mechanism
     before = form.read(config).geometry

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import os
 import pty
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import pytest
 
 from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.loader import load_cell
+from hexacell.robot_model import config_format
 from tests.cli.test_run_answers import Terminal, ended
 from tests.hexacell.application.proposed_runs import MET, propose_run
+from tests.hexacell.controller_config.test_keyed_formats import write_hal, write_ini
 
 GRAVE = AcceptanceGate(
     name="within tolerance", passed=False, sentence="Beyond: S1x.", needs_person=True, needs_cell_name=True
@@ -19,9 +23,50 @@ KEYS_APPLIED = {"applied", "by", "config", "run", "sha256", "teach"}
 KEYS_RESTORED = {"restored", "config", "from", "undone"}
 
 
-@pytest.fixture
-def cell(cell_folder):
-    return load_cell(cell_folder.cell)
+@dataclass(frozen=True)
+class OtherFormat:
+    """A format beside the native one: its options in the cell file, and how a config of it is written."""
+
+    options: str
+    rows: Callable[[Callable[[str], str], str], list[str]]
+
+
+SIGNS = "[-1, -1, -1, 1, 1, 1]"
+LINES = '["JOINT[{leg}] := ({S.x}, {S.y}, {S.z});", "BALL[{leg}] := ({B.x}, {B.y}, {B.z}), {l};"]'
+
+
+def write_lines(number: Callable[[str], str], gap: str) -> list[str]:
+    """Those of a controller that is not known."""
+    rows = [";PARAMETERS"]
+    for leg in range(1, 7):
+        joint, ball = (gap.join(f"{number(f'{kind}{leg}{axis}')}," for axis in "xyz") for kind in "SB")
+        rows.append(f"JOINT[{leg}] := ({joint.rstrip(',')});")
+        rows.append(f"BALL[{leg}] := ({ball.rstrip(',')}), {number(f'l{leg}')};")
+    return rows
+
+
+FORMATS = {
+    "linuxcnc-ini": OtherFormat(f'{{ section = "HEXAGLIDE", branch = {SIGNS} }}', write_ini),
+    "linuxcnc-hal": OtherFormat(f'{{ component = "hexaglidekins", branch = {SIGNS} }}', write_hal),
+    "template": OtherFormat(f"{{ branch = {SIGNS}, lines = {LINES} }}", write_lines),
+}
+
+
+@pytest.fixture(params=["toml", *FORMATS])
+def cell(cell_folder, request):
+    """A cell whose controller has a config of each format."""
+    native = load_cell(cell_folder.cell)
+    if request.param == "toml":
+        return native
+    found = FORMATS[request.param]
+    geometry = config_format(native.settings).read(native.config_path).geometry
+    numbers = dict(zip(geometry.parameters.names, geometry.vector.tolist(), strict=True))
+    native.config_path.write_text("\n".join([*found.rows(lambda name: repr(numbers[name]), " "), ""]))
+    text = native.path.read_text()
+    assert text.count('config_format = "toml"') == 1
+    stated = f'config_format = "{request.param}"\nconfig_options = {found.options}'
+    native.path.write_text(text.replace('config_format = "toml"', stated))
+    return load_cell(native.path)
 
 
 @pytest.fixture

@@ -63,7 +63,8 @@ def propose_run(
     found = form.read(cell.config_path).geometry
     after = Geometry(found.parameters, found.vector + shift_mm)
     start = fingerprint(cell.config_path)
-    change = propose(cell.config_path, form, "toml", after, fingerprint_at_start=start)
+    name_of_format = cell.settings.controller.config_format
+    change = propose(cell.config_path, form, name_of_format, after, fingerprint_at_start=start)
     change.save(folder.proposal)
     with Journal(folder.journal) as journal:
         for event in _history(cell, change, gates, verdict, verification):

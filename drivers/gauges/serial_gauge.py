@@ -31,6 +31,7 @@ from hexacell.errors import DeviceError, FileError
 
 MAX_READINGS = 12  # enough for an oscillating ball to come to rest
 MAX_REQUESTS = 3
+MORE_STATES = 2  # the settings are asked for so often again before something is wrong with them
 OTHER_DECIMALS = "Press its in/mm key, or correct resolution_mm in the cell file"
 BEYOND_TRAVEL = "Check its cable; if its zero or preset key was pressed, open it again"
 
@@ -88,8 +89,10 @@ class SerialGauge(ABC):
         try:
             await self._connect()
             state = await self._read_state_when_awake()
-            if self._unusable(state):
-                state = await self._read_state()  # one damaged answer is no setting
+            for _ in range(MORE_STATES):  # a damaged answer is no setting
+                if not self._unusable(state):
+                    break
+                state = await self._read_state()
             self._require_usable(state)
             await self._require_stated_resolution()
         except BaseException:
@@ -132,8 +135,10 @@ class SerialGauge(ABC):
         """Query the settings again; a ``ZeroVoid`` if one has changed since ``open``."""
         before = self._opened_state()
         now = await self._read_state()
-        if self._unusable(now) or now.changes_since(before):
-            now = await self._read_state()  # one damaged answer is no change
+        for _ in range(MORE_STATES):  # a damaged answer is no change
+            if not (self._unusable(now) or now.changes_since(before)):
+                break
+            now = await self._read_state()
         self._require_usable(now)
         if changes := now.changes_since(before):
             raise self._voided(f"was set differently: {', '.join(changes)}")

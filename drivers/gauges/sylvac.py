@@ -65,7 +65,7 @@ class Query:
 
 UNIT = Query(b"UNI?\r", re.compile(rb"(?:UNI ?)?(MM|IN)\r"))
 IDENTIFICATION = Query(b"ID?\r", re.compile(rb"([A-Z][ -~]{1,31})\r"))
-MODE = Query(b"MOD?\r", re.compile(rb"(?:MOD ?)?([A-Z]{3}\d?)\r"))
+MODE = Query(b"MOD?\r", re.compile(rb"(?:MOD ?)?((?:NOR|MIN|MAX|DEL|TOL|REF)\d?)\r"))
 HOLD = Query(b"STO?\r", re.compile(rb"(?:STO ?)?([01])\r"))
 DIRECTION = Query(b"CHA?\r", re.compile(rb"(?:CHA ?)?([+-])\r"))
 PRESET = Query(b"PRE?\r", re.compile(rb"(?:PRE ?)?([+\- ]?\d{1,5}\.\d{1,6})\r"))

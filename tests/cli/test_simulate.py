@@ -156,3 +156,29 @@ def test_two_processes_cannot_move_one_robot(served, start, typed_here):
     stopped = first.stopped(signal.SIGTERM)
     assert stopped.code == 130
     assert typed_here("preflight", printed).code == 0
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("slow:x", "--fault slow:x is no fault that can be simulated. Write it like damaged:x@12"),
+        ("damaged:x@soon", "--fault damaged:x@soon is no fault"),
+        ("damaged:w", "no fault 'damaged' can be simulated of 'w'"),
+    ],
+)
+def test_faults_that_cannot_be_simulated_are_refused(cell_folder, typed_here, fault, words):
+    outcome = typed_here("simulate", cell_folder.cell, "--fault", fault)
+    assert outcome.code == 2
+    assert words in " ".join(outcome.err.split())
+
+
+def test_a_fault_named_on_the_command_line_is_there(cell_folder, start, typed_here):
+    process = start(
+        "simulate", cell_folder.cell, "--fault", "in inches:x", "--fault", "jumped:encoder 2@900"
+    )
+    process.wait_for("serving", lambda: process.err)
+    served = cell_folder.path / "served.toml"
+    served.write_text(process.out)
+    outcome = typed_here("devices", "--diagnose", "x", "--cell", served, "--seconds", "0.1")
+    assert outcome.code == 3
+    assert "gauge x: answers in inch" in outcome.err

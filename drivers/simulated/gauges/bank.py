@@ -8,6 +8,7 @@ from functools import partial
 
 from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
 from drivers.simulated.gauges.instruments import INSTRUMENTS, Instrument
+from drivers.simulated.gauges.line_faults import LATE_TIMEOUTS, LineFault, LineFaults
 from drivers.simulated.gauges.server import GaugeLineServer
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.served_device import Closeable, Switch
@@ -53,6 +54,7 @@ class SimulatedGaugeBank(Closeable):
         self.indicators = {gauge.name: Indicator(plungers[gauge.name], gauge.travel_mm) for gauge in gauges}
         self._settings = settings
         self._clock = clock
+        self._channels = {gauge.name: _channel(gauge) for gauge in gauges}
         self._lines: dict[str, GaugeLineServer] = {}
         with ExitStack() as served:
             for group in _by_line(gauges):
@@ -81,6 +83,12 @@ class SimulatedGaugeBank(Closeable):
             "in inches": indicator.set_inch,
             "exchanged": partial(self._exchange, gauge),
             "frozen": indicator.set_frozen,
+            "on hold": indicator.set_hold,
+            "in peak mode": indicator.set_peak,
+            "zeroed": indicator.set_zeroed,
+            "low battery": indicator.set_battery_low,
+            "switched on again": partial(_switch_on, line, self._channels[gauge]),
+            **{fault.value: partial(line.faults.switch, fault) for fault in LineFault},
         }
 
     def _exchange(self, gauge: str, *, on: bool) -> None:
@@ -100,11 +108,17 @@ class SimulatedGaugeBank(Closeable):
             self._clock,
             latency_s=self._settings.latency_s,
             baudrate=self._settings.baudrate,
+            faults=LineFaults(LATE_TIMEOUTS * group[0].timeout_s),
         )
 
     def close(self) -> None:
         """Close every line; closing twice is harmless."""
         self._served.close()
+
+
+def _switch_on(line: GaugeLineServer, channel: int, *, on: bool) -> None:
+    if on:
+        line.switch_on(channel)
 
 
 def _channel(gauge: GaugeSettings) -> int:

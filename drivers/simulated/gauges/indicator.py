@@ -17,7 +17,10 @@ Called from the thread of the line.
 
 
 class Indicator:
-    """One instrument. Its settings and its power are attributes; ``held_mm`` is the value on hold."""
+    """One instrument. Its settings and its power are attributes.
+
+    ``held_mm`` is the value on hold, ``peak_mm`` the largest one while it shows that.
+    """
 
     def __init__(self, plunger: PlungerPosition, travel_mm: float = 12.5) -> None:
         self.inch = False
@@ -31,6 +34,7 @@ class Indicator:
         self._offset_mm = 0.0
         self._at_end = False
         self._jammed_mm: float | None = None
+        self.peak_mm: float | None = None
         self._pushed_mm = 0.0
         self._off_middle_mm = 0.0
 
@@ -39,11 +43,26 @@ class Indicator:
         value = self._live_mm() if self.held_mm is None else self.held_mm
         if value is None:
             return None
+        if self.peak_mm is not None:
+            value = self.peak_mm = max(self.peak_mm, value)
         return value / MM_PER_INCH if self.inch else value
 
     def set_hold(self, *, on: bool) -> None:
         """Hold the display, without effect at an end of the travel; or end the hold."""
         self.held_mm = self._live_mm() if on else None
+
+    def set_peak(self, *, on: bool) -> None:
+        """Show the largest value since then, or the present one again."""
+        self.peak_mm = self._live_mm() if on else None
+
+    def set_battery_low(self, *, on: bool) -> None:
+        """Report a low battery, or a good one."""
+        self.battery_low = on
+
+    def set_zeroed(self, *, on: bool) -> None:
+        """Press the zero key; what it did stays."""
+        if on:
+            self.recall_preset()
 
     def recall_preset(self) -> None:
         """Set the display to the preset value; with a preset of 0 this is the zero key."""

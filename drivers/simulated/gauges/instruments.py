@@ -116,7 +116,7 @@ class Sylvac(SingleIndicator):
         return {
             "UNI?": "IN" if indicator.inch else "MM",
             "ID?": "SY276",
-            "MOD?": "NOR",
+            "MOD?": "NOR" if indicator.peak_mm is None else "MAX",
             "STO?": "STO0" if indicator.held_mm is None else "STO1",
             "CHA?": "CHA-" if indicator.reversed else "CHA+",
             "PRE?": f"PRE {indicator.preset_mm:+.3f}",
@@ -188,10 +188,12 @@ class Cdi(SingleIndicator):
 
     def _parameters(self) -> dict[str, int]:
         indicator = self.indicator
+        peak = {} if indicator.peak_mm is None else {"011": 1}
         return self._without_effect | {
             "013": 1 if indicator.inch else 2,
             "019": int(indicator.reversed),
             "021": int(indicator.held_mm is not None),
+            **peak,
         }
 
     def _set(self, number: str, setting: str) -> bytes:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 
 from drivers.simulated.gauges.instruments import Instrument
+from drivers.simulated.gauges.line_faults import LineFaults
 from drivers.simulated.serial_line import SerialLine
 from drivers.simulated.served_device import Closeable
 from hexacell.clock import CellClock
@@ -38,8 +39,10 @@ class GaugeLineServer(Closeable):
         *,
         latency_s: float,
         baudrate: int | None = None,
+        faults: LineFaults | None = None,
     ) -> None:
         self.instrument = instrument
+        self.faults = faults or LineFaults(late_s=0.0)
         self.url = line.url
         self._line = line
         self._clock = clock
@@ -124,9 +127,11 @@ class GaugeLineServer(Closeable):
         answer = self.instrument.answer(command)
         if self._silent:
             answer = b""
+        late_s = self.faults.delay_s() / self._clock.real_seconds(1.0)
+        answer = self.faults.sent(command, answer)
         wire_s = (len(command) + len(COMMAND_END) + len(answer)) * self._byte_s
         free_at = max([self._clock.now(), *(due for due, _ in self._answers)])
-        self._answers.append((free_at + self._latency_s + wire_s, answer))
+        self._answers.append((free_at + self._latency_s + late_s + wire_s, answer))
 
     def _until_next_answer_s(self) -> float | None:
         if not self._answers:

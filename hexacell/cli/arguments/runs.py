@@ -113,6 +113,13 @@ def _simulate(commands: Any) -> None:  # noqa: ANN401
     )
     add_cell(parser)
     add_file(parser, "--output", "write the cell file for `run` there instead of to stdout")
+    parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="KIND:DEVICE@MOVE",
+        help='inject a fault, such as "damaged:x@12": of gauge x, with move 12; without @12 at once',
+    )
 
 
 def _host(commands: Any) -> None:  # noqa: ANN401

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from hexacell.application.demo import served_cell
+from hexacell.application.demo import served_cell, with_faults
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
@@ -18,7 +18,7 @@ from hexacell.storage.atomic_files import write_atomically
 def main(options: argparse.Namespace) -> ExitCode:
     """Serve until interrupted; stdout gets a cell file with the addresses of the served devices."""
     console = Console()
-    cell = cell_at(options.cell, console)
+    cell = with_faults(cell_at(options.cell, console), options.fault)
     with _blocked_signals() as stops, served_cell(cell) as text:
         if options.output is None:
             print(text, flush=True)

@@ -180,7 +180,7 @@ async def test_inch_pressed_during_a_set_is_found_in_a_reading(dialogue, opened,
 
 async def test_the_unit_is_requested_with_the_plunger_at_its_end(dialogue, gauge):
     at_end = opening(b"OUT OF BOUNDS\r\n")
-    dialogue.expect(*[at_end[0], (b"?p013\r", b"1\r\n"), *at_end[1:]] * 2)
+    dialogue.expect(*[at_end[0], (b"?p013\r", b"1\r\n"), *at_end[1:]] * 3)
     with pytest.raises(WrongSetting):
         await gauge.open()
     dialogue.expect(at_end[0], (b"?p013\r", b"2\r\n"), *at_end[1:])
@@ -197,7 +197,7 @@ async def test_the_unit_is_requested_with_the_plunger_at_its_end(dialogue, gauge
     ],
 )
 async def test_settings_that_falsify_readings_are_refused(dialogue, gauge, answers, words):
-    dialogue.expect(*opening(**answers) * 2)
+    dialogue.expect(*opening(**answers) * 3)
     with pytest.raises(WrongSetting, match=words):
         await gauge.open()
 
@@ -207,7 +207,7 @@ async def test_settings_that_falsify_readings_are_refused(dialogue, gauge, answe
     [({"p019": b"1\r\n"}, "reversed False -> True"), ({"p011": b"2\r\n"}, "mode ABS -> INCR")],
 )
 async def test_a_setting_changed_during_a_set_voids_the_zero(dialogue, opened, answers, words):
-    dialogue.expect(*opening(**answers) * 2)
+    dialogue.expect(*opening(**answers) * 3)
     with pytest.raises(ZeroVoid, match=words):
         await opened.check()
 

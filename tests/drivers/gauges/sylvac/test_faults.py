@@ -75,7 +75,7 @@ async def test_overspeed_voids_the_zero_until_it_is_opened_again(dialogue, opene
 
 
 async def test_an_inch_gauge_is_refused(dialogue, gauge):
-    dialogue.expect(*opening(UNI=b"IN\r") * 2)
+    dialogue.expect(*opening(UNI=b"IN\r") * 3)
     with pytest.raises(WrongSetting) as caught:
         await gauge.open()
     assert str(caught.value) == "gauge y: answers in inch. Press its in/mm key"
@@ -88,7 +88,7 @@ async def test_inch_pressed_during_a_set_is_found_in_a_reading(dialogue, opened)
 
 
 async def test_inch_pressed_during_a_set_is_found_by_the_check(dialogue, opened):
-    dialogue.expect(*opening(UNI=b"IN\r") * 2)
+    dialogue.expect(*opening(UNI=b"IN\r") * 3)
     with pytest.raises(WrongSetting):
         await opened.check()
 
@@ -106,10 +106,10 @@ async def test_inch_pressed_during_a_set_is_found_by_the_check(dialogue, opened)
 async def test_settings_that_falsify_readings_are_refused_at_opening_and_by_the_check(
     dialogue, gauge, answers, words
 ):
-    dialogue.expect(*opening(**answers) * 2)
+    dialogue.expect(*opening(**answers) * 3)
     with pytest.raises(WrongSetting, match=words):
         await gauge.open()
-    dialogue.expect(*OPENING, *opening(**answers) * 2)
+    dialogue.expect(*OPENING, *opening(**answers) * 3)
     await gauge.open()
     with pytest.raises(WrongSetting, match=words):
         await gauge.check()
@@ -125,7 +125,7 @@ async def test_settings_that_falsify_readings_are_refused_at_opening_and_by_the_
     ],
 )
 async def test_a_setting_changed_during_a_set_voids_the_zero(dialogue, opened, answers, words):
-    dialogue.expect(*opening(**answers) * 2)
+    dialogue.expect(*opening(**answers) * 3)
     with pytest.raises(ZeroVoid, match=words):
         await opened.check()
     with pytest.raises(ZeroVoid):

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Callable
+from typing import Any
 
+import numpy as np
 import pytest
 
 from hexacell.cell.loader import load_cell
+from hexacell.controller_config.linuxcnc_limits import limits_of_ini
 from hexacell.robot_model import config_format
 from tests.linuxcnc.conftest import LinuxCNC
 from tests.waiting import wait_until
@@ -69,7 +72,7 @@ def go_on(machine: LinuxCNC) -> None:
 
 def test_a_hexaglide_is_calibrated_and_its_geometry_runs(linuxcnc: LinuxCNC) -> None:
     before = written(linuxcnc)
-    require_passed(linuxcnc.hexacell(*RUN))
+    require_passed(linuxcnc, linuxcnc.hexacell(*RUN))
     after = written(linuxcnc)
     assert after != before
     assert pins_of_hexaglide(linuxcnc) == pytest.approx(after, rel=1e-6)
@@ -116,13 +119,23 @@ def require_stopped_and_resumed(machine: LinuxCNC, fault: Fault) -> None:
     at_the_fault = sampled(machine)
     go_on(machine)
     assert sampled(machine) == at_the_fault
-    require_passed(machine.hexacell(*RUN, "--resume"))
+    require_passed(machine, machine.hexacell(*RUN, "--resume"))
 
 
-def require_passed(done: subprocess.CompletedProcess[str]) -> None:
-    """Verdict pass: the error at the task poses with its uncertainty is within the limit."""
+def require_passed(machine: LinuxCNC, done: subprocess.CompletedProcess[str]) -> None:
+    """Verdict pass: the error at the task poses with its uncertainty is within the limit.
+
+    No pose was commanded beyond the limits of LinuxCNC's axes.
+    """
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["verdict"] == "pass"
+    steps = [event["step"] for event in journal(machine) if event["kind"] == "begun"]
+    commanded = np.array([step["pose"] for step in steps if step["kind"] == "move"])
+    axes = limits_of_ini(machine.ini).axes
+    assert axes is not None
+    lowest, highest = np.transpose([axis for axis in axes if axis is not None])
+    assert len(commanded) > 50
+    assert ((commanded >= lowest) & (commanded <= highest)).all()
 
 
 def shorten(machine: LinuxCNC) -> None:
@@ -162,8 +175,13 @@ def written(machine: LinuxCNC) -> list[float]:
 
 def sampled(machine: LinuxCNC) -> int:
     """Records so far."""
-    return sum(
-        json.loads(line)["event"]["kind"] == "sampled"
+    return sum(event["kind"] == "sampled" for event in journal(machine))
+
+
+def journal(machine: LinuxCNC) -> list[dict[str, Any]]:
+    """The events of its run so far."""
+    return [
+        json.loads(line)["event"]
         for path in machine.folder.glob("runs/*/*/journal.jsonl")
         for line in path.read_text().split("\n")[:-1]
-    )
+    ]

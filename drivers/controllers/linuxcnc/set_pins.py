@@ -2,9 +2,11 @@
 
     hexacell-set-pins hexaglide.hal geometry.inc
 
-sets every pin again that a ``setp`` line of the HAL files sets, to the line's number or to the variable of
-the INI files that it names. It is the ``reload_command`` of a cell: the machine must be off, since with the
-machine on a new geometry makes the joints jump (by 6.8 mm at 3.4 m/s in a trial).
+sets every pin again that a ``setp`` line of the HAL files sets to a variable of the INI files; if none is
+named, every pin that such a line sets to a number. Other pins stay as they were tuned at run time.
+
+It is the ``reload_command`` of a cell: the machine must be off, since with the machine on a new geometry
+makes the joints jump (by 6.8 mm at 3.4 m/s in a trial).
 
 The forward kinematics must then find a pose at the joints where they stand. If a pin ``*fwd-kins-fail``
 says that it does not, the old values are set again and the command fails.
@@ -76,13 +78,17 @@ def set_pins(files: Sequence[Path]) -> int:
 
 
 def _wanted(hal: Iterable[Path], inis: Sequence[IniText]) -> Iterator[tuple[str, str]]:
-    """Every pin with its value as text; of INI variables, those of sections that the INI files have."""
+    """Every pin with its value as text; of INI variables, those of sections that the INI files have.
+
+    Where there are INI files, they have the geometry, and a number in the HAL file is none.
+    """
     for path in hal:
         for line in read_text(path).split("\n"):
             if setp := SETP.fullmatch(line):
                 reference = _REFERENCE.fullmatch(setp["value"])
                 if reference is None:
-                    yield setp["pin"], setp["value"]
+                    if not inis:
+                        yield setp["pin"], setp["value"]
                 elif (value := _looked_up(reference, inis)) is not None:
                     yield setp["pin"], value
 

@@ -36,18 +36,21 @@ else:
 HAL = """
 loadrt kins
 setp kins.l.0 [KINS]L1   # of leg 1
-setp kins.l.1 582.5
+setp kins.l.1 [KINS]L2
+setp kins.criterion 1e-9
 setp kins.gain [OTHER]GAIN
 net x kins.out => joint.0.in
 """
-INI = "[KINS]\nL1 = 591.123456789\n"
+INI = "[KINS]\nL1 = 591.123456789\nL2 = 582.5\n"
+TUNED = "1e-07"
 
 
 @pytest.fixture
 def pins(tmp_path, monkeypatch) -> Callable[[], dict[str, str]]:
     """What the running LinuxCNC has."""
     kept = tmp_path / "pins.json"
-    kept.write_text(json.dumps({"kins.l.0": "590", "kins.l.1": "580", "kins.fwd-kins-fail": "FALSE"}))
+    values = {"kins.l.0": "590", "kins.l.1": "580", "kins.criterion": TUNED, "kins.fwd-kins-fail": "FALSE"}
+    kept.write_text(json.dumps(values))
     folder = tmp_path / "bin"
     folder.mkdir()
     program = folder / "halcmd"
@@ -68,15 +71,21 @@ def files(tmp_path) -> Callable[..., list[Path]]:
     return write
 
 
-def test_pins_get_the_numbers_of_both_files(pins, files) -> None:
+def test_pins_get_the_numbers_of_the_ini_file_and_others_stay_as_they_were_tuned(pins, files) -> None:
     assert set_pins(files()) == 2
     assert pins()["kins.l.0"] == "591.123456789", "not rounded"
     assert pins()["kins.l.1"] == "582.5"
+    assert pins()["kins.criterion"] == TUNED
+
+
+def test_without_an_ini_file_pins_get_the_numbers_of_the_hal_file(pins, files) -> None:
+    assert set_pins(files(hal="setp kins.l.0 585.5\nsetp kins.l.1 [KINS]L2\n")[:1]) == 1
+    assert (pins()["kins.l.0"], pins()["kins.l.1"]) == ("585.5", "580")
 
 
 def test_where_the_forward_kinematics_fails_the_old_numbers_are_set_again(pins, files) -> None:
     with pytest.raises(UsageError, match=r"no pose with these numbers \(kins.fwd-kins-fail\)"):
-        set_pins(files(ini="[KINS]\nL1 = 950.0\n"))
+        set_pins(files(ini="[KINS]\nL1 = 950.0\nL2 = 582.5\n"))
     assert (pins()["kins.l.0"], pins()["kins.l.1"]) == ("590", "580")
     assert pins()["kins.fwd-kins-fail"] == "FALSE"
 

@@ -16,7 +16,7 @@ import numpy as np
 from hexacell.application.started_robot import started_robot
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import ConfigChange
-from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.controller_config.interface import ControllerGeometry, ControllerLimits
 from hexacell.controller_config.write_back import BEFORE, RECEIPT, Receipt
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
@@ -86,7 +86,8 @@ def _require_own_geometry(
     if not _is_same(found, stated, started):
         raise _differs(folder, f"another geometry than {path}")
     own = stated_limits(cell.settings, found, SAME_FRAMES).joint_ranges
-    if started.joint_ranges != own or started.limits != found.limits:
+    limits = started.limits or ControllerLimits(joints=found.limits.joints)  # of older versions: no axes
+    if started.joint_ranges != own or limits != found.limits:
         raise _differs(folder, f"other limits than the cell file, {path} and [limits] ini, if one is named")
 
 

@@ -34,7 +34,7 @@ def main() -> int:
         if len(sys.argv) != 2:
             raise UsageError("no INI file is named", action="hexacell-restart-linuxcnc FILE.ini")
         restart(Path(sys.argv[1]).absolute())
-    except HexacellError as error:
+    except (HexacellError, OSError) as error:
         print(f"hexacell-restart-linuxcnc: {error}", file=sys.stderr)  # noqa: T201 - a command of its own
         return 1
     return 0
@@ -45,6 +45,7 @@ def restart(ini: Path) -> subprocess.Popen[bytes]:
 
     Raises:
         UsageError: its display is not linuxcncrsh, it does not end, or it does not start.
+        OSError: LinuxCNC is not installed here, or its folder cannot be written.
     """
     server = _server_of(ini)
     _wait(lambda: _is_shut_down(server), ENDED_S, "LinuxCNC does not end")

@@ -118,12 +118,19 @@ def test_another_display_is_refused(machine: Machine) -> None:
         restart(machine.ini)
 
 
-def test_the_command_says_in_one_line_what_is_wrong(machine: Machine) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "path", "problem"),
+    [((), os.environ["PATH"], "no INI file is named"), (("machine.ini",), "", "'inivar'")],
+)
+def test_the_command_says_in_one_line_what_is_wrong(arguments, path, problem) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "drivers.controllers.linuxcnc.restart"],
+        [sys.executable, "-m", "drivers.controllers.linuxcnc.restart", *arguments],
+        env=os.environ | {"PATH": path},
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 1
-    assert done.stderr.startswith("hexacell-restart-linuxcnc: no INI file is named")
+    assert done.stderr.startswith("hexacell-restart-linuxcnc: ")
+    assert problem in done.stderr
+    assert done.stderr.count("\n") == 1

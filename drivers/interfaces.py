@@ -73,7 +73,7 @@ StartupActions = frozenset[StartupAction]
 class ControllerStatus:
     """A controller's status: emergency stop, enabled, and its error messages.
 
-    ``heartbeat`` changes whenever the sliders move, or more often, as long as the controller works;
+    ``heartbeat`` changes whenever the joints move, or more often, as long as the controller works;
     empty where there is none. One that is frozen may still answer, but with the same.
     """
 
@@ -147,7 +147,7 @@ class Gauge(Device[DeviceIdentity], Protocol):
 
 
 class EncoderBank(Device[tuple[DeviceIdentity, ...]], Protocol):
-    """Six slider encoders that are sampled simultaneously."""
+    """Six encoders of the joints that are sampled simultaneously."""
 
     async def read(self) -> EncoderSample:
         """One complete sample of all six encoders at the same instant, or an error."""
@@ -182,7 +182,7 @@ class Controller(Device[DeviceIdentity], Protocol):
         ...
 
     async def reload(self, permitted: StartupActions) -> None:
-        """Make it reload its config; sliders must not move. Afterwards it is as ``prepare`` leaves it.
+        """Make it reload its config; joints must not move. Afterwards it is as ``prepare`` leaves it.
 
         It is switched off and on for that, without permission where it was on before.
 

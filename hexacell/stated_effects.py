@@ -39,7 +39,7 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
     """
     stated = settings.uncertainty
     return (
-        *_of_encoders(stated),
+        *_of_encoders(stated, are_identified=settings.robot.encoder_scales),
         _of_stops(stated, settings.mechanism.words),
         *_of_guides(stated, settings.limits.joint_max - settings.limits.joint_min),
         gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True, source="noise.gauge_scale"),
@@ -49,12 +49,14 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
     )
 
 
-def _of_encoders(stated: CommonUncertaintySettings) -> tuple[Effect, ...]:
+def _of_encoders(stated: CommonUncertaintySettings, *, are_identified: bool) -> tuple[Effect, ...]:
+    """Where the scales are identified, what is not known of them is in the covariance of the parameters."""
     if isinstance(stated, LinearUncertaintySettings):
         common, each = "common_encoder_scale_um_m", "encoder_scale_um_m"
+        of_each = encoder_scales(stated.encoder_scale_um_m, stated.source(each))
         return (
             common_encoder_scale(stated.common_encoder_scale_um_m, stated.source(common)),
-            encoder_scales(stated.encoder_scale_um_m, stated.source(each)),
+            *(() if are_identified else (of_each,)),
         )
     if isinstance(stated, RotaryUncertaintySettings):
         key = "encoder_eccentricity_mdeg"

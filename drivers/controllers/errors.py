@@ -15,7 +15,7 @@ class ResponseTimeout(ConnectionLost):
 
 
 class ControllerFrozen(ResponseTimeout):
-    """It answers, but always the same, although the sliders move: the part that controls them stands."""
+    """It answers, but always the same, although the joints move: the part that controls them stands."""
 
 
 class StartupNotPermitted(DeviceError):

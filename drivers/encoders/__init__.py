@@ -1,1 +1,1 @@
-"""Driver of the slider encoders: six CANopen nodes (CiA 406) on any CAN interface."""
+"""Driver of the encoders: six CANopen nodes (CiA 406) on any CAN interface."""

@@ -1,4 +1,4 @@
-"""The true state of a robot whose sliders a real controller moves."""
+"""The true state of a robot whose joints a real controller moves."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from drivers.simulated.physics import Motion, RobotPhysics
 from hexacell.kinematics.rotations import Array
 
 LONGEST_STEP_MM = 5.0
-"""Of a slider between two solutions of the pose, so that the assembly mode is kept."""
+"""Of a joint variable between two solutions of the pose, so that the assembly mode is kept."""
 
 MOVED_MM = 1e-4
 
 
 class FollowingPhysics(RobotPhysics):
-    """Where the sliders are is what ``source`` says; before it says anything, at the first point."""
+    """Where the joints are is what ``source`` says; before it says anything, at the first point."""
 
     def __init__(self, source: JointSource, *arguments: Any) -> None:  # noqa: ANN401 - those of its base
         super().__init__(*arguments)
@@ -31,7 +31,7 @@ class FollowingPhysics(RobotPhysics):
         return now
 
     def encoder_positions(self) -> Array:
-        """The slider positions measured by the encoders (6,), mm."""
+        """The joint variables measured by the encoders (6,)."""
         with self._lock:
             self._update()
             return super().encoder_positions()

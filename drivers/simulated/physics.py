@@ -1,6 +1,6 @@
-"""The true state of a simulated cell: actual slider positions, actual ball position, and the sensors.
+"""The true state of a simulated cell: actual joint variables, actual ball position, and the sensors.
 
-Sliders move along given paths at one rate with ramps at its ends, and can be stopped at any time. The
+Joints move along given paths at one rate with ramps at its ends, and can be stopped at any time. The
 pose under the true geometry is computed by continuation, so that the assembly mode is kept. Gauges and
 encoders add noise.
 """
@@ -31,10 +31,10 @@ RAMP_S = 0.2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A motion of the sliders along a path at one rate, with ramps of ``RAMP_S`` at its ends.
+    """A motion of the joints along a path at one rate, with ramps of ``RAMP_S`` at its ends.
 
     Attributes:
-        path: slider positions (k, 6), mm, evenly spaced.
+        path: joint variables (k, 6), evenly spaced.
         start_s: time of the start, on the cell's clock.
         duration_s: from standstill to standstill.
         stopped_s: when it was stopped before its end.
@@ -47,12 +47,12 @@ class Motion:
 
     @classmethod
     def stationary(cls, joints: Array) -> Motion:
-        """Standstill at slider positions (6,), mm."""
+        """Standstill at joint variables (6,)."""
         return cls(np.stack([joints, joints]), -1e9, 0.0)
 
     @property
     def end_s(self) -> float:
-        """When the sliders reach standstill."""
+        """When the joints reach standstill."""
         return min(self.start_s + self.duration_s, self.stopped_s)
 
     def fraction(self, now_s: float) -> float:
@@ -73,7 +73,7 @@ class Motion:
         return self.fraction(now_s) * (len(self.path) - 1)
 
     def joints(self, now_s: float) -> Array:
-        """The slider positions (6,), mm, at a time."""
+        """The joint variables (6,), at a time."""
         position = self.path_position(now_s)
         below = min(int(position), len(self.path) - 2)
         share = position - below
@@ -92,7 +92,7 @@ class RobotPhysics:
         on_motion_start: called when a motion has started; must return quickly.
         gauges: where they are.
 
-    It starts where a controller with the geometry ``commanding`` puts the sliders for ``home``. The sliders
+    It starts where a controller with the geometry ``commanding`` puts the joints for ``home``. The joints
     go where the encoders show what is commanded. ``fixture`` has the seats of a length check, if any.
 
     Raises:
@@ -153,7 +153,7 @@ class RobotPhysics:
             return self._motion
 
     def stop(self) -> None:
-        """Stop the sliders at their present positions."""
+        """Stop the joints at their present positions."""
         with self._lock:
             now = self._clock.now()
             if now < self._motion.end_s:
@@ -161,7 +161,7 @@ class RobotPhysics:
 
     @property
     def motion_end_s(self) -> float:
-        """When the sliders reached, or will reach, standstill, on the cell's clock."""
+        """When the joints reached, or will reach, standstill, on the cell's clock."""
         with self._lock:
             return self._motion.end_s
 
@@ -171,7 +171,7 @@ class RobotPhysics:
             return self._motion.fraction(self._clock.now())
 
     def encoder_positions(self) -> Array:
-        """The slider positions measured by the encoders (6,), mm."""
+        """The joint variables measured by the encoders (6,), mm."""
         with self._lock:
             flicker = self._settings.encoders.flicker * self._random.standard_normal(6)
             shown = self._shown_per_mm * self._motion.joints(self._clock.now())
@@ -179,7 +179,7 @@ class RobotPhysics:
             return measured
 
     def true_joints(self) -> Array:
-        """Where the sliders are (6,), mm, whatever the encoders show."""
+        """Where the joints are (6,), mm, whatever the encoders show."""
         with self._lock:
             return self._motion.joints(self._clock.now())
 
@@ -205,7 +205,7 @@ class RobotPhysics:
         self._encoder_noise = self._settings.encoders.noise * self._random.standard_normal(6)
 
     def _update(self) -> float:
-        """Move the platform along the path of the sliders since the last update."""
+        """Move the platform along the path of the joints since the last update."""
         now = self._clock.now()
         position = self._motion.path_position(now)
         while self._rows_passed + 1 <= position:
@@ -222,7 +222,7 @@ class RobotPhysics:
         if found.found[0]:
             self._pose = found.poses
         # Otherwise the platform is at a singularity. Where a real one would go is unknown; this one
-        # waits until the sliders are where it can continue from its pose.
+        # waits until the joints are where it can continue from its pose.
 
     def _ringing(self, since_s: float) -> Array:
         motion = self._settings.motion

@@ -18,7 +18,6 @@ from hexacell.cell.model import CellSettings
 from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
 from hexacell.errors import FileError, HexacellError
-from hexacell.kinematics.mechanism import Mechanism
 from hexacell.plugins import Group, load
 from hexacell.robot_model import config_format
 from hexacell.storage.toml_locations import KeyPath
@@ -43,12 +42,11 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
     from drivers.simulated.cell import SimulatedCell  # noqa: PLC0415
     from drivers.simulated.followed_controller import FollowedController  # noqa: PLC0415
 
-    mechanism: Mechanism = load(Group.MECHANISMS, settings.robot.mechanism)()
     kind = FollowedController if settings.simulation.joints_command else SimulatedCell
     with kind(
         settings,
         settings.simulation,
-        mechanism,
+        settings.mechanism,
         config_format(settings),
         cell.config_path,
         other_processes=other_processes,

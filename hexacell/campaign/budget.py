@@ -16,7 +16,7 @@ class UsualMoves:
 
     Attributes:
         moves: waypoints and ways back included.
-        joint_mm, edge_mm: how far the fastest slider and the fastest point of the platform would come at
+        joint_mm, edge_mm: how far the fastest joint and the fastest point of the platform would come at
             their largest speed for the duration of a move.
     """
 

@@ -112,7 +112,9 @@ def schema() -> dict[str, Any]:
 
 
 def _checked(document: TomlDocument, path: Path) -> CellSettings:
-    return validated(document, cell_model(_mechanism(document)), path)
+    return validated(
+        document, cell_model(_mechanism(document), encoder_scales=_encoder_scales(document)), path
+    )
 
 
 def validated(document: TomlDocument, model: type[SectionType], path: Path) -> SectionType:
@@ -134,6 +136,12 @@ def validated(document: TomlDocument, model: type[SectionType], path: Path) -> S
         count = f"{len(errors)} mistakes" if len(errors) < MOST_TOLD else "many mistakes; among them"
         raise joined(f"{path} has {count}", in_order[:MOST_TOLD])
     return settings
+
+
+def _encoder_scales(document: TomlDocument) -> bool:
+    """Whether the file has errors of the encoders' scales, which decides about its other keys too."""
+    robot = document.data.get("robot")
+    return isinstance(robot, dict) and robot.get("encoder_scales") is True
 
 
 def _mechanism(document: TomlDocument) -> str:

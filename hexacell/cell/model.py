@@ -57,8 +57,9 @@ from hexacell.cell.uncertainty import (
     RotaryUncertaintySettings,
     UncertaintySettings,
 )
+from hexacell.kinematics.encoder_scales import WithEncoderScales
 from hexacell.kinematics.mechanism import Mechanism
-from hexacell.kinematics.parameters import JointUnit, ParameterKind, ParameterSet
+from hexacell.kinematics.parameters import LEGS, JointUnit, ParameterKind, ParameterSet
 from hexacell.plugins import Group, load
 
 DEFAULT_MECHANISM = "hexaglide"
@@ -79,6 +80,11 @@ class RobotSettings(Section):
         description="hexaglide, gough-stewart, six-rails, rotary-cranks, or one that a plug-in adds",
     )
     nominal: GeometrySettings = Field(description="the drawing; identification starts from it")
+    encoder_scales: bool = Field(
+        False,
+        description="whether errors of the encoders' scales are identified too: encoder_scale in drawing, "
+        "tolerances and the controller's config, which needs a place for them",
+    )
 
 
 class CellSettings(Section):
@@ -117,7 +123,7 @@ class CellSettings(Section):
     @property
     def mechanism(self) -> Mechanism:
         """The mechanism that the file names; raises ``UsageError`` if it is not installed."""
-        return mechanism_named(self.robot.mechanism)
+        return mechanism_of(self.robot.mechanism, encoder_scales=self.robot.encoder_scales)
 
     @property
     def reference_agreement(self) -> tuple[float, float]:
@@ -264,9 +270,16 @@ def mechanism_named(name: str) -> Mechanism:
 
 
 @cache
-def cell_model(mechanism: str) -> type[CellSettings]:
+def mechanism_of(name: str, *, encoder_scales: bool) -> Mechanism:
+    """The same, with errors of the encoders' scales if these are identified."""
+    named = mechanism_named(name)
+    return WithEncoderScales(named) if encoder_scales else named
+
+
+@cache
+def cell_model(mechanism: str, *, encoder_scales: bool = False) -> type[CellSettings]:
     """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed."""
-    found = mechanism_named(mechanism)
+    found = mechanism_of(mechanism, encoder_scales=encoder_scales)
     parameters = found.parameters
     geometry, tolerances = geometry_settings(parameters), tolerance_settings(parameters)
     has_defaults = not any(field.is_required() for field in tolerances.model_fields.values())
@@ -314,7 +327,8 @@ def _in_unit(mechanism: Mechanism, **sections: type[Section]) -> dict[str, Any]:
 def geometry_settings(parameters: ParameterSet) -> type[GeometrySettings]:
     """The section for a geometry of these parameters."""
     fields: dict[str, Any] = {
-        kind.symbol: (_array_type(kind), Field(description=kind.meaning)) for kind in parameters.kinds
+        kind.symbol: (_array_type(kind), Field(_default(kind), description=kind.meaning))
+        for kind in parameters.kinds
     }
     return _derived(GeometrySettings, **fields)
 
@@ -333,6 +347,10 @@ def tolerance_settings(parameters: ParameterSet) -> type[ToleranceSettings]:
 def _tolerance_field(kind: ParameterKind) -> Any:  # noqa: ANN401 - what pydantic's Field returns
     default = ... if kind.default_tolerance is None else kind.default_tolerance
     return Field(default, description=kind.tolerance_meaning)
+
+
+def _default(kind: ParameterKind) -> Any:  # noqa: ANN401 - what pydantic's Field takes
+    return ... if kind.default is None else (kind.default,) * LEGS
 
 
 def _array_type(kind: ParameterKind) -> Any:  # noqa: ANN401 - a type made here

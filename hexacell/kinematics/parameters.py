@@ -80,10 +80,11 @@ class ParameterKind:
         has_ball_offset: the ball's mounting displaces this kind of all legs by the same vector.
         is_positive: only values above zero are physical.
         default_tolerance: where the cell file states none; without one it must.
+        default: its value where a drawing states none; without one it must.
         part: the part that expands with the temperature, and this kind with it; none if it does not.
 
     Raises:
-        ValueError: the ball's offset needs the components x, y and z.
+        ValueError: the ball's offset needs the components x, y and z, a default none.
     """
 
     symbol: str
@@ -96,8 +97,11 @@ class ParameterKind:
     is_positive: bool = False
     default_tolerance: float | None = None
     part: MachinePart | None = None
+    default: float | None = None
 
     def __post_init__(self) -> None:
+        if self.default is not None and self.components:
+            raise ValueError(f"{self.symbol} has a default, so it must be a single number a leg")
         if self.has_ball_offset and self.components != ("x", "y", "z"):
             raise ValueError(f"{self.symbol} takes the ball's offset, so its components must be x, y, z")
 

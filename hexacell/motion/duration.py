@@ -26,7 +26,7 @@ SHORTEST_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class SpeedLimits:
-    """The largest speeds, mm/s: of any slider, and of the ball and any joint of the platform (its edge)."""
+    """The largest speeds of any joint variable, and of the ball and the platform's joints, its edge."""
 
     joint: float
     edge_mm_s: float

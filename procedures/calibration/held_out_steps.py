@@ -123,7 +123,7 @@ class HeldOutSteps:
     def _back(self, state: RunState, key: SetKey) -> Move | None:
         """The move to the reference after the ball has left the travel; none there, or where none is found.
 
-        The verdict is certain, and the old config is to be restored. Far from level, the slider positions
+        The verdict is certain, and the old config is to be restored. Far from level, the joint variables
         may belong to no pose of the old geometry. One attempt is made.
         """
         measured = state.set(key)

@@ -65,7 +65,7 @@ class LiveValues:
     """The latest values of all devices; ``now`` gives seconds.
 
     Attributes:
-        encoders: the six slider positions.
+        encoders: the six joint variables.
         controller: whether it may move, and its error messages.
         stop_reason: why motion is forbidden; empty while it is not.
     """

@@ -220,7 +220,7 @@ def revert_at_end(state: RunState, error: BaseException) -> Reversal | None:
 
     A result that was not verified is reverted after a failure; a person who interrupts may resume and
     verify it. A provisional geometry is reverted where the robot is at a reference. At other poses the
-    slider positions may belong to no pose of the old geometry; the resumed run reverts it.
+    joint variables may belong to no pose of the old geometry; the resumed run reverts it.
     """
     is_failure = isinstance(error, HexacellError) and not isinstance(error, Interruption)
     if is_failure and state.is_unverified:

@@ -204,7 +204,7 @@ class StepExecutor:
         return await in_thread(self.computations.with_replacements, excluded, state)
 
     def _commanded(self, step: Move) -> Array:
-        """Where the sliders (6,), mm, belong by the geometry that the controller has now."""
+        """The joint variables (6,) of the target by the geometry that the controller has now."""
         commanding, target = self.current_config.geometry(), PoseBatch.of([step.target])
         mechanism = self.calibration.robot.mechanism
         joints: Array = mechanism.inverse(commanding.geometry, commanding.branch, target)[0]

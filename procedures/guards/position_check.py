@@ -29,7 +29,7 @@ from procedures.guards.polling import POLL_PAUSE_S
 from procedures.run.trips import Guard, Trip
 
 ATTEMPTS = 5
-"""Reports are read one after the other, and are read again if a slider moved a little in between."""
+"""Reports are read one after the other, and are read again if a joint moved a little in between."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

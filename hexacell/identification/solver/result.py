@@ -137,10 +137,16 @@ class Identification:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Parameters that the data hardly determine: their sigma is still near the prior's."""
+        """Parameters that the data hardly determine: their sigma is still near the prior's.
+
+        A kind with a default, such as errors of scale, is known well enough beforehand where records say no
+        more.
+        """
+        parameters = self.geometry.parameters
+        is_drawn = np.array([one.kind.default is None for one in parameters.parameters])
         undetermined = self.sigma > UNDETERMINED_RATIO * self.prior_sigma
-        rows = np.flatnonzero(undetermined & (self.prior_sigma > 0.0))
-        return tuple(self.geometry.parameters.names[row] for row in rows)
+        rows = np.flatnonzero(undetermined & is_drawn & (self.prior_sigma > 0.0))
+        return tuple(parameters.names[row] for row in rows)
 
     @property
     def estimate(self) -> GeometryEstimate:

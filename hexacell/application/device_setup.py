@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from drivers.foreign_errors import translated
 from drivers.interfaces import DeviceIdentity
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.stop_input import stop_input_of
@@ -114,18 +115,29 @@ def devices_of(
     """
     gauges = tuple(
         MountedGauge(
-            load(Group.GAUGES, gauge.protocol)(gauge_with_agreement(gauge, settings.noise), links),
+            translated(
+                load(Group.GAUGES, gauge.protocol)(gauge_with_agreement(gauge, settings.noise), links),
+                f"gauge {gauge.name}",
+            ),
             gauge.mounting,
         )
         for gauge in settings.gauges
     )
-    controller = load(Group.CONTROLLERS, settings.controller.protocol)(settings.controller, trace=trace)
+    controller = translated(
+        load(Group.CONTROLLERS, settings.controller.protocol)(settings.controller, trace=trace),
+        "controller",
+    )
     factory = load(Group.ENCODERS, settings.encoders.protocol)
     of_controller = settings.encoders.protocol == CONTROLLER_SCALES
     encoders = factory(
         encoders_with_speed(settings), **({"controller": controller} if of_controller else {"trace": trace})
     )
-    return Devices(gauges, encoders, controller, stop_input_of(settings.guards, folder or Path()))
+    return Devices(
+        gauges,
+        translated(encoders, "encoders"),
+        controller,
+        stop_input_of(settings.guards, folder or Path()),
+    )
 
 
 def gauge_with_agreement(gauge: GaugeSettings, noise: NoiseSettings) -> GaugeSettings:

@@ -40,10 +40,10 @@ async def reconnect(devices: Devices, error: HexacellError, known: Sequence[Devi
     gauges = [mounted for mounted in devices.gauges if _concerns(mounted, errors)]
     await gather_errors("gauges cannot be closed", [mounted.gauge.close() for mounted in gauges])
     found = await gather_errors("gauges cannot be reopened", [mounted.gauge.open() for mounted in gauges])
-    if any(isinstance(one, ENCODER_ERRORS) or _is_silent(one, "encoders") for one in errors):
+    if any(isinstance(one, ENCODER_ERRORS) or _has_failed(one, "encoders") for one in errors):
         await devices.encoders.close()
         found += await devices.encoders.open()
-    if any(isinstance(one, ConnectionLost) or _is_silent(one, "controller") for one in errors):
+    if any(isinstance(one, ConnectionLost) or _has_failed(one, "controller") for one in errors):
         await devices.controller.close()
         found.append(await devices.controller.open())
     require_known(found, known)
@@ -76,11 +76,13 @@ def _differs(then: DeviceIdentity, now: DeviceIdentity) -> bool:
 def _concerns(mounted: MountedGauge, errors: Sequence[HexacellError]) -> bool:
     """Whether an error names the gauge; gauges on one port are named together: ``gauges x, y``."""
     named = [one for one in errors if mounted.gauge.name in _gauge_names(one.subject or "")]
-    return any(isinstance(one, GAUGE_ERRORS) or _is_silent(one, one.subject or "") for one in named)
+    return any(isinstance(one, GAUGE_ERRORS) or _has_failed(one, one.subject or "") for one in named)
 
 
-def _is_silent(error: HexacellError, device: str) -> bool:
-    """Whether a guard tripped because a device did not answer."""
+def _has_failed(error: HexacellError, device: str) -> bool:
+    """Whether a guard tripped because a device did not answer, or its driver has no better word for it."""
+    if type(error) is DeviceError and error.subject == device:
+        return True
     is_stale = isinstance(error, GuardTripped) and error.trip.guard is Guard.STALE
     return is_stale and error.subject == device
 

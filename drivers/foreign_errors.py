@@ -1,0 +1,60 @@
+"""Errors of other libraries, as errors of the device: a driver from elsewhere may let them through."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Awaitable, Callable
+from typing import Any, TypeVar, cast
+
+from hexacell.errors import DeviceError, HexacellError
+
+LIBRARIES = frozenset({"serial", "can", "canopen", "termios", "pyvisa", "pymodbus", "cantools"})
+"""Modules whose exceptions are about a device."""
+
+Device = TypeVar("Device")
+
+
+def translated(device: Device, subject: str) -> Device:
+    """The device, whose coroutines raise a ``DeviceError`` where a library or the system failed.
+
+    An error of any other kind is a fault of the driver, and stays what it is.
+    """
+    return cast("Device", _Translated(device, subject))
+
+
+class _Translated:
+    def __init__(self, device: object, subject: str) -> None:
+        self._device, self._subject = device, subject
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever the device has
+        found = getattr(self._device, name)
+        return self._wrapped(found) if inspect.iscoroutinefunction(found) else found
+
+    def _wrapped(self, call: Callable[..., Awaitable[Any]]) -> Callable[..., Awaitable[Any]]:
+        @functools.wraps(call)
+        async def wrapped(*arguments: Any, **named: Any) -> Any:  # noqa: ANN401
+            try:
+                return await call(*arguments, **named)
+            except HexacellError:
+                raise
+            except Exception as error:
+                if not is_about_a_device(error):
+                    raise
+                raise _device_error(error, self._subject) from error
+
+        return wrapped
+
+
+def is_about_a_device(error: Exception) -> bool:
+    """Whether the system or a library for devices raised it."""
+    module = type(error).__module__.partition(".")[0]
+    return isinstance(error, OSError | EOFError) or module in LIBRARIES
+
+
+def _device_error(error: Exception, subject: str) -> DeviceError:
+    return DeviceError(
+        f"its driver failed: {type(error).__name__}: {error}",
+        subject=subject,
+        action="Check the device and its cable; if they are sound, tell the driver's maker",
+    )

@@ -16,6 +16,7 @@ class Group(Enum):
     """A kind of plug-in: the name of its entry point group, and the word for one plug-in in a message."""
 
     GAUGES = ("hexacell.gauges", "gauge protocol")
+    SIMULATED_GAUGES = ("hexacell.simulated_gauges", "simulated gauge")
     ENCODERS = ("hexacell.encoders", "encoder protocol")
     CONTROLLERS = ("hexacell.controllers", "controller protocol")
     THERMOMETERS = ("hexacell.thermometers", "thermometer protocol")

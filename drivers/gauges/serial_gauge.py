@@ -46,12 +46,14 @@ class SerialGauge(ABC):
 
     Attributes:
         value_request: the request for the displayed value.
+        terminator: ends an answer.
         channel: the input of a shared multiplexer; None if the gauge uses the line alone.
     """
 
     spec: ClassVar[ProtocolSpec]
     normal_modes: ClassVar[frozenset[str]] = frozenset()
     value_request: bytes
+    terminator: bytes = TERMINATOR
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         self.settings = settings
@@ -200,7 +202,7 @@ class SerialGauge(ABC):
     async def _ask(self, request: bytes) -> bytes:
         port = self._open_port()
         try:
-            return await port.exchange(request, TERMINATOR, self.settings.timeout_s)
+            return await port.exchange(request, self.terminator, self.settings.timeout_s)
         except NoAnswer as missing:
             if other_bytes := missing.received.replace(request, b"").strip():
                 raise FrameRejected(other_bytes) from missing

@@ -13,6 +13,9 @@ from drivers.discovery.gauges import PortFindings, search_port
 from drivers.serial.adapters import SerialPortFound, serial_ports
 from hexacell.plugins import Group, load, names
 
+BY_REQUEST = "request"
+"""The protocol that nobody can try who does not know what is asked."""
+
 
 @dataclass(frozen=True)
 class SearchRequest:
@@ -44,7 +47,7 @@ class SearchFindings:
 async def search_devices(request: SearchRequest) -> SearchFindings:
     """Ask at every place, all ports at once; takes some seconds."""
     ports = tuple(SerialPortFound(port, port, "") for port in request.ports) or serial_ports()
-    factories = {name: load(Group.GAUGES, name) for name in names(Group.GAUGES)}
+    factories = {name: load(Group.GAUGES, name) for name in names(Group.GAUGES) if name != BY_REQUEST}
     gauges, controller = await asyncio.gather(
         asyncio.gather(*(search_port(port.port, factories) for port in ports)),
         search_controller(*request.controller),

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, SecretStr, field_validator
+from pydantic import Field, SecretStr, field_validator, model_validator
 
 from hexacell.cell.certificates import CertificateSettings
 from hexacell.cell.fields import InRange, Name, Password, Positive, Section, SixInRange, Text, broken_rule
@@ -47,13 +48,53 @@ class GaugeAxis:
         return self.sign * coordinate_mm
 
 
+NUMBER = re.compile(  # a number as instruments send it
+    r"[+-]?\d+(\.\d*)?"
+)
+
+
+Wire = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[\x00-\xff]*$")]
+"""Text on a line, one byte a character, which may be control characters."""
+
+
+class RequestSettings(Section):
+    """What a gauge of protocol ``request`` is asked, and what it answers."""
+
+    ask: Wire = Field(description="what is sent for a value")
+    answer: Text = Field(
+        min_length=1,
+        description="regular expression of the answer without line ends; group 1: the number",
+    )
+    example: Wire = Field(description="a typical answer, which must match")
+    ends_with: Wire = Field("\r", description="the first line end of an answer")
+    mm_per_unit: Positive = Field(1.0, description="what a unit of the number is, mm: 25.4 for inches")
+    at_end: Wire | None = Field(
+        None, description="regular expression of the answer with the plunger at an end of its travel"
+    )
+
+    @model_validator(mode="after")
+    def _the_example_matches(self) -> RequestSettings:
+        patterns = [self.answer] + ([] if self.at_end is None else [self.at_end])
+        for pattern in patterns:
+            try:
+                re.compile(pattern)
+            except re.error as error:
+                raise broken_rule(f"{pattern!r} is no regular expression: {error}", "Correct it") from error
+        match = re.fullmatch(self.answer, self.example.strip("\r\n"))
+        if match is None or not match.groups() or not NUMBER.fullmatch(match[1].replace(" ", "")):
+            raise broken_rule(
+                "the example is no answer with a number in group 1", "Correct answer or example"
+            )
+        return self
+
+
 class GaugeSettings(Section):
     """One dial indicator."""
 
     name: Name = Field(description="its name on screens and in reports")
     axis: Literal["x", "y", "z"] = Field(description="base axis along which its plunger moves")
     sign: Literal[1, -1] = Field(1, description="1: the reading grows when the ball moves along +axis")
-    protocol: Text = Field(description="sylvac, mux10, cdi, or one that a plug-in adds")
+    protocol: Text = Field(description="sylvac, mux10, cdi, request, or one that a plug-in adds")
     port: Text | None = Field(None, description="device path or pyserial URL; gauges may share one")
     serial: dict[str, Any] = Field(
         default_factory=dict, description="passed to pyserial; overrides the protocol's defaults"
@@ -73,6 +114,7 @@ class GaugeSettings(Section):
         "where its plunger stands",
     )
     serial_number: Text = Field("", description="of the instrument, where it does not tell it itself")
+    request: RequestSettings | None = Field(None, description="of protocol request: what is asked")
     certificate: CertificateSettings | None = Field(None, description="of its calibration")
 
     @property

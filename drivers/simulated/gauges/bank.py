@@ -7,31 +7,41 @@ from contextlib import ExitStack
 from functools import partial
 
 from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
-from drivers.simulated.gauges.instruments import INSTRUMENTS, Instrument
+from drivers.simulated.gauges.instruments import INSTRUMENTS, ByRequest, Instrument
 from drivers.simulated.gauges.line_faults import LATE_TIMEOUTS, LineFault, LineFaults
 from drivers.simulated.gauges.server import GaugeLineServer
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.served_device import Closeable, Switch
-from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.devices import GaugeSettings, RequestSettings
 from hexacell.cell.simulation import FaultKind, SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import FileError
+from hexacell.plugins import Group, load, names
 
 MULTIPLEXED = frozenset({"mux10"})
 
 
-def simulated_instrument(protocol: str, indicators: Mapping[int, Indicator]) -> Instrument:
-    """An instrument with ``protocol``, with ``indicators`` by channel.
+def simulated_instrument(
+    protocol: str, indicators: Mapping[int, Indicator], request: RequestSettings | None = None
+) -> Instrument:
+    """An instrument with ``protocol``, with ``indicators`` by channel; of this program or of a plug-in.
 
     Raises:
         FileError: There is no such simulated instrument.
+        UsageError: A plug-in for it cannot be loaded.
     """
-    if protocol not in INSTRUMENTS:
-        raise FileError(
-            f"no simulated gauge speaks protocol {protocol}",
-            action=f"Choose one of {', '.join(sorted(INSTRUMENTS))}",
-        )
-    return INSTRUMENTS[protocol](indicators)
+    if protocol == "request" and request is not None:
+        return ByRequest(indicators, request)
+    if protocol in INSTRUMENTS:
+        return INSTRUMENTS[protocol](indicators)
+    others = names(Group.SIMULATED_GAUGES)
+    if protocol in others:
+        made: Instrument = load(Group.SIMULATED_GAUGES, protocol)(indicators)
+        return made
+    raise FileError(
+        f"no simulated gauge speaks protocol {protocol}",
+        action=f"Choose one of {', '.join(sorted({*INSTRUMENTS, 'request', *others}))}",
+    )
 
 
 class SimulatedGaugeBank(Closeable):
@@ -100,7 +110,7 @@ class SimulatedGaugeBank(Closeable):
 
     def _serve(self, group: Sequence[GaugeSettings]) -> GaugeLineServer:
         indicators = {_channel(gauge): self.indicators[gauge.name] for gauge in group}
-        instrument = simulated_instrument(group[0].protocol, indicators)
+        instrument = simulated_instrument(group[0].protocol, indicators, group[0].request)
         name = "-".join(gauge.name for gauge in group)
         return GaugeLineServer(
             instrument,

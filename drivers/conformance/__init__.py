@@ -1,0 +1,11 @@
+"""What every gauge's driver must do, as tests: for those that come with the package, and for others.
+
+A package that adds a gauge subclasses :class:`GaugeConformance` in its tests; pytest collects it. It runs
+the driver against a twin of the instrument on a serial line: one that the package brings, or one of
+:func:`served_twin`.
+"""
+
+from drivers.conformance.gauges import GaugeConformance, GaugeTwin
+from drivers.conformance.twins import served_twin
+
+__all__ = ["GaugeConformance", "GaugeTwin", "served_twin"]

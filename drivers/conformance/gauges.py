@@ -1,0 +1,176 @@
+"""The tests that every gauge's driver passes, against a twin of its instrument on a serial line."""
+
+from __future__ import annotations
+
+import asyncio
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AbstractContextManager, asynccontextmanager
+from typing import Any, Protocol
+
+from drivers.interfaces import Gauge
+from drivers.serial.shared_port import SharedSerialPorts
+from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.simulation import FaultKind
+from hexacell.errors import DeviceError
+
+LONGEST_S = 60.0
+"""No call may take longer, whatever the instrument does."""
+
+WORST_LATENCY_S = 0.2
+VALUES_MM = (0.0, 1.5, -2.25, 4.0)
+
+
+class GaugeTwin(Protocol):
+    """A simulated instrument: its address, what it shows, and its faults."""
+
+    @property
+    def settings(self) -> GaugeSettings:
+        """Those of the gauge, with the port on which the twin answers."""
+        ...
+
+    def show(self, mm: float) -> None:
+        """Move the plunger, mm from the middle of its travel."""
+        ...
+
+    def inject(self, fault: FaultKind, *, on: bool) -> None:
+        """Switch ``unplugged``, ``silent`` or ``damaged`` on or off."""
+        ...
+
+
+class GaugeConformance(ABC):
+    """Subclass it in a test file, name it ``Test...``, and say what is tested.
+
+    Attributes:
+        tolerance_mm: by how much a reading may differ from what the twin shows: half its last digit.
+    """
+
+    tolerance_mm: float = 0.00051
+
+    @abstractmethod
+    def driver(self, settings: GaugeSettings, ports: SharedSerialPorts) -> Gauge:
+        """The driver under test."""
+
+    @abstractmethod
+    def twin(self) -> AbstractContextManager[GaugeTwin]:
+        """The instrument, as long as the context lasts."""
+
+    def test_it_is_the_same_whenever_it_is_opened(self) -> None:
+        async def check(gauge: Gauge, _: GaugeTwin) -> None:
+            first = await gauge.open()
+            await gauge.close()
+            assert await gauge.open() == first
+            assert first.name == gauge.name
+
+        self._run(check)
+
+    def test_it_reads_what_the_instrument_shows(self) -> None:
+        async def check(gauge: Gauge, twin: GaugeTwin) -> None:
+            await gauge.open()
+            for mm in VALUES_MM:
+                twin.show(mm)
+                for read in (gauge.read, gauge.read_once):
+                    found = await read()
+                    assert abs(found.value_mm - mm) <= self.tolerance_mm, found
+
+        self._run(check)
+
+    def test_an_unchanged_instrument_passes_the_check(self) -> None:
+        async def check(gauge: Gauge, twin: GaugeTwin) -> None:
+            await gauge.open()
+            await gauge.check()
+            twin.show(1.0)
+            await gauge.check()
+
+        self._run(check)
+
+    def test_closing_twice_is_harmless_and_a_closed_one_names_itself(self) -> None:
+        async def check(gauge: Gauge, _: GaugeTwin) -> None:
+            await gauge.close()
+            await gauge.open()
+            await gauge.close()
+            await gauge.close()
+            for call in (gauge.read, gauge.read_once, gauge.check):
+                self._names_itself(gauge, await _failure(call))
+
+        self._run(check)
+
+    def test_one_that_is_unplugged_fails_and_can_be_opened_again(self) -> None:
+        self._fails_and_comes_back("unplugged")
+
+    def test_one_that_is_silent_fails_and_can_be_opened_again(self) -> None:
+        self._fails_and_comes_back("silent")
+
+    def test_damaged_answers_are_never_read_as_something_else(self) -> None:
+        async def check(gauge: Gauge, twin: GaugeTwin) -> None:
+            twin.show(1.0)
+            await gauge.open()
+            twin.inject("damaged", on=True)
+            for _ in range(20):
+                try:
+                    found = await gauge.read()
+                except DeviceError:
+                    continue
+                assert abs(found.value_mm - 1.0) <= self._agreement_mm(twin), found
+
+        self._run(check)
+
+    def test_a_reading_that_is_given_up_leaves_the_line_in_step(self) -> None:
+        async def check(gauge: Gauge, twin: GaugeTwin) -> None:
+            await gauge.open()
+            for mm in VALUES_MM:
+                given_up = asyncio.create_task(gauge.read_once())
+                await asyncio.sleep(0)
+                given_up.cancel()
+                await asyncio.gather(given_up, return_exceptions=True)
+                twin.show(mm)
+                assert abs((await gauge.read()).value_mm - mm) <= self.tolerance_mm
+
+        self._run(check)
+
+    def _fails_and_comes_back(self, fault: FaultKind) -> None:
+        async def check(gauge: Gauge, twin: GaugeTwin) -> None:
+            await gauge.open()
+            twin.inject(fault, on=True)
+            self._names_itself(gauge, await _failure(gauge.read))
+            self._names_itself(gauge, await _failure(gauge.check))
+            twin.inject(fault, on=False)
+            twin.show(2.0)
+            await gauge.close()
+            await gauge.open()
+            assert abs((await gauge.read()).value_mm - 2.0) <= self.tolerance_mm
+
+        self._run(check)
+
+    def _names_itself(self, gauge: Gauge, error: BaseException | None) -> None:
+        assert isinstance(error, DeviceError), f"{error!r} is no DeviceError"
+        assert gauge.name in (error.subject or ""), f"{error} does not name gauge {gauge.name}"
+
+    def _agreement_mm(self, twin: GaugeTwin) -> float:
+        return (twin.settings.agreement_mm or 0.05) + self.tolerance_mm
+
+    def _run(self, check: Callable[[Gauge, GaugeTwin], Awaitable[None]]) -> None:
+        async def run() -> None:
+            with self.twin() as twin:
+                async with self._opened(twin) as gauge, asyncio.timeout(LONGEST_S):
+                    await check(gauge, twin)
+
+        asyncio.run(run())
+
+    @asynccontextmanager
+    async def _opened(self, twin: GaugeTwin) -> AsyncIterator[Gauge]:
+        ports = SharedSerialPorts(worst_latency_s=WORST_LATENCY_S)
+        gauge = self.driver(twin.settings, ports)
+        try:
+            yield gauge
+        finally:
+            await gauge.close()
+            await ports.close()
+
+
+async def _failure(call: Callable[[], Awaitable[Any]]) -> Exception | None:
+    try:
+        await call()
+    except Exception as error:
+        return error
+    return None

@@ -1,0 +1,49 @@
+"""Our own gauges pass the suite that a driver from elsewhere passes."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from typing import Any
+
+from drivers.conformance import GaugeConformance, GaugeTwin, served_twin
+from drivers.gauges.cdi import CdiGauge
+from drivers.gauges.mux10 import Mux10Gauge
+from drivers.gauges.request import RequestGauge
+from drivers.gauges.sylvac import SylvacGauge
+from drivers.interfaces import Gauge
+from drivers.serial.shared_port import SharedSerialPorts
+from hexacell.cell.devices import GaugeSettings
+from tests.drivers.gauges.test_request import ID_H
+
+
+class OfProtocol(GaugeConformance):
+    """A gauge of this program, and its simulation."""
+
+    protocol: str
+    factory: Any
+    more: dict[str, Any] = {}  # noqa: RUF012 - not changed
+
+    def driver(self, settings: GaugeSettings, ports: SharedSerialPorts) -> Gauge:
+        gauge: Gauge = type(self).factory(settings, ports)
+        return gauge
+
+    def twin(self) -> AbstractContextManager[GaugeTwin]:
+        stated: dict[str, Any] = {"name": "x", "axis": "x", "protocol": self.protocol, "timeout_s": 1.0}
+        return served_twin(GaugeSettings(**stated, **self.more))
+
+
+class TestSylvac(OfProtocol):
+    protocol, factory = "sylvac", SylvacGauge
+
+
+class TestMux10(OfProtocol):
+    protocol, factory = "mux10", Mux10Gauge
+
+
+class TestCdi(OfProtocol):
+    protocol, factory = "cdi", CdiGauge
+
+
+class TestByRequest(OfProtocol):
+    protocol, factory = "request", RequestGauge
+    more = {"request": ID_H}  # noqa: RUF012

@@ -1,0 +1,124 @@
+"""A gauge that is described in the cell file alone, as two makers' instruments speak."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from drivers.errors import GaugeAtEnd, WrongAnswer, WrongSetting
+from drivers.gauges.request import RequestGauge
+from drivers.interfaces import GaugeReading
+from drivers.serial.shared_port import SharedSerialPorts
+from drivers.simulated.gauges.bank import simulated_instrument
+from drivers.simulated.gauges.indicator import Indicator
+from hexacell.cell.devices import GaugeSettings, RequestSettings
+from hexacell.errors import FileError
+
+ID_H = {
+    "ask": "GA01\r\n",
+    "answer": r"GN01,([+-]\d{4}\.\d{4})",
+    "example": "GN01,+0016.2345\r\n",
+    "at_end": r"GA01,ER\d",
+}
+"""Mitutoyo ID-H, as its manual has the commands."""
+
+AMPLIFIER = {
+    "ask": "M0\r\n",
+    "answer": r"M0,([+-]\d{8})",
+    "example": "M0,+00012345\r\n",
+    "ends_with": "\n",
+    "mm_per_unit": 0.0001,
+}
+"""An amplifier that counts tenths of a micrometre."""
+
+
+@pytest.fixture
+async def gauge(links, settings):
+    gauge = RequestGauge(settings("request", request=ID_H), links)
+    yield gauge
+    await gauge.close()
+
+
+async def test_it_is_asked_and_understood_as_described(dialogue, gauge):
+    dialogue.expect(*[(b"GA01\r\n", b"GN01,+0016.2345\r\n")] * 3)
+    assert (await gauge.open()).description == "gauge by request"
+    assert await gauge.read() == GaugeReading(16.2345, "GN01,+0016.2345")
+    assert dialogue.settings["baudrate"] == 9600
+
+
+async def test_a_number_without_a_point_is_counted_in_its_unit(dialogue, links, settings):
+    gauge = RequestGauge(settings("request", request=AMPLIFIER, resolution_mm=0.0001), links)
+    dialogue.expect(*[(b"M0\r\n", b"M0,-00012345\r\n")] * 4)
+    await gauge.open()
+    assert (await gauge.read()).value_mm == pytest.approx(-1.2345)
+    await gauge.close()
+
+
+async def test_an_end_of_its_travel_is_told(dialogue, gauge):
+    dialogue.expect(*[(b"GA01\r\n", b"GA01,ER2\r\n")] * 2)
+    await gauge.open()
+    with pytest.raises(GaugeAtEnd, match=r"gauge y: plunger at its end \(GA01,ER2\)"):
+        await gauge.read()
+
+
+async def test_other_decimals_are_another_unit(dialogue, links, settings):
+    loose = ID_H | {"answer": r"GN01,([+-][\d.]+)"}
+    gauge = RequestGauge(settings("request", request=loose), links)
+    dialogue.expect(*[(b"GA01\r\n", b"GN01,+0016.2345\r\n")] * 3)
+    await gauge.open()
+    await gauge.read()
+    dialogue.expect(*[(b"GA01\r\n", b"GN01,+016.23451\r\n")] * 3)
+    with pytest.raises(WrongSetting, match="shows 5 decimals"):
+        await gauge.read()
+    await gauge.close()
+
+
+@pytest.mark.parametrize("answer", [b"GN02,+0016.2345\r\n", b"GN01,+0016,2345\r\n", b"GN01,\r\n"])
+async def test_anything_else_is_asked_for_again_and_then_quoted(dialogue, gauge, answer):
+    dialogue.expect(*[(b"GA01\r\n", answer)] * 3)
+    with pytest.raises(WrongAnswer, match=r"where protocol request has answers like 'GN01,\+0016.2345"):
+        await gauge.open()
+
+
+async def test_a_pattern_that_takes_anything_takes_numbers_only(dialogue, links, settings):
+    gauge = RequestGauge(
+        settings("request", request=ID_H | {"answer": "(.*)", "example": "1.0\r\n"}), links
+    )
+    dialogue.expect(*[(b"GA01\r\n", b"error\r\n")] * 3)
+    with pytest.raises(WrongAnswer, match="error"):
+        await gauge.open()
+
+
+async def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file(links, settings):
+    with pytest.raises(FileError, match="gauge y: does not say what is asked and answered"):
+        RequestGauge(settings("request"), links)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"answer": r"GN01,([+-]\d{4}"},
+        {"answer": r"GN01,[+-]\d{4}\.\d{4}"},
+        {"answer": r"(GN01),[+-]\d{4}\.\d{4}"},
+        {"example": "GN01,16\r\n"},
+        {"at_end": "("},
+        {"mm_per_unit": 0.0},
+    ],
+)
+def test_descriptions_that_cannot_be_are_refused(change):
+    with pytest.raises(ValidationError):
+        RequestSettings(**ID_H | change)
+
+
+@given(st.floats(-6.0, 6.0), st.sampled_from([ID_H, AMPLIFIER]))
+def test_what_the_simulated_gauge_answers_is_understood(value, description):
+    request = RequestSettings(**description)
+    twin = simulated_instrument("request", {1: Indicator(lambda: value)}, request)
+    settings = GaugeSettings(name="x", axis="x", protocol="request", port="wire", request=request)
+    shown = RequestGauge(settings, SharedSerialPorts())._parse_value(
+        twin.answer(request.ask.rstrip("\r\n").encode())
+    )
+    assert shown.value == pytest.approx(value, abs=0.51e-4)
+    assert shown.decimals == 4

@@ -22,7 +22,7 @@ QUICK = (
     ("orientations = 11", "orientations = 7"),
     ("platform_cone_deg = 45.0", "platform_cone_deg = 90.0"),
     ("orientations = 6", "orientations = 2"),
-    ("position_mm = 0.25 ", "position_mm = 20.0"),
+    ("position_mm = 0.3 ", "position_mm = 20.0"),
     ("orientation_deg = 0.08", "orientation_deg = 5.0"),
     # Each test of the model fails one healthy run in a thousand, and the suite has hundreds of runs.
     ("encoder_mm = 0.01\ngauge_mm = 0.01", "encoder_mm = 0.014\ngauge_mm = 0.014"),

@@ -39,8 +39,8 @@ ROBOTS = int(os.environ.get("ROBOTS", "100"))
 class Outcome:
     """What came of a robot.
 
-    ``stands``: whether it can, at all points. ``reason``: where no result was verified, or a test of the
-    model failed.
+    ``stands``: whether it can, at all points. ``reason``: where no result was verified, a test of the model
+    failed, or the orientation does not pass.
     """
 
     number: int
@@ -83,6 +83,9 @@ def outcome(number: int) -> Outcome:
     belief = after.belief(found)
     task = Task.of(cell.settings, after, belief).reachable(belief)
     errors = World(after, truth, Effect(), 0).errors(found.geometry, task.poses, task.workspace)
+    turned = accuracy.orientation
+    if not failures and turned.verdict is not Verdict.PASS:
+        failures = f"orientation {turned.value:.3f} +- {turned.expanded:.3f} deg"
     return Outcome(
         number,
         stands,

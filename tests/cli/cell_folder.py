@@ -20,7 +20,7 @@ QUICK = (
     ("give_up_s = 60.0", "give_up_s = 6000.0"),
     ("orientations = 11", "orientations = 7"),
     ("orientations = 6", "orientations = 2"),
-    ("position_mm = 0.25 ", "position_mm = 20.0"),
+    ("position_mm = 0.3 ", "position_mm = 20.0"),
     ("orientation_deg = 0.08", "orientation_deg = 5.0"),
     # Large rotations: few records identify it.
     ("turn_deg = 60.0", "turn_deg = 180.0"),

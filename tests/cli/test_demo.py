@@ -80,7 +80,7 @@ def test_the_demo_prints_the_deviation_before_and_after(demo):
     match = re.fullmatch(
         r"35 parameters, 5[0-5] records at 5 points; mean deviation at held-out poses "
         r"(\d+\.\d+) -> (\d+\.\d+) mm; "
-        r"position error at the task poses 0\.\d{3} \+- 0\.\d{3} mm \(limit 0\.25\): pass",
+        r"position error at the task poses 0\.\d{3} \+- 0\.\d{3} mm \(limit 0\.3\): pass",
         line,
     )
     assert match, line

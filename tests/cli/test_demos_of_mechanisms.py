@@ -33,7 +33,7 @@ def test_it_passes_and_falls_by_more_than_95_percent(demo: Demo) -> None:
     match = re.fullmatch(
         r"(\d+) parameters, \d\d records at [568] points; mean deviation at held-out poses "
         r"(\d+\.\d+) -> (\d+\.\d+) mm; "
-        r"position error at the task poses (0\.\d{3}) \+- (0\.\d{3}) mm \(limit 0\.25\): pass",
+        r"position error at the task poses (0\.\d{3}) \+- (0\.\d{3}) mm \(limit 0\.3\): pass",
         line,
     )
     assert match, line

@@ -83,7 +83,7 @@ def test_a_cell_that_cannot_be_calibrated_is_refused_with_the_reason(
 
 
 WIDE = (
-    ("position_mm = 0.25 ", "position_mm = 20.0 "),
+    ("position_mm = 0.3 ", "position_mm = 20.0 "),
     ("orientation_deg = 0.08 ", "orientation_deg = 5.0 "),
 )
 """Limits that any robot of the cell passes."""
@@ -93,7 +93,7 @@ WIDE = (
 def test_limits_that_a_good_machine_fails_are_warned_of(typed_here: Any, cell_folder: Any) -> None:
     cell_folder.edit(
         ("orientations = 11", "orientations = 7"),
-        ("position_mm = 0.25 ", "position_mm = 0.05 "),
+        ("position_mm = 0.3 ", "position_mm = 0.05 "),
         ('grade = "ideal"', 'grade = "ideal"\nload_n = 400.0\nleg_compliance_um_n = 0.1'),
     )
     outcome = typed_here("preflight", cell_folder.cell)

@@ -113,7 +113,7 @@ class TestUnattendedRun:
         assert fast_cell.controller.read_bytes() == config
 
     def test_a_result_out_of_limits_is_rolled_back_bit_for_bit(self, typed_here, fast_cell, demo):
-        fast_cell.edit(("position_mm = 0.25 ", "position_mm = 0.0001 "))
+        fast_cell.edit(("position_mm = 0.3 ", "position_mm = 0.0001 "))
         run = fast_cell.rewound(demo.run, before="propose")
         config = fast_cell.controller.read_bytes()
         outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json")
@@ -161,7 +161,7 @@ class TestUnattendedRun:
         document = outcome.document
         assert re.fullmatch(
             r"check: \d+ records at 2 points; position error at the task poses "
-            r"\d+\.\d{3} \+- \d+\.\d{3} mm \(limit 0\.25, guard band 1\.5 U\): fail",
+            r"\d+\.\d{3} \+- \d+\.\d{3} mm \(limit 0\.3, guard band 1\.5 U\): fail",
             document["line"],
         )
         assert document["verdict"] == document["check"]["verdict"] == "fail"

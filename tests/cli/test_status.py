@@ -61,7 +61,7 @@ def test_metrics_are_those_of_the_latest_verdict(typed_here, demo, calibrated, t
     found = samples(target)
     accuracy = demo.outcome.document["verification"]["accuracy"]["position"]
     assert found[("position_error_mm",)] == accuracy["value"]
-    assert found[("position_limit_mm",)] == 0.25
+    assert found[("position_limit_mm",)] == 0.3
     assert (found[("last_verdict", "pass")], found[("last_verdict", "fail")]) == (1.0, 0.0)
     assert found[("last_run_passed",)] == 1.0
     assert found[("last_pass_timestamp_seconds",)] == found[("last_run_timestamp_seconds",)] > 1.7e9
@@ -134,7 +134,7 @@ def test_a_broken_cell_hides_no_other(typed_here, cell_folder, tmp_path, mistake
         text = cell_folder.cell.read_text()
         broken.write_text(text.replace("[robot]", "[robot", 1) if mistake == "no TOML" else text)
     if mistake == "a value":
-        broken.write_text(broken.read_text().replace("position_mm = 0.25", 'position_mm = "wide"', 1))
+        broken.write_text(broken.read_text().replace("position_mm = 0.3 ", 'position_mm = "wide"', 1))
     outcome = typed_here("status", broken, cell_folder.cell, "--json", "--metrics", target)
     assert outcome.code == 2
     assert [one["name"] for one in outcome.document["cells"]] == ["simulated-hexaglide"]

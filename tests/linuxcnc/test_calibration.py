@@ -145,7 +145,7 @@ def shorten(machine: LinuxCNC) -> None:
     for old, new in (
         ("orientations = 11", "orientations = 7"),
         ("orientations = 6", "orientations = 3"),
-        ("position_mm = 0.25", "position_mm = 0.5"),
+        ("position_mm = 0.3 ", "position_mm = 0.5 "),
         ("orientation_deg = 0.08", "orientation_deg = 0.2"),
     ):
         assert text.count(old) == 1

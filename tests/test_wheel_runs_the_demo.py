@@ -93,7 +93,7 @@ print(json.dumps({"path": sys.path, "files": files, "plugins": plugins}))
     installed = site_packages(elsewhere)
     assert all(installed in Path(path).parents for path in found["files"])
     assert CHECKOUT not in {(tmp_path / path).resolve() for path in found["path"]}
-    assert found["plugins"]["hexacell.gauges"] == ["cdi", "mux10", "sylvac"]
+    assert found["plugins"]["hexacell.gauges"] == ["cdi", "mux10", "request", "sylvac"]
     assert all(found["plugins"].values())
 
 

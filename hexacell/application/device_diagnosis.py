@@ -45,7 +45,7 @@ class SeriesFigures:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class DeviceDiagnosis:
     """What was seen of a device.
 
     Attributes:
@@ -68,7 +68,7 @@ class Diagnosis:
         return bool(self.readings) and not self.problem
 
 
-async def diagnose(cell: Cell, device: str, seconds: float) -> Diagnosis:
+async def diagnose(cell: Cell, device: str, seconds: float) -> DeviceDiagnosis:
     """Watch a gauge, by its name, or ``encoders``.
 
     Raises:
@@ -98,7 +98,7 @@ async def _devices(settings: CellSettings) -> AsyncIterator[Devices]:
         await shielded(links.close())
 
 
-async def _watch_gauge(gauge: Gauge, settings: CellSettings, seconds: float) -> Diagnosis:
+async def _watch_gauge(gauge: Gauge, settings: CellSettings, seconds: float) -> DeviceDiagnosis:
     async def read() -> tuple[float, ...]:
         return ((await gauge.read_once()).value_mm,)
 
@@ -109,7 +109,7 @@ async def _watch_gauge(gauge: Gauge, settings: CellSettings, seconds: float) -> 
     finally:
         await gauge.close()
     figures = _figures(watched.values, [f"gauge {gauge.name}"], "mm")
-    return Diagnosis(
+    return DeviceDiagnosis(
         gauge.name,
         (identity,),
         watched.seconds,
@@ -121,7 +121,7 @@ async def _watch_gauge(gauge: Gauge, settings: CellSettings, seconds: float) -> 
     )
 
 
-async def _watch_encoders(devices: Devices, settings: CellSettings, seconds: float) -> Diagnosis:
+async def _watch_encoders(devices: Devices, settings: CellSettings, seconds: float) -> DeviceDiagnosis:
     async def read() -> tuple[float, ...]:
         return (await devices.encoders.read()).positions
 
@@ -131,7 +131,7 @@ async def _watch_encoders(devices: Devices, settings: CellSettings, seconds: flo
     finally:
         await devices.encoders.close()
     names = [f"encoder {leg}" for leg in range(1, 7)]
-    return Diagnosis(
+    return DeviceDiagnosis(
         ENCODERS,
         identities,
         watched.seconds,

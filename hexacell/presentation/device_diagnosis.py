@@ -6,19 +6,19 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from hexacell.application.device_diagnosis import Diagnosis, SeriesFigures
+from hexacell.application.device_diagnosis import DeviceDiagnosis, SeriesFigures
 from hexacell.presentation.planning import device_line
 
 NOISY = 3.0
 """A scatter of so many times what the cell file states is told."""
 
 
-def diagnosis_document(found: Diagnosis) -> dict[str, Any]:
+def diagnosis_document(found: DeviceDiagnosis) -> dict[str, Any]:
     """All figures."""
     return {**asdict(found), "is_usable": found.is_usable}
 
 
-def diagnosis_lines(found: Diagnosis) -> Iterator[str]:
+def diagnosis_lines(found: DeviceDiagnosis) -> Iterator[str]:
     """The figures in words, then what is wrong."""
     for identity in found.identities:
         yield device_line(identity)
@@ -37,7 +37,7 @@ def _series_line(series: SeriesFigures) -> str:
     return f"{series.name}: {span}, {series.distinct} distinct values{scatter}"
 
 
-def _meaning(found: Diagnosis) -> Iterator[str]:
+def _meaning(found: DeviceDiagnosis) -> Iterator[str]:
     if found.problem:
         yield f"It cannot be used like this: {found.problem}"
     if found.failures:

@@ -27,6 +27,12 @@ class _Translated:
     def __init__(self, device: object, subject: str) -> None:
         self._device, self._subject = device, subject
 
+    def __getattribute__(self, name: str) -> Any:  # noqa: ANN401
+        """Its class is the device's own: whoever asks what it is learns that."""
+        if name == "__class__":
+            return type(object.__getattribute__(self, "_device"))
+        return object.__getattribute__(self, name)
+
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever the device has
         found = getattr(self._device, name)
         return self._wrapped(found) if inspect.iscoroutinefunction(found) else found

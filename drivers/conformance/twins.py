@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-from drivers.simulated.gauges.bank import SimulatedGaugeBank
+from drivers.simulated.gauges.bank import InstrumentFactory, SimulatedGaugeBank
 from drivers.simulated.served_device import Switch
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import FaultKind, SimulatedGauges
@@ -18,13 +18,15 @@ QUICKER = 100.0
 class ServedTwin:
     """One gauge of the simulation; it shows what it is told to."""
 
-    def __init__(self, settings: GaugeSettings) -> None:
+    def __init__(self, settings: GaugeSettings, instrument: InstrumentFactory | None) -> None:
         self._mm = 0.0
+        others = {} if instrument is None else {settings.protocol: instrument}
         self._bank = SimulatedGaugeBank(
             [settings],
             {settings.name: lambda: self._mm},
             SimulatedGauges(flicker_mm=0.0),
             CellClock(QUICKER),
+            others,
         )
         [self.settings] = self._bank.gauges
 
@@ -47,9 +49,11 @@ class ServedTwin:
 
 
 @contextmanager
-def served_twin(settings: GaugeSettings) -> Iterator[ServedTwin]:
-    """Serve the simulated gauge of a protocol, of this program or of a plug-in, on a pseudo-terminal."""
-    twin = ServedTwin(settings)
+def served_twin(
+    settings: GaugeSettings, instrument: InstrumentFactory | None = None
+) -> Iterator[ServedTwin]:
+    """Serve a simulated gauge on a pseudo-terminal: an instrument of one's own, or that of the protocol."""
+    twin = ServedTwin(settings, instrument)
     try:
         yield twin
     finally:

@@ -276,9 +276,16 @@ def mechanism_of(name: str, *, encoder_scales: bool) -> Mechanism:
     return WithEncoderScales(named) if encoder_scales else named
 
 
-@cache
 def cell_model(mechanism: str, *, encoder_scales: bool = False) -> type[CellSettings]:
-    """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed."""
+    """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed.
+
+    Each has one model only, however it is asked for: settings of two would never be equal.
+    """
+    return _cell_model(mechanism, encoder_scales)
+
+
+@cache
+def _cell_model(mechanism: str, encoder_scales: bool) -> type[CellSettings]:
     found = mechanism_of(mechanism, encoder_scales=encoder_scales)
     parameters = found.parameters
     geometry, tolerances = geometry_settings(parameters), tolerance_settings(parameters)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 
@@ -19,6 +19,10 @@ from hexacell.errors import FileError
 from hexacell.plugins import Group, load, names
 
 MULTIPLEXED = frozenset({"mux10"})
+
+
+InstrumentFactory = Callable[[Mapping[int, Indicator]], Instrument]
+"""Makes an instrument of its indicators by channel."""
 
 
 def simulated_instrument(
@@ -45,7 +49,7 @@ def simulated_instrument(
 
 
 class SimulatedGaugeBank(Closeable):
-    """The gauges of a simulated cell; serves until it is closed.
+    """The gauges of a simulated cell; serves until it is closed. ``instruments``: others, by protocol.
 
     ``plungers`` gives the plunger position of each gauge by its name: mm from the middle of the
     travel, in the instrument's own direction, with noise; called from the threads of the lines.
@@ -60,7 +64,9 @@ class SimulatedGaugeBank(Closeable):
         plungers: Mapping[str, PlungerPosition],
         settings: SimulatedGauges,
         clock: CellClock,
+        instruments: Mapping[str, InstrumentFactory] | None = None,
     ) -> None:
+        self._instruments = instruments or {}
         self.indicators = {gauge.name: Indicator(plungers[gauge.name], gauge.travel_mm) for gauge in gauges}
         self._settings = settings
         self._clock = clock
@@ -110,7 +116,11 @@ class SimulatedGaugeBank(Closeable):
 
     def _serve(self, group: Sequence[GaugeSettings]) -> GaugeLineServer:
         indicators = {_channel(gauge): self.indicators[gauge.name] for gauge in group}
-        instrument = simulated_instrument(group[0].protocol, indicators, group[0].request)
+        first = group[0]
+        own = self._instruments.get(first.protocol)
+        instrument = (
+            own(indicators) if own else simulated_instrument(first.protocol, indicators, first.request)
+        )
         name = "-".join(gauge.name for gauge in group)
         return GaugeLineServer(
             instrument,

@@ -1,8 +1,9 @@
-"""The gauge passes what every gauge must: the whole test of such a package, once it is installed."""
+"""The gauge passes what every gauge must: the whole test of such a package."""
 
 from contextlib import AbstractContextManager
 
 from hexacell_counter import CounterGauge
+from hexacell_counter_twin import Counter
 
 from drivers.conformance import GaugeConformance, GaugeTwin, served_twin
 from drivers.interfaces import Gauge
@@ -18,4 +19,5 @@ class TestCounter(GaugeConformance):
         return gauge
 
     def twin(self) -> AbstractContextManager[GaugeTwin]:
-        return served_twin(GaugeSettings(name="x", axis="x", protocol="counter", timeout_s=1.0))
+        settings = GaugeSettings(name="x", axis="x", protocol="counter", timeout_s=1.0)
+        return served_twin(settings, Counter)

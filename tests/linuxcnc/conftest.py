@@ -15,6 +15,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -161,19 +162,27 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 
 @pytest.fixture
-def linuxcnc(installed: None, tmp_path: Path) -> Iterator[LinuxCNC]:
+def linuxcnc(installed: None, folder_of_nobody: Path) -> Iterator[LinuxCNC]:
     """A copy of the Hexaglide's configuration; it is running."""
-    yield from _running("hexaglide", tmp_path)
+    yield from _running("hexaglide", folder_of_nobody)
 
 
 @pytest.fixture
-def hexapod(installed: None, tmp_path: Path) -> Iterator[LinuxCNC]:
+def hexapod(installed: None, folder_of_nobody: Path) -> Iterator[LinuxCNC]:
     """A copy of the stock hexapod's configuration; it is running."""
-    yield from _running("hexapod", tmp_path)
+    yield from _running("hexapod", folder_of_nobody)
 
 
-def _running(machine: str, tmp_path: Path) -> Iterator[LinuxCNC]:
-    folder = tmp_path / f"linuxcnc-{machine}"
+@pytest.fixture
+def folder_of_nobody() -> Iterator[Path]:
+    """LinuxCNC of root runs as nobody, from whom another pytest that begins takes all folders of pytest."""
+    with TemporaryDirectory(prefix="hexacell-linuxcnc-") as folder:
+        Path(folder).chmod(0o777)
+        yield Path(folder)
+
+
+def _running(machine: str, place: Path) -> Iterator[LinuxCNC]:
+    folder = place / f"linuxcnc-{machine}"
     shutil.copytree(CONFIGURATIONS / folder.name, folder)
     port = _free_port()
     for name, pattern in ((f"{machine}.ini", r"--port \d+"), ("cell.toml", r"port = \d+")):
@@ -181,11 +190,8 @@ def _running(machine: str, tmp_path: Path) -> Iterator[LinuxCNC]:
         words = re.search(pattern, text)
         assert words is not None
         (folder / name).write_text(text.replace(words[0], f"{words[0].rsplit(maxsplit=1)[0]} {port}"))
-    for path in (tmp_path, folder, *folder.iterdir()):  # LinuxCNC of root runs as nobody
+    for path in (folder, *folder.iterdir()):
         path.chmod(path.stat().st_mode | 0o777)
-    for parent in tmp_path.parents:
-        with suppress(PermissionError):
-            parent.chmod(parent.stat().st_mode | 0o011)
     running = LinuxCNC(folder, f"{machine}.ini", port)
     running.start()
     yield running

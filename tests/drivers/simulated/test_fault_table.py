@@ -97,7 +97,7 @@ async def gauge_row(protocol: str, fault: FaultKind) -> Row:
 
 
 async def encoder_row(fault: FaultKind) -> Row:
-    settings = LinearEncoderSettings(timeout_s=1.0, heartbeat_ms=200, largest_speed_mm_s=1000.0)
+    settings = LinearEncoderSettings(timeout_s=1.0, heartbeat_ms=5000, largest_speed_mm_s=1000.0)
     at = [0.0]
     simulated = SimulatedEncoderBank(settings, lambda: at * 6, CellClock(1.0))
     bank = Cia406Bank(settings.model_copy(update={"bus": simulated.bus_settings}))

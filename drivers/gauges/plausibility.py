@@ -30,6 +30,8 @@ class DisplayHistory:
     """
 
     def __init__(self, settings: GaugeSettings) -> None:
+        zeros = 1.0 if settings.middle_mm is not None else 2.0  # its zero key may be pressed at either end
+        self._span_mm = TRAVEL_MARGIN * zeros * settings.travel_mm
         self._travel_mm = settings.travel_mm
         self._stated = settings.resolution_mm
         self._decimals = None if self._stated is None else decimals_of(self._stated)
@@ -62,16 +64,22 @@ class DisplayHistory:
     def beyond_travel(self, shown: DisplayedValue) -> str | None:
         """Why a value is farther from the others than the plunger travels, in words; none if it is not."""
         lowest, highest = self._extended(shown)
-        if highest - lowest <= TRAVEL_MARGIN * self._travel_mm:
+        if highest - lowest <= self._span_mm:
             return None
         return (
             f"shows {shown.text}, and values {highest - lowest:.3f} mm apart do not fit into its travel of "
             f"{self._travel_mm:g} mm"
         )
 
-    def add(self, shown: DisplayedValue) -> None:
-        """Take a value that is possible as one that was shown."""
+    def keep_decimals(self, shown: DisplayedValue) -> None:
+        """Hold all values to come to the decimals of this one."""
         self._decimals = shown.decimals
+
+    def add(self, shown: DisplayedValue) -> None:
+        """Take a value as one that was shown, as a second reading agreed with it.
+
+        A single one may be damaged, and would make right ones impossible.
+        """
         self._range = self._extended(shown)
 
     def _extended(self, shown: DisplayedValue) -> tuple[float, float]:

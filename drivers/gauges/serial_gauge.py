@@ -117,6 +117,7 @@ class SerialGauge(ABC):
             readings.append(await self._read_value())
             is_in_step = self._open_port().surplus_count == surplus
             if is_in_step and self._history.agree(*readings[-2:]):
+                self._history.add(readings[-1])
                 return _reading(readings[-1])
         raise GaugeUnsteady(
             f"readings do not agree{self._history.limit}: {', '.join(one.text for one in readings)}",
@@ -185,7 +186,7 @@ class SerialGauge(ABC):
             raise ImplausibleValue(frame, self._wrong_setting(reason, OTHER_DECIMALS))
         if reason := self._history.beyond_travel(shown):
             raise ImplausibleValue(frame, WrongAnswer(reason, subject=self.subject, action=BEYOND_TRAVEL))
-        self._history.add(shown)
+        self._history.keep_decimals(shown)
         return shown
 
     async def _query(self, request: bytes, parse: Callable[[bytes], Parsed]) -> Parsed:

@@ -83,8 +83,8 @@ async def diagnose(cell: Cell, device: str, seconds: float) -> DeviceDiagnosis:
         async with _devices(settings) as devices:
             if device == ENCODERS:
                 return await _watch_encoders(devices, settings, seconds)
-            [gauge] = [one.gauge for one in devices.gauges if one.gauge.name == device]
-            return await _watch_gauge(gauge, settings, seconds)
+            [mounted] = [one for one in devices.gauges if one.gauge.name == device]
+            return await _watch_gauge(mounted.gauge, settings.noise.gauge_at(mounted.axis.index), seconds)
 
 
 @asynccontextmanager
@@ -98,7 +98,7 @@ async def _devices(settings: CellSettings) -> AsyncIterator[Devices]:
         await shielded(links.close())
 
 
-async def _watch_gauge(gauge: Gauge, settings: CellSettings, seconds: float) -> DeviceDiagnosis:
+async def _watch_gauge(gauge: Gauge, stated_mm: float, seconds: float) -> DeviceDiagnosis:
     async def read() -> tuple[float, ...]:
         return ((await gauge.read_once()).value_mm,)
 
@@ -117,7 +117,7 @@ async def _watch_gauge(gauge: Gauge, settings: CellSettings, seconds: float) -> 
         figures,
         dict(watched.failures),
         problem,
-        settings.noise.gauge_mm,
+        stated_mm,
     )
 
 

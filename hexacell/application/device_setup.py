@@ -148,8 +148,7 @@ def gauge_with_agreement(gauge: GaugeSettings, noise: NoiseSettings) -> GaugeSet
     """
     if gauge.agreement_mm is not None:
         return gauge
-    index = gauge.mounting.index
-    sigma_mm = noise.gauge_mm if noise.gauges_mm is None else noise.gauges_mm[index]
+    sigma_mm = noise.gauge_at(gauge.mounting.index)
     least_mm = AGREEMENT_STEPS * (gauge.resolution_mm or USUAL_RESOLUTION_MM)
     return gauge.model_copy(update={"agreement_mm": max(AGREEMENT_SIGMAS * sigma_mm, least_mm)})
 

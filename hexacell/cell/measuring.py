@@ -244,6 +244,10 @@ class NoiseSettings(Section):
         1, ge=1, le=16, description="most settled windows that a record may be the mean of, if it pays"
     )
 
+    def gauge_at(self, index: int) -> float:
+        """Of the readings of gauge x, y or z, index 0 to 2, mm."""
+        return self.gauge_mm if self.gauges_mm is None else self.gauges_mm[index]
+
     @model_validator(mode="after")
     def _series_are_long_enough(self) -> Self:
         if 0 < self.standstill_readings < FEWEST_STANDSTILL_READINGS:

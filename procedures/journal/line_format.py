@@ -23,7 +23,7 @@ from hexacell.cell.fields import first_mistake
 from hexacell.errors import FileError
 from procedures.run.events import Event
 
-VERSION = 12
+VERSION = 13
 """What this program writes; it reads this and all before. Version 1 had neither version nor ``s``, and
 versions 1 and 2 no verification; checks of version 3 measured held-out points; up to version 5 no noise was
 measured. Versions up to 6 had no length check. Up to 8 only the controller's pose was read where the robot
@@ -31,7 +31,9 @@ was located, its guard tripped on an emergency stop, gauges were not tried, the 
 did not count, the minutes of a forecast knew no durations of moves, and commands kept fewer limits. Up to
 9 there was no quick level, a narrow failure of a test of the model ended the run, and a calibrated
 controller got a provisional geometry too. In version 10 a pass kept U from its limit where the cell file
-said nothing else, and now keeps 1.5 U. So a run of them was decided by other rules."""
+said nothing else, and now keeps 1.5 U. So a run of them was decided by other rules.
+Up to 12 a record was the plain mean of its readings; neither limits of the controller's files nor settings
+and ports of devices were kept."""
 
 RULES_SINCE = 11
 """The version since which runs are decided by the present rules; older ones are not resumed."""

@@ -33,6 +33,9 @@ QUICK = (
     ("encoder_mm = 0.01\ngauge_mm = 0.01", "encoder_mm = 0.014\ngauge_mm = 0.014"),
 )
 
+ASK = ('approval = "automatic"', 'approval = "ask"')
+BY_HAND = ('placement = "fixed"', 'placement = "by-hand"')
+
 # A busy machine may leave a simulated device waiting longer than a real one ever takes.
 PATIENT = (
     *(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import pty
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
@@ -19,6 +20,7 @@ from procedures.journal.journal import read_journal
 from procedures.run import events
 from tests.cli.cell_folder import QUICK, SHORT, CellFolder, copy_cell
 from tests.cli.commands import Outcome, Start, run_command, started_in
+from tests.cli.terminal import Terminal
 
 
 @pytest.fixture
@@ -140,3 +142,18 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Demo:
             folder.mkdir()
             kept.write_text(json.dumps(asdict(run_command(folder, "demo", "--json"))))
     return Demo(Outcome(**json.loads(kept.read_text())), folder / "hexacell-demo")
+
+
+@pytest.fixture
+def lines_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands find a terminal that cannot move its cursor."""
+    monkeypatch.setenv("TERM", "dumb")
+
+
+@pytest.fixture
+def terminal() -> Iterator[Terminal]:
+    """One to type at."""
+    master, slave = pty.openpty()
+    yield Terminal(master, slave)
+    os.close(master)
+    os.close(slave)

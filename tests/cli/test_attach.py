@@ -12,8 +12,9 @@ import pytest
 from hexacell.cell.loader import load_cell
 from procedures.journal.journal import read_journal
 from procedures.run import events
+from tests.cli.cell_folder import BY_HAND
+from tests.cli.terminal import Terminal, ended, start_at
 from tests.cli.test_host import nothing_is_left
-from tests.cli.test_run_answers import BY_HAND, Terminal, ended, start_at
 from tests.waiting import wait_until
 
 PLACED = "Press Enter when they are in place, or type a to abort: "

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import pty
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -12,7 +10,7 @@ import pytest
 from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.loader import load_cell
 from hexacell.robot_model import config_format
-from tests.cli.test_run_answers import Terminal, ended
+from tests.cli.terminal import ended
 from tests.hexacell.application.proposed_runs import MET, propose_run
 from tests.hexacell.controller_config.test_keyed_formats import write_hal, write_ini
 
@@ -67,14 +65,6 @@ def cell(cell_folder, request):
     stated = f'config_format = "{request.param}"\nconfig_options = {found.options}'
     native.path.write_text(text.replace('config_format = "toml"', stated))
     return load_cell(native.path)
-
-
-@pytest.fixture
-def terminal():
-    master, slave = pty.openpty()
-    yield Terminal(master, slave)
-    os.close(master)
-    os.close(slave)
 
 
 def test_applied_and_undone(cell, typed_here) -> None:

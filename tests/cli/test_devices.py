@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pty
 import tomllib
 from pathlib import Path
 
@@ -11,7 +10,9 @@ import pytest
 from serial.tools import list_ports
 
 from hexacell.cell.loader import load_cell
-from tests.cli.test_run_answers import Terminal, ended, start_at
+from tests.cli.terminal import ended, start_at
+
+pytestmark = pytest.mark.usefixtures("lines_only")
 
 CELL = "simulated-hexaglide.toml"
 NOBODY = "127.0.0.1:1"
@@ -142,15 +143,6 @@ def test_questions_want_a_terminal_and_a_new_file(typed_here, cell_folder, monke
     outcome = typed_here("devices", "--write", "new.toml")
     assert outcome.code == 4
     assert "asks what no device tells" in outcome.err
-
-
-@pytest.fixture
-def terminal(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("TERM", "dumb")
-    master, slave = pty.openpty()
-    yield Terminal(master, slave)
-    os.close(master)
-    os.close(slave)
 
 
 def test_a_cell_file_is_written_from_what_was_found_and_answers(

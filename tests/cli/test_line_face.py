@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import os
-import pty
 import re
+from functools import partial
 
 import pytest
 
 from procedures.journal.journal import read_journal
 from procedures.run import events
-from tests.cli.test_run_answers import ASK, BY_HAND, Terminal, ended, start_at
+from tests.cli.cell_folder import ASK, BY_HAND
+from tests.cli.commands import Process
+from tests.cli.terminal import ended, start_at
 from tests.waiting import wait_until
 
+pytestmark = pytest.mark.usefixtures("lines_only")
+
+TOLD = "Letters, each with Enter"
 PLACED = "Press Enter when they are in place, or type a to abort: "
-
-
-@pytest.fixture
-def terminal():
-    master, slave = pty.openpty()
-    yield Terminal(master, slave)
-    os.close(master)
-    os.close(slave)
-
-
-@pytest.fixture(autouse=True)
-def dumb(monkeypatch) -> None:
-    monkeypatch.setenv("TERM", "dumb")
 
 
 def test_all_abilities_of_the_screen(quick_cell, start, terminal) -> None:
@@ -97,16 +88,18 @@ def answer_everything(process, terminal) -> None:
         terminal.type("\n" if found.group() == PLACED else "yes\n")
 
 
+def _is_told_again(process: Process, before: int) -> bool:
+    return process.out.count(TOLD) > before
+
+
 def test_what_is_no_letter_tells_all_of_them(quick_cell, start, terminal) -> None:
     quick_cell.edit(BY_HAND)
     process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
     terminal.read_until(PLACED)
     for typed in ("m x\n", "u 3\n", "?\n"):
-        before = process.out.count("Letters, each with Enter")
+        before = process.out.count(TOLD)
         terminal.type(typed)
-        process.wait_until(
-            lambda count=before: process.out.count("Letters, each with Enter") > count, typed
-        )
+        process.wait_until(partial(_is_told_again, process, before), typed)
         terminal.read_until(PLACED)
     terminal.type("a\n")
     assert ended(process, terminal) == 130

@@ -2,27 +2,17 @@
 
 from __future__ import annotations
 
-import os
-import pty
-
 import pytest
 
 from hexacell.presentation.plan_draft import REQUEST
 from procedures.journal.journal import read_journal
 from procedures.run import events
-from tests.cli.test_run_answers import Terminal, ended, start_at
+from tests.cli.terminal import ended, start_at
 from tests.waiting import wait_until
 
+pytestmark = pytest.mark.usefixtures("lines_only")
+
 ASKED = REQUEST.splitlines()[-1]
-
-
-@pytest.fixture
-def terminal(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("TERM", "dumb")
-    master, slave = pty.openpty()
-    yield Terminal(master, slave)
-    os.close(master)
-    os.close(slave)
 
 
 @pytest.mark.slow

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import os
-import pty
 import re
-import select
 import signal
-from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
 from procedures.journal.journal import read_journal
 from procedures.run import events
-from tests.waiting import wait_until
+from tests.cli.cell_folder import ASK, BY_HAND
+from tests.cli.terminal import ended, start_at
 
 FAST = (("clock_factor = 150.0", "clock_factor = 600.0"), ("give_up_s = 60.0", "give_up_s = 6000.0"))
-ASK = ('approval = "automatic"', 'approval = "ask"')
-BY_HAND = ('placement = "fixed"', 'placement = "by-hand"')
 
 
 @pytest.fixture
@@ -27,59 +21,6 @@ def fast_cell(cell_folder):
     cell_folder.edit(*FAST)
     cell_folder.wait_long_for_devices()
     return cell_folder
-
-
-@dataclass
-class Terminal:
-    """A terminal of 80 columns, and what was shown on it."""
-
-    master: int
-    slave: int
-    shown: str = ""
-    seen: int = field(default=0)
-
-    def read_until(self, words: str) -> str:
-        """What is shown from the last time up to these words."""
-        while (place := self.shown.find(words, self.seen)) < 0:
-            if select.select([self.master], [], [], 0.05)[0]:
-                self.shown += os.read(self.master, 65536).decode()
-        passage = self.shown[self.seen : place + len(words)]
-        self.seen = place + len(words)
-        return passage
-
-    def drain(self) -> str:
-        """All that is shown."""
-        while select.select([self.master], [], [], 0.0)[0]:
-            self.shown += os.read(self.master, 65536).decode()
-        return self.shown
-
-    def type(self, text: str) -> None:
-        os.write(self.master, text.encode())
-
-
-@pytest.fixture
-def terminal() -> Iterator[Terminal]:
-    master, slave = pty.openpty()
-    yield Terminal(master, slave)
-    os.close(master)
-    os.close(slave)
-
-
-def start_at(terminal, start, *arguments):
-    """A command with its input and its stderr at a terminal; stdout goes to a file."""
-    return start(*arguments, stdin=terminal.slave, stderr=terminal.slave)
-
-
-def ended(process, terminal):
-    """How it ends; its terminal is read meanwhile."""
-
-    def is_over() -> bool:
-        terminal.drain()
-        return process.popen.poll() is not None
-
-    wait_until(is_over)
-    assert "Traceback" not in terminal.drain()
-    return process.popen.poll()
 
 
 @pytest.mark.usefixtures("few_candidates")

@@ -11,19 +11,16 @@ from pathlib import Path
 import pytest
 
 from tests.cli.cell_folder import QUICK, copy_cell
+from tests.packages.conftest import Install
 from tests.packages.test_a_mechanism_from_elsewhere import hexacell
 
 PACKAGE = Path(__file__).parent / "counter_gauge"
 
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder that the package is installed in, with what .venv has, so without network."""
-    folder = tmp_path_factory.mktemp("installed")
-    source = shutil.copytree(PACKAGE, tmp_path_factory.mktemp("source") / "package")
-    options = ("--quiet", "--no-deps", "--no-build-isolation", "--target", str(folder))
-    subprocess.run([sys.executable, "-m", "pip", "install", *options, str(source)], check=True)
-    return folder
+def installed(install: Install) -> Path:
+    """The folder that the package is installed in."""
+    return install(PACKAGE)
 
 
 def test_it_passes_what_every_gauge_must(installed: Path, tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.packages.conftest import Install
+
 PACKAGE = Path(__file__).parent / "ring_mechanism"
 NOT_ITS_WORDS = re.compile(r".*\b(?:slider|hexaglide)\w*.*", re.IGNORECASE)
 
@@ -19,13 +21,9 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder that the package is installed in, with what .venv has, so without network."""
-    folder = tmp_path_factory.mktemp("installed")
-    source = shutil.copytree(PACKAGE, tmp_path_factory.mktemp("source") / "package")
-    options = ("--quiet", "--no-deps", "--no-build-isolation", "--target", str(folder))
-    subprocess.run([sys.executable, "-m", "pip", "install", *options, str(source)], check=True)
-    return folder
+def installed(install: Install) -> Path:
+    """The folder that the package is installed in."""
+    return install(PACKAGE)
 
 
 @pytest.fixture(scope="module")

@@ -24,6 +24,9 @@ from hexacell.screen.assistant import FirstCellAssistant
 def main(options: argparse.Namespace) -> ExitCode:
     """Search, or watch one device of a cell; nothing moves, and no device is set."""
     console = Console(options.json)
+    if options.diagnose is not None and options.ports:
+        problem = f"--diagnose watches a device of the cell, and {options.ports[0]} is a port"
+        raise UsageError(problem, action="Leave the port out, or --diagnose")
     return _watch(options, console) if options.diagnose is not None else _search(options, console)
 
 

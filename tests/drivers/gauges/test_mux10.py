@@ -239,11 +239,40 @@ async def test_a_gauge_of_another_resolution_than_stated_is_refused(
 
 
 async def test_values_farther_apart_than_the_travel_are_damaged(dialogue, opened):
+    dialogue.expect(*[(b"2\r", VALUE)] * 2)
+    assert (await opened.read()).value_mm == 0.123
     dialogue.expect((b"2\r", b"02A+0040.123\r"), *[(b"2\r", VALUE)] * 2)
     assert (await opened.read()).value_mm == 0.123
     dialogue.expect(*[(b"2\r", b"02A+0040.123\r")] * 3)
     with pytest.raises(WrongAnswer, match=r"shows 02A\+0040.123, and values 40.000 mm apart do not fit"):
         await opened.read()
+
+
+async def test_a_value_that_was_shown_once_makes_no_other_impossible(dialogue, opened):
+    """Damage within the travel: the right values are at its other end."""
+    low, high, right = b"02A-0011.000\r", b"02A+0012.000\r", b"02A-0001.500\r"
+    dialogue.expect(*((b"2\r", value) for value in (VALUE, high, VALUE, VALUE)))
+    assert (await opened.read()).value_mm == 0.123
+    dialogue.expect(*((b"2\r", value) for value in (low, low, right, right)))
+    assert (await opened.read()).value_mm == -11.0
+    assert (await opened.read()).value_mm == -1.5
+
+
+@pytest.mark.parametrize(("middle_mm", "is_refused"), [(0.0, True), (None, False)])
+async def test_a_gauge_that_may_be_zeroed_at_either_end_shows_twice_its_travel(
+    dialogue, links, settings, middle_mm, is_refused
+):
+    gauge = Mux10Gauge(settings("mux10", channel=2, travel_mm=10.0, middle_mm=middle_mm), links)
+    ends = [b"02A-0009.000\r"] * 2 + [b"02A+0009.000\r"] * (3 if is_refused else 2)
+    dialogue.expect(*OPENING, *((b"2\r", value) for value in ends))
+    await gauge.open()
+    assert (await gauge.read()).value_mm == -9.0
+    if is_refused:
+        with pytest.raises(WrongAnswer, match="do not fit into its travel of 10 mm"):
+            await gauge.read()
+    else:
+        assert (await gauge.read()).value_mm == 9.0
+    await gauge.close()
 
 
 async def test_values_may_be_anywhere_after_it_was_opened_again(dialogue, opened):

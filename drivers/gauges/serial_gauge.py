@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from typing import ClassVar, TypeVar
@@ -132,7 +132,7 @@ class SerialGauge(ABC):
             return _reading(self._plausible(await self._ask(self.value_request)))
         except FrameRejected as rejection:
             self._require_silence()
-            raise self._rejected(rejection) from rejection
+            raise self._rejected([rejection]) from rejection
 
     async def check(self) -> None:
         """Query the settings again; a ``ZeroVoid`` if one has changed since ``open``."""
@@ -191,12 +191,12 @@ class SerialGauge(ABC):
 
     async def _query(self, request: bytes, parse: Callable[[bytes], Parsed]) -> Parsed:
         """The parsed answer; the request is repeated if ``parse`` rejects the frame."""
-        rejected = FrameRejected(b"")
+        rejected: list[FrameRejected] = []
         for _ in range(MAX_REQUESTS):
             try:
                 return parse(await self._ask(request))
             except FrameRejected as rejection:
-                rejected = rejection
+                rejected.append(rejection)
                 self._require_silence()
         raise self._rejected(rejected)
 
@@ -205,19 +205,26 @@ class SerialGauge(ABC):
         try:
             return await port.exchange(request, self.terminator, self.settings.timeout_s)
         except NoAnswer as missing:
-            if other_bytes := missing.received.replace(request, b"").strip():
-                raise FrameRejected(other_bytes) from missing
-            echo = bool(missing.received)
+            beside_echo = missing.received.replace(request, b"")
+            echo = beside_echo != missing.received
+            if beside_echo.strip() or (
+                beside_echo and not echo
+            ):  # also a lone line end: its answer was lost
+                raise FrameRejected(beside_echo) from missing
             raise silent_gauge(self.subject, port.url, self.settings.timeout_s, echo=echo) from missing
 
     def _require_silence(self) -> None:
         self._open_port().require_silence()
 
-    def _rejected(self, rejection: FrameRejected) -> DeviceError:
-        """The error for a frame that was rejected to the last."""
-        if isinstance(rejection, ImplausibleValue):
-            return rejection.error
-        return self._garbled(rejection.frame)
+    def _rejected(self, rejections: Sequence[FrameRejected]) -> DeviceError:
+        """The error for a request whose answers were all rejected: what the most of them say.
+
+        A damaged digit looks like another resolution once; an instrument in inches does so each time.
+        """
+        implausible = [one for one in rejections if isinstance(one, ImplausibleValue)]
+        if 2 * len(implausible) > len(rejections):
+            return implausible[-1].error
+        return self._garbled(next(one.frame for one in reversed(rejections) if one not in implausible))
 
     def _garbled(self, received: bytes) -> DeviceError:
         return unexpected_answer(self.subject, self.spec, received)

@@ -152,6 +152,12 @@ async def test_an_older_indicator_without_parameters_is_accepted(dialogue, gauge
     await gauge.check()
 
 
+async def test_an_answer_of_which_only_the_line_end_came_is_damage_and_no_silence(dialogue, opened):
+    asked = opening()
+    dialogue.expect(asked[0], (b"?p011\r", b"\r\n"), *asked[1:])
+    await opened.check()
+
+
 async def test_an_indicator_that_has_reported_parameters_must_still_do_so(dialogue, opened):
     dialogue.expect((b"R\r", VALUE), (b"?p011\r",))
     with pytest.raises(GaugeSilent):

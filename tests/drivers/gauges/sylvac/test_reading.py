@@ -1,8 +1,10 @@
 """Opening and reading a Sylvac gauge."""
 
+import re
+
 import pytest
 
-from drivers.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongAnswer
+from drivers.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongAnswer, WrongSetting
 from drivers.gauges.serial_gauge import MAX_READINGS
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.interfaces import DeviceIdentity, Gauge, GaugeReading
@@ -116,3 +118,21 @@ async def test_read_once_without_an_answer(dialogue, opened):
 async def test_read_once_of_a_closed_gauge_is_an_error(gauge):
     with pytest.raises(DeviceError, match="is not open"):
         await gauge.read_once()
+
+
+GARBLED, ONE_DIGIT_LOST = b"+1.\xb234\r", b"+1.24\r"
+
+
+@pytest.mark.parametrize(
+    ("answers", "error", "words"),
+    [
+        ((GARBLED, GARBLED, ONE_DIGIT_LOST), WrongAnswer, re.escape(f"answers {GARBLED!r}")),
+        ((ONE_DIGIT_LOST, GARBLED, ONE_DIGIT_LOST), WrongSetting, "shows 2 decimals"),
+    ],
+)
+async def test_a_digit_lost_once_is_damage_and_no_setting(dialogue, opened, answers, error, words):
+    dialogue.expect(*[(b"?\r", b"+1.234\r")] * 2)
+    await opened.read()
+    dialogue.expect(*((b"?\r", answer) for answer in answers))
+    with pytest.raises(error, match=words):
+        await opened.read()

@@ -1,0 +1,243 @@
+"""A million answers of each protocol over lines that damage one byte in a hundred: what gets through?
+
+Three gauges are read as a run reads them, until their readings settle, each time at another place.
+``FRAMES`` in the environment says how many answers each protocol has to give.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections import Counter
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from drivers.interfaces import EncoderSample, Gauge, GaugeReading
+from drivers.serial.shared_port import SharedSerialPorts
+from drivers.simulated.gauges.bank import simulated_instrument
+from drivers.simulated.gauges.indicator import Indicator
+from drivers.wire_trace import WireTrace
+from hexacell.application.device_setup import gauge_with_agreement
+from hexacell.cell.devices import GaugeSettings, RequestSettings
+from hexacell.cell.measuring import NoiseSettings, TimingSettings
+from hexacell.clock import CellClock
+from hexacell.errors import DeviceError, HexacellError, flatten_errors
+from hexacell.plugins import Group, load
+from procedures.devices.device_set import Devices, MountedGauge
+from procedures.devices.settling import settle, trimmed_mean
+from tests.benchmarks.line_in_process import Damage, InstrumentLine, have_lines
+
+FRAMES = int(os.environ.get("FRAMES", "20000"))
+SHARE = 0.01
+CHECKED_EVERY = 20
+"""After so many records the settings are compared, as a run does at every reference."""
+
+QUICKER = 1e6
+TRAVEL_MM = 12.5
+FARTHEST_MM = 5.0
+NOISE = NoiseSettings()
+TIMING = TimingSettings()
+
+ONE_IN = 100_000
+MEMORY_MIB = 8.0
+
+ID_H = RequestSettings(
+    ask="GA01\r\n",
+    answer=r"GN01,([+-]\d{4}\.\d{4})",
+    example="GN01,+0016.2345\r\n",
+    at_end=r"GA01,ER\d",
+)
+
+
+def gauges(protocol: str) -> list[GaugeSettings]:
+    """Three of one protocol; those of a multiplexer share its line."""
+    return [
+        GaugeSettings(
+            name=axis,
+            axis=axis,
+            protocol=protocol,
+            port="mux10" if protocol == "mux10" else axis,
+            channel=place,
+            travel_mm=TRAVEL_MM,
+            request=ID_H if protocol == "request" else None,
+        )
+        for place, axis in enumerate(("x", "y", "z"), 1)
+    ]
+
+
+class NoEncoders:
+    """Encoders that stand still."""
+
+    async def open(self) -> tuple:
+        return ()
+
+    async def read(self) -> EncoderSample:
+        return EncoderSample((0,) * 6, (0.0,) * 6)
+
+    async def close(self) -> None:
+        pass
+
+
+@dataclass
+class Outcome:
+    """What came of all records."""
+
+    records: int = 0
+    wrong_records: int = 0
+    readings: int = 0
+    wrong_readings: int = 0
+    shown_by_another: int = 0
+    refused: Counter = field(default_factory=Counter)
+    foreign: list[Exception] = field(default_factory=list)
+
+
+class Watched:
+    """A gauge whose readings are compared with the truth.
+
+    A reading that is farther from it than two readings may differ is one that the other reading shows,
+    unless both answers were damaged.
+    """
+
+    def __init__(
+        self,
+        gauge: Gauge,
+        truth: Callable[[], float],
+        agreement_mm: float,
+        damage: Damage,
+        outcome: Outcome,
+    ) -> None:
+        self._gauge, self._truth, self._damage, self._outcome = gauge, truth, damage, outcome
+        self._agreement_mm = agreement_mm
+        self.name = gauge.name
+        self.open, self.close, self.check = gauge.open, gauge.close, gauge.check
+        self.read_once = gauge.read_once
+
+    async def read(self) -> GaugeReading:
+        damaged = self._damage.damaged
+        reading = await self._gauge.read()
+        error = abs(reading.value_mm - self._truth())
+        self._outcome.readings += 1
+        if error > self._agreement_mm + 1e-9:
+            self._outcome.wrong_readings += 1
+            self._outcome.shown_by_another += self._damage.damaged - damaged < 2
+        return reading
+
+
+class Cell:
+    """Three gauges on damaged lines."""
+
+    def __init__(self, protocol: str, monkeypatch: pytest.MonkeyPatch, random: Random) -> None:
+        settings = [gauge_with_agreement(one, NOISE) for one in gauges(protocol)]
+        self.damage = Damage(0.0, random)
+        self.outcome = Outcome()
+        self.truth = [0.0, 0.0, 0.0]
+        self.indicators = [Indicator(self._plunger(place), TRAVEL_MM) for place in range(3)]
+        by_port: dict[str, dict[int, Indicator]] = {}
+        for one, indicator in zip(settings, self.indicators, strict=True):
+            channel = one.channel if protocol == "mux10" else 1
+            by_port.setdefault(str(one.port), {})[channel] = indicator
+        have_lines(
+            monkeypatch,
+            {
+                url: InstrumentLine(simulated_instrument(protocol, some, ID_H), self.damage)
+                for url, some in by_port.items()
+            },
+        )
+        self.ports = SharedSerialPorts(trace=WireTrace())
+        self.gauges = [
+            Watched(
+                load(Group.GAUGES, protocol)(one, self.ports),
+                self._plunger(place),
+                one.agreement_mm or 0.0,
+                self.damage,
+                self.outcome,
+            )
+            for place, one in enumerate(settings)
+        ]
+        mounted = tuple(
+            MountedGauge(gauge, one.mounting) for gauge, one in zip(self.gauges, settings, strict=True)
+        )
+        self.devices = Devices(mounted, NoEncoders(), None)  # type: ignore[arg-type]
+        self._clock = CellClock(QUICKER)
+        self._random = random
+
+    def _plunger(self, place: int) -> Callable[[], float]:
+        return lambda: self.truth[place]
+
+    async def open(self) -> None:
+        """On lines without damage: what is opened on a bad line is another matter."""
+        share, self.damage.share = self.damage.share, 0.0
+        for gauge in self.gauges:
+            await gauge.close()
+            await gauge.open()
+        self.damage.share = share
+
+    async def record(self) -> None:
+        """One record of three gauges at a new place."""
+        self.truth[:] = [round(self._random.uniform(-FARTHEST_MM, FARTHEST_MM), 3) for _ in range(3)]
+        outcome = self.outcome
+        try:
+            settled = await settle(self.devices, TIMING, self._clock)
+            outcome.records += 3
+            errors = np.abs(trimmed_mean(settled.gauges) - self.truth)
+            outcome.wrong_records += int(np.sum(errors > NOISE.gauge_mm))
+            if outcome.records // 3 % CHECKED_EVERY == 0:
+                for gauge in self.gauges:
+                    await gauge.check()
+        except HexacellError as error:
+            for one in flatten_errors(error):
+                outcome.refused[type(one).__name__] += 1
+                assert isinstance(one, DeviceError)
+            await self.open()
+        except Exception as error:
+            outcome.foreign.append(error)
+            await self.open()
+
+
+def resident_mib() -> float:
+    gc.collect()
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
+@asynccontextmanager
+async def opened(protocol: str, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Cell]:
+    cell = Cell(protocol, monkeypatch, Random(protocol))
+    await cell.open()
+    cell.damage.share = SHARE
+    try:
+        yield cell
+    finally:
+        await cell.devices.gauges[0].gauge.close()
+        await cell.ports.close()
+
+
+@pytest.mark.parametrize("protocol", ["sylvac", "mux10", "cdi", "request"])
+async def test_no_damage_becomes_a_record(protocol: str, say, monkeypatch) -> None:
+    async with opened(protocol, monkeypatch) as cell:
+        outcome, memory = cell.outcome, [0.0]
+        while cell.damage.answers < FRAMES:
+            await cell.record()
+            if memory == [0.0] and cell.damage.answers >= FRAMES / 2:
+                memory[0] = resident_mib()
+        grown = resident_mib() - memory[0]
+        damage = cell.damage
+    say(f"{protocol}: answers; damaged", f"{damage.answers}; {damage.damaged}", f"{FRAMES}")
+    say("  records; wrong", f"{outcome.records}; {outcome.wrong_records}", "below 1 in 100,000")
+    say(
+        "  readings off by more than two may differ; of them with a true one",
+        f"{outcome.wrong_readings} of {outcome.readings}; {outcome.shown_by_another}",
+        "none with a true one",
+    )
+    say("  refused", ", ".join(f"{n} {name}" for name, n in outcome.refused.items()) or "none", "")
+    say("  memory grown in the second half", f"{grown:.1f} MiB", f"at most {MEMORY_MIB:g}")
+    assert not outcome.foreign
+    assert outcome.shown_by_another == 0
+    assert outcome.wrong_records <= outcome.records / ONE_IN
+    assert grown <= MEMORY_MIB

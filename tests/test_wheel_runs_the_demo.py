@@ -93,7 +93,7 @@ print(json.dumps({"path": sys.path, "files": files, "plugins": plugins}))
     installed = site_packages(elsewhere)
     assert all(installed in Path(path).parents for path in found["files"])
     assert CHECKOUT not in {(tmp_path / path).resolve() for path in found["path"]}
-    assert found["plugins"]["hexacell.gauges"] == ["cdi", "mux10", "request", "sylvac"]
+    assert found["plugins"]["hexacell.gauges"] == ["cdi", "mux10", "request", "stream", "sylvac", "uwave"]
     empty = {group for group, plugins in found["plugins"].items() if not plugins}
     assert empty == {"hexacell.simulated_gauges"}, "those of hexacell itself are no plug-ins"
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from drivers.discovery.streams import a_number, uwave_channels
 from drivers.errors import (
     EmptyChannel,
     GaugeAtEnd,
@@ -20,6 +22,10 @@ from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, HexacellError
 
 TIMEOUT_S = 0.5
+UWAVE = "uwave"
+BAUD_RATES = (9600, 115200)
+DESCRIBE = 'Describe its lines with protocol = "stream" (docs/drivers.md)'
+
 CHANNELS = range(1, 5)
 """Inputs of a multiplexer that are tried."""
 
@@ -54,14 +60,27 @@ class PortFindings:
 
 
 async def search_port(port: str, factories: Mapping[str, GaugeFactory]) -> PortFindings:
-    """Ask in every protocol; the first that is answered is the port's."""
+    """Ask in every protocol, then listen; the first that is answered is the port's."""
     for protocol, factory in factories.items():
+        if protocol == UWAVE:
+            continue
         try:
             found = await _channels(protocol, factory, port)
         except HexacellError as error:
             return PortFindings(port, problem=f"{error.problem}. {error.action}")
         if found:
             return PortFindings(port, tuple(found))
+    return await _listen(port, factories.get(UWAVE))
+
+
+async def _listen(port: str, uwave: GaugeFactory | None) -> PortFindings:
+    """What sends by itself."""
+    channels = await asyncio.to_thread(uwave_channels, port)
+    if channels and uwave is not None:
+        return PortFindings(port, tuple([await _ask(UWAVE, uwave, port, channel) for channel in channels]))
+    for baudrate in BAUD_RATES:
+        if text := await asyncio.to_thread(a_number, port, baudrate):
+            return PortFindings(port, problem=f"sends {text!r} by itself at {baudrate} baud. {DESCRIBE}")
     return PortFindings(port)
 
 

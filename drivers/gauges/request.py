@@ -6,22 +6,19 @@ number is. So a display counter or an amplifier with a serial line needs no driv
 
 from __future__ import annotations
 
-import re
-
 from drivers.errors import GaugeAtEnd
-from drivers.gauges.plausibility import decimals_of
+from drivers.gauges.described_value import described_value, is_at_end
 from drivers.gauges.protocol import (
     DisplayedValue,
     FrameRejected,
     GaugeState,
     LineSettings,
     ProtocolSpec,
-    Unit,
 )
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.serial.framing import LINE_ENDS
 from drivers.serial.shared_port import SharedSerialPorts
-from hexacell.cell.devices import NUMBER, GaugeSettings
+from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError
 
 
@@ -48,19 +45,11 @@ class RequestGauge(SerialGauge):
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
         text = frame.strip(LINE_ENDS).decode("latin-1")
-        if match := re.fullmatch(self._request.answer, text):
-            return self._value(match[1].replace(" ", ""), text)
-        if self._request.at_end is not None and re.fullmatch(self._request.at_end, text):
+        if shown := described_value(text, self._request):
+            return shown
+        if is_at_end(text, self._request):
             raise self._at_end(f"plunger at its end ({text})")
         raise FrameRejected(frame)
-
-    def _value(self, number: str, text: str) -> DisplayedValue:
-        """The value, mm; a pattern that takes anything may have taken no number."""
-        if not NUMBER.fullmatch(number):
-            raise FrameRejected(text.encode("latin-1"))
-        unit_mm = self._request.mm_per_unit
-        decimals = len(number.partition(".")[2]) + decimals_of(unit_mm)
-        return DisplayedValue(float(number) * unit_mm, decimals, Unit.MM, text)
 
     async def _read_state(self) -> GaugeState:
         # decimals only: it has no other setting that can be asked for

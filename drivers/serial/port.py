@@ -13,11 +13,13 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from math import inf
 
 import serial
 
 from drivers.errors import PortLost
 from drivers.serial.errors import opening_errors
+from drivers.serial.frame_log import FrameLog
 from drivers.serial.framing import LINE_ENDS, cut_frame, is_copies
 from drivers.serial.parity import have_terminal_check, in_software
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
@@ -60,6 +62,7 @@ class SerialPort:
 
     Attributes:
         unsolicited: bytes that came without a request or too late; the latest ones only.
+        log: what came unasked, of a device that sends by itself.
         surplus_count: how often bytes had come before a request, copies included: the response to the one
             before may have been such bytes.
     """
@@ -88,6 +91,8 @@ class SerialPort:
         self._surplus = self._last_frame = b""
         self._careful = 0
         self.surplus_count = 0
+        self.log = FrameLog()
+        self._empty_at = -inf
 
     def open(self) -> int:
         """Open the port unless it is open and usable; how often it has been opened.
@@ -102,6 +107,7 @@ class SerialPort:
             self._port = self._opened()
             self.open_count += 1
             self._silence_s, self._surplus, self._last_frame, self._careful = 0.0, b"", b"", 0
+            self._empty_at = -inf
         return self.open_count
 
     def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
@@ -123,6 +129,23 @@ class SerialPort:
                 if not self._careful or self._is_alone(self._port, frame):
                     return frame
         raise self._not_silent()
+
+    def listen(self) -> None:
+        """Take what comes within one slice of time, unasked, into ``log``.
+
+        Raises:
+            DeviceError: The port is not open, was lost, or is being closed.
+        """
+        if self._port is None:
+            raise self._lost("it is not open")
+        with self._port_errors():
+            if not self._port.in_waiting:
+                self._empty_at = self.now()
+            self.log.add(self._read(self._port), self._empty_at)
+
+    def now(self) -> float:
+        """The time, s, by which the frames in ``log`` are dated."""
+        return time.monotonic()
 
     def require_silence(self) -> None:
         """Wait for a short silence of the line before the next request."""

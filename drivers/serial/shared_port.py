@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable, Mapping
 from functools import partial
 
+from drivers.serial.frame_log import FrameLog
 from drivers.serial.port import WORST_LATENCY_S, SerialPort
 from drivers.wire_trace import TraceRecorder
 from drivers.worker_thread import Result, WorkerThread
@@ -79,6 +80,19 @@ class SharedSerialPort:
     async def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
         """As :meth:`SerialPort.exchange`."""
         return await self._run(partial(self._port.exchange, request, terminator, timeout_s))
+
+    async def listen(self) -> None:
+        """As :meth:`SerialPort.listen`."""
+        await self._run(self._port.listen)
+
+    @property
+    def log(self) -> FrameLog:
+        """As that of :class:`SerialPort`: several gauges may find theirs in it."""
+        return self._port.log
+
+    def now(self) -> float:
+        """As :meth:`SerialPort.now`."""
+        return self._port.now()
 
     def require_silence(self) -> None:
         """Wait for a short silence before the next exchange, after a garbled frame."""

@@ -5,12 +5,22 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SecretStr, field_validator, model_validator
 
 from hexacell.cell.certificates import CertificateSettings
-from hexacell.cell.fields import InRange, Name, Password, Positive, Section, SixInRange, Text, broken_rule
+from hexacell.cell.fields import (
+    InRange,
+    Name,
+    NotNegative,
+    Password,
+    Positive,
+    Section,
+    SixInRange,
+    Text,
+    broken_rule,
+)
 from hexacell.kinematics.parameters import JointUnit
 
 NodeId = Annotated[int, Field(ge=1, le=127)]
@@ -57,23 +67,22 @@ Wire = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[\x00-\xff]
 """Text on a line, one byte a character, which may be control characters."""
 
 
-class RequestSettings(Section):
-    """What a gauge of protocol ``request`` is asked, and what it answers."""
+class DescribedFrame(Section):
+    """What a gauge sends: its pattern, and what its number is."""
 
-    ask: Wire = Field(description="what is sent for a value")
     answer: Text = Field(
         min_length=1,
-        description="regular expression of the answer without line ends; group 1: the number",
+        description="regular expression of what it sends without line ends; group number, or the first: "
+        "the number",
     )
-    example: Wire = Field(description="a typical answer, which must match")
-    ends_with: Wire = Field("\r", description="the first line end of an answer")
+    example: Wire = Field(description="a typical one, which must match")
     mm_per_unit: Positive = Field(1.0, description="what a unit of the number is, mm: 25.4 for inches")
     at_end: Wire | None = Field(
         None, description="regular expression of the answer with the plunger at an end of its travel"
     )
 
     @model_validator(mode="after")
-    def _the_example_matches(self) -> RequestSettings:
+    def _the_example_matches(self) -> Self:
         patterns = [self.answer] + ([] if self.at_end is None else [self.at_end])
         for pattern in patterns:
             try:
@@ -81,11 +90,48 @@ class RequestSettings(Section):
             except re.error as error:
                 raise broken_rule(f"{pattern!r} is no regular expression: {error}", "Correct it") from error
         match = re.fullmatch(self.answer, self.example.strip("\r\n"))
-        if match is None or not match.groups() or not NUMBER.fullmatch(match[1].replace(" ", "")):
+        number = match[self.number_group] if match is not None and match.groups() else None
+        if not NUMBER.fullmatch((number or "").replace(" ", "")):
             raise broken_rule(
                 "the example is no answer with a number in group 1", "Correct answer or example"
             )
         return self
+
+    @property
+    def number_group(self) -> str | int:
+        """The group with the number."""
+        return "number" if "number" in re.compile(self.answer).groupindex else 1
+
+
+class RequestSettings(DescribedFrame):
+    """What a gauge of protocol ``request`` is asked, and what it answers."""
+
+    ask: Wire = Field(description="what is sent for a value")
+    ends_with: Wire = Field("\r", description="the first line end of an answer")
+
+
+class StreamSettings(DescribedFrame):
+    """What a gauge of protocol ``stream`` sends by itself, in lines.
+
+    Of several gauges on one port the pattern has a group ``channel``, which is that of the gauge.
+    """
+
+    @model_validator(mode="after")
+    def _its_groups_are_told_apart(self) -> Self:
+        match = re.fullmatch(self.answer, self.example.strip("\r\n"))
+        if match is None or not self.has_channel:
+            return self
+        if self.number_group != "number" or not (match["channel"] or "").isdecimal():
+            raise broken_rule(
+                "a pattern with a group channel, of digits, needs a group number",
+                "Write (?P<channel>...) and (?P<number>...)",
+            )
+        return self
+
+    @property
+    def has_channel(self) -> bool:
+        """Whether its lines tell the gauge by its channel."""
+        return "channel" in re.compile(self.answer).groupindex
 
 
 class GaugeSettings(Section):
@@ -94,13 +140,25 @@ class GaugeSettings(Section):
     name: Name = Field(description="its name on screens and in reports")
     axis: Literal["x", "y", "z"] = Field(description="base axis along which its plunger moves")
     sign: Literal[1, -1] = Field(1, description="1: the reading grows when the ball moves along +axis")
-    protocol: Text = Field(description="sylvac, mux10, cdi, request, or one that a plug-in adds")
+    protocol: Text = Field(
+        description="sylvac, mux10, cdi, uwave, request, stream, or one that a plug-in adds"
+    )
     port: Text | None = Field(None, description="device path or pyserial URL; gauges may share one")
     serial: dict[str, Any] = Field(
         default_factory=dict, description="passed to pyserial; overrides the protocol's defaults"
     )
-    channel: int = Field(1, ge=1, le=99, description="input of a multiplexer")
+    channel: int = Field(
+        1,
+        ge=0,
+        le=9999,
+        description="input of a multiplexer, from 1; the four digits of a U-WAVE",
+    )
     timeout_s: Positive = Field(0.5, description="longest wait for an answer")
+    delay_s: NotNegative | None = Field(
+        None,
+        description="of gauges that send unasked: how old a value may be when it comes; by default 0.5 "
+        "of uwave, else 0.1",
+    )
     travel_mm: Positive = Field(12.5, description="the instrument's own measuring range")
     resolution_mm: Positive | None = Field(
         None, description="the last digit of its display in mm; one with other decimals is set to inches"
@@ -115,7 +173,19 @@ class GaugeSettings(Section):
     )
     serial_number: Text = Field("", description="of the instrument, where it does not tell it itself")
     request: RequestSettings | None = Field(None, description="of protocol request: what is asked")
+    stream: StreamSettings | None = Field(None, description="of protocol stream: what it sends")
     certificate: CertificateSettings | None = Field(None, description="of its calibration")
+
+    @model_validator(mode="after")
+    def _a_multiplexer_has_the_channel(self) -> Self:
+        if self.protocol == "mux10" and not 1 <= self.channel <= 99:
+            raise broken_rule("a multiplexer has channels from 1 to 99", "Correct channel")
+        return self
+
+    @property
+    def shares_line(self) -> bool:
+        """Whether others may be on its port, told apart by their channels."""
+        return self.protocol in {"mux10", "uwave"} or (self.stream is not None and self.stream.has_channel)
 
     @property
     def mounting(self) -> GaugeAxis:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import os
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from serial.tools import list_ports
 
+from drivers.simulated.gauges.bank import SimulatedGaugeBank
+from hexacell.cell.devices import GaugeSettings, StreamSettings
 from hexacell.cell.loader import load_cell
+from hexacell.cell.simulation import SimulatedGauges
+from hexacell.clock import CellClock
 from tests.cli.terminal import ended, start_at
 
 pytestmark = pytest.mark.usefixtures("lines_only")
@@ -79,6 +84,34 @@ def test_every_protocol_is_found_and_the_text_is_that_of_a_cell_file(typed_here,
     assert told["encoders"]["measuring_step_nm"] == real["encoders"]["measuring_step_nm"]
     assert told["encoders"]["bus"]["channel"] == adapter
     assert f"{told['controller']['host']}:{told['controller']['port']}" == controller
+
+
+@pytest.fixture
+def streams() -> Iterator[SimulatedGaugeBank]:
+    """Two U-WAVE transmitters behind one receiver, and a gauge that the cell file would describe."""
+    described = StreamSettings(answer=r"([+-]\d+\.\d{2}) mm", example="+01.23 mm\r\n")
+    gauges = [
+        GaugeSettings(name="x", axis="x", protocol="uwave", channel=0),
+        GaugeSettings(name="y", axis="y", protocol="uwave", channel=203),
+        GaugeSettings(name="z", axis="z", protocol="stream", stream=described),
+    ]
+    plungers = {gauge.name: lambda: 1.25 for gauge in gauges}
+    with SimulatedGaugeBank(gauges, plungers, SimulatedGauges(), CellClock(1.0)) as bank:
+        yield bank
+
+
+@pytest.mark.usefixtures("no_ports")
+def test_gauges_that_send_unasked_are_heard(typed_here, streams) -> None:
+    ports = [streams.gauges[0].port, streams.gauges[2].port]
+    outcome = typed_here("devices", *ports, "--controller", NOBODY, "--json")
+    assert outcome.code == 0, outcome.err
+    told = tomllib.loads(outcome.document["cell"])["gauges"]
+    assert [(gauge["protocol"], gauge["channel"]) for gauge in told] == [("uwave", 0), ("uwave", 203)]
+    assert [gauge["resolution_mm"] for gauge in told] == [0.001, 0.001]
+    said = " ".join(outcome.err.split())
+    assert "channel 203: uwave: Mitutoyo U-WAVE, shows DT10203+0000001.250M" in said
+    assert "sends '+01.25 mm' by itself at 9600 baud" in said
+    assert 'protocol = "stream" (docs/drivers.md)' in said
 
 
 @pytest.mark.usefixtures("no_ports")

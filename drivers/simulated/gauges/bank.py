@@ -6,27 +6,30 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 
+from drivers.simulated.gauges.described import ByRequest, Streaming
 from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
-from drivers.simulated.gauges.instruments import INSTRUMENTS, ByRequest, Instrument
+from drivers.simulated.gauges.instruments import INSTRUMENTS as ASKED
+from drivers.simulated.gauges.instruments import Instrument
 from drivers.simulated.gauges.line_faults import LATE_TIMEOUTS, LineFault, LineFaults
 from drivers.simulated.gauges.server import GaugeLineServer
+from drivers.simulated.gauges.uwave import Uwave
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.served_device import Closeable, Switch
-from hexacell.cell.devices import GaugeSettings, RequestSettings
+from hexacell.cell.devices import DescribedFrame, GaugeSettings, RequestSettings, StreamSettings
 from hexacell.cell.simulation import FaultKind, SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import FileError
 from hexacell.plugins import Group, load, names
 
-MULTIPLEXED = frozenset({"mux10"})
-
+INSTRUMENTS: Mapping[str, type[Instrument]] = {**ASKED, "uwave": Uwave}
+"""By the protocol in the cell file."""
 
 InstrumentFactory = Callable[[Mapping[int, Indicator]], Instrument]
 """Makes an instrument of its indicators by channel."""
 
 
 def simulated_instrument(
-    protocol: str, indicators: Mapping[int, Indicator], request: RequestSettings | None = None
+    protocol: str, indicators: Mapping[int, Indicator], described: DescribedFrame | None = None
 ) -> Instrument:
     """An instrument with ``protocol``, with ``indicators`` by channel; of this program or of a plug-in.
 
@@ -34,8 +37,10 @@ def simulated_instrument(
         FileError: There is no such simulated instrument.
         UsageError: A plug-in for it cannot be loaded.
     """
-    if protocol == "request" and request is not None:
-        return ByRequest(indicators, request)
+    if protocol == "request" and isinstance(described, RequestSettings):
+        return ByRequest(indicators, described)
+    if protocol == "stream" and isinstance(described, StreamSettings):
+        return Streaming(indicators, described)
     if protocol in INSTRUMENTS:
         return INSTRUMENTS[protocol](indicators)
     others = names(Group.SIMULATED_GAUGES)
@@ -44,7 +49,7 @@ def simulated_instrument(
         return made
     raise FileError(
         f"no simulated gauge speaks protocol {protocol}",
-        action=f"Choose one of {', '.join(sorted({*INSTRUMENTS, 'request', *others}))}",
+        action=f"Choose one of {', '.join(sorted({*INSTRUMENTS, 'request', 'stream', *others}))}",
     )
 
 
@@ -119,7 +124,9 @@ class SimulatedGaugeBank(Closeable):
         first = group[0]
         own = self._instruments.get(first.protocol)
         instrument = (
-            own(indicators) if own else simulated_instrument(first.protocol, indicators, first.request)
+            own(indicators)
+            if own
+            else simulated_instrument(first.protocol, indicators, first.request or first.stream)
         )
         name = "-".join(gauge.name for gauge in group)
         return GaugeLineServer(
@@ -142,13 +149,13 @@ def _switch_on(line: GaugeLineServer, channel: int, *, on: bool) -> None:
 
 
 def _channel(gauge: GaugeSettings) -> int:
-    return gauge.channel if gauge.protocol in MULTIPLEXED else 1
+    return gauge.channel if gauge.shares_line else 1
 
 
 def _by_line(gauges: Sequence[GaugeSettings]) -> list[list[GaugeSettings]]:
     """The gauges grouped by line: those of one multiplexer (same protocol and port) together."""
     lines: dict[tuple[str | None, ...], list[GaugeSettings]] = {}
     for gauge in gauges:
-        line = (gauge.protocol, gauge.port) if gauge.protocol in MULTIPLEXED else (gauge.name,)
+        line = (gauge.protocol, gauge.port) if gauge.shares_line else (gauge.name,)
         lines.setdefault(line, []).append(gauge)
     return list(lines.values())

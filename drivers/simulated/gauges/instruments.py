@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from drivers.simulated.gauges.indicator import Indicator
-from hexacell.cell.devices import RequestSettings
 
 
 class Instrument(ABC):
@@ -23,6 +22,8 @@ class Instrument(ABC):
     """The answer with the plunger at an end of its travel."""
     introduction: ClassVar[bytes] = b""
     """What it sends when it is switched on."""
+    period_s: ClassVar[float | None] = None
+    """How often it sends unasked; none if it waits for a command."""
 
     def __init__(self, indicators: Mapping[int, Indicator]) -> None:
         self.indicators = dict(indicators)
@@ -30,6 +31,11 @@ class Instrument(ABC):
     @abstractmethod
     def answer(self, command: bytes) -> bytes:
         """The answer to ``command``, which has no carriage return."""
+
+    def unasked(self) -> tuple[bytes, ...]:
+        """What it sends each period, of all its indicators that are on."""
+        values = (self._value(channel) for channel, one in self.indicators.items() if one.powered)
+        return tuple(value for value in values if value)
 
     @staticmethod
     @abstractmethod
@@ -213,40 +219,6 @@ class Cdi(SingleIndicator):
             case _:
                 self._without_effect[number] = value
         return b"SUCCESS\r\n"
-
-
-class ByRequest(SingleIndicator):
-    """A gauge that the cell file describes: it answers like the example, with another number."""
-
-    at_end: ClassVar[bytes] = b"ERROR\r\n"
-
-    def __init__(self, indicators: Mapping[int, Indicator], request: RequestSettings) -> None:
-        super().__init__(indicators)
-        self._request = request
-        match = re.fullmatch(request.answer, request.example.strip("\r\n"))
-        if match is None:
-            raise ValueError(request.example)
-        self._before, self._after = request.example[: match.start(1)], request.example[match.end(1) :]
-        self._number = match[1]
-
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
-        """Without an example a plain number."""
-        return f"{value:+.{5 if inch else 3}f}\r".encode()
-
-    def answer(self, command: bytes) -> bytes:
-        """The value; commands come without their carriage return."""
-        return self._reply(command.decode("latin-1")) if self.indicator.powered else b""
-
-    def _reply(self, command: str) -> bytes:
-        if command != self._request.ask.rstrip("\r\n"):
-            return b""
-        shown = self.indicator.shown()
-        if shown is None:
-            return self.at_end
-        decimals, width = len(self._number.partition(".")[2]), len(self._number)
-        number = f"{shown / self._request.mm_per_unit:+0{width}.{decimals}f}"
-        return f"{self._before}{number}{self._after}".encode("latin-1")
 
 
 INSTRUMENTS: dict[str, type[Instrument]] = {"sylvac": Sylvac, "mux10": Mux10, "cdi": Cdi}

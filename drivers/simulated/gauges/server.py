@@ -19,6 +19,8 @@ from hexacell.clock import CellClock
 
 COMMAND_END = b"\r"
 COMMAND_LIMIT = 256
+SHORTEST_PERIOD_S = 0.005
+"""Of what is sent unasked, in real time, however quick the cell's clock is."""
 JOB_TIMEOUT_S = 5.0
 
 _log = logging.getLogger(__name__)
@@ -29,6 +31,7 @@ class GaugeLineServer(Closeable):
 
     An answer is sent after ``latency_s`` plus the transmission time of request and answer, in seconds
     of the cell's clock. Answers are sent one after another, as on a cable.
+    An instrument with a period sends by itself.
     """
 
     def __init__(
@@ -54,6 +57,7 @@ class GaugeLineServer(Closeable):
         self._jobs: queue.SimpleQueue[tuple[Callable[[], None], Future[None]]] = queue.SimpleQueue()
         self._wake_read, self._wake_write = os.pipe()
         self._stopping = False
+        self._next_unasked = None if instrument.period_s is None else clock.now()
         self._thread = threading.Thread(target=self._serve, name=f"gauges on {self.url}")
         self._thread.start()
 
@@ -105,6 +109,7 @@ class GaugeLineServer(Closeable):
                 self._do_jobs()
             else:
                 self._receive(self._line.receive(ready))
+            self._prepare_unasked()
             self._send_due()
 
     def _do_jobs(self) -> None:
@@ -134,9 +139,25 @@ class GaugeLineServer(Closeable):
         self._answers.append((free_at + self._latency_s + late_s + wire_s, answer))
 
     def _until_next_answer_s(self) -> float | None:
-        if not self._answers:
-            return None
-        return max(0.0, self._clock.real_seconds(self._answers[0][0] - self._clock.now()))
+        times = [due for due, _ in self._answers][:1]
+        if self._next_unasked is not None:
+            times.append(self._next_unasked)
+        return max(0.0, self._clock.real_seconds(min(times) - self._clock.now())) if times else None
+
+    def _prepare_unasked(self) -> None:
+        """What the instrument sends by itself, when it is time; a late one is lost."""
+        period_s, now = self.instrument.period_s, self._clock.now()
+        if period_s is None or self._next_unasked is None or now < self._next_unasked:
+            return
+        scale = self._clock.real_seconds(1.0)
+        if late_s := self.faults.delay_s():
+            self.faults.sent(b"", b"")
+            self._next_unasked = now + late_s / scale
+            return
+        self._next_unasked = now + max(period_s, SHORTEST_PERIOD_S / scale)
+        for frame in () if self._silent else self.instrument.unasked():
+            sent = self.faults.sent(b"", frame)
+            self._answers.append((now + len(sent) * self._byte_s, sent))
 
     def _send_due(self) -> None:
         while self._answers and self._answers[0][0] <= self._clock.now():

@@ -9,11 +9,14 @@ from drivers.conformance import GaugeConformance, GaugeTwin, served_twin
 from drivers.gauges.cdi import CdiGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.request import RequestGauge
+from drivers.gauges.stream import StreamGauge
 from drivers.gauges.sylvac import SylvacGauge
+from drivers.gauges.uwave import UwaveGauge
 from drivers.interfaces import Gauge
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from tests.drivers.gauges.test_request import ID_H
+from tests.drivers.gauges.test_stream import RECEIVER
 
 
 class OfProtocol(GaugeConformance):
@@ -47,3 +50,13 @@ class TestCdi(OfProtocol):
 class TestByRequest(OfProtocol):
     protocol, factory = "request", RequestGauge
     more = {"request": ID_H}  # noqa: RUF012
+
+
+class TestUwave(OfProtocol):
+    protocol, factory = "uwave", UwaveGauge
+    more = {"channel": 2, "delay_s": 0.02}  # noqa: RUF012
+
+
+class TestStream(OfProtocol):
+    protocol, factory = "stream", StreamGauge
+    more = {"stream": RECEIVER, "delay_s": 0.02}  # noqa: RUF012

@@ -23,7 +23,7 @@ from hexacell.cell.simulation import FaultKind
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from procedures.devices.settling import trimmed_mean
-from tests.drivers.simulated.gauges.served.cell import PROTOCOLS, Cell
+from tests.drivers.simulated.gauges.served.cell import PROTOCOLS, STREAMS, Cell
 
 TABLE = Path(__file__).parents[3] / "docs" / "device-faults.md"
 BEGIN = "<!-- made by tests/drivers/simulated/test_fault_table.py -->\n"
@@ -124,7 +124,7 @@ async def encoder_row(fault: FaultKind) -> Row:
 async def rows() -> list[Row]:
     gauges = _kinds(lambda: Cell(["sylvac"] * 3).rack, "x")
     encoders = list(SimulatedEncoderBank.faults(_a_bank(), 1))
-    found = [await gauge_row(protocol, fault) for fault in gauges for protocol in PROTOCOLS]
+    found = [await gauge_row(protocol, fault) for fault in gauges for protocol in (*PROTOCOLS, *STREAMS)]
     return found + [await encoder_row(fault) for fault in encoders]
 
 

@@ -9,6 +9,7 @@ from drivers.gauges.cdi import CdiGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.gauges.sylvac import SylvacGauge
+from drivers.gauges.uwave import UwaveGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_instrument
 from drivers.simulated.gauges.indicator import Indicator
@@ -25,6 +26,8 @@ DRIVERS: dict[str, Callable[..., SerialGauge]] = {
 }
 
 PROTOCOLS = tuple(DRIVERS)
+STREAMS: dict[str, Callable[..., SerialGauge]] = {"uwave": UwaveGauge}
+STREAM_DELAY_S = 0.02
 TRANSPORTS = ("pty", "socket")
 FAST = 100.0
 TIMEOUT_S = 1.0  # for what does not answer; a busy machine answers late
@@ -38,14 +41,23 @@ class Cell:
     def __init__(self, protocols, transport="pty", timeout_s=LONG_S, **simulation):
         self.balls = {"x": 1.0, "y": 2.0, "z": 3.0}
         settings = [
-            GaugeSettings(name=name, axis=name, protocol=protocol, channel=number, timeout_s=timeout_s)
+            GaugeSettings(
+                name=name,
+                axis=name,
+                protocol=protocol,
+                channel=number,
+                timeout_s=timeout_s,
+                delay_s=STREAM_DELAY_S,
+            )
             for number, (name, protocol) in enumerate(zip("xyz", protocols, strict=True), start=1)
         ]
         plungers = {name: lambda name=name: self.balls[name] for name in "xyz"}
         simulated = SimulatedGauges(transport=transport, **simulation)
         self.rack = SimulatedGaugeBank(settings, plungers, simulated, CellClock(FAST))
         self.links = SharedSerialPorts(worst_latency_s=WORST_LATENCY_S)
-        self.gauges = {each.name: DRIVERS[each.protocol](each, self.links) for each in self.rack.gauges}
+        self.gauges = {
+            each.name: (DRIVERS | STREAMS)[each.protocol](each, self.links) for each in self.rack.gauges
+        }
 
     async def open(self):
         await asyncio.gather(*(gauge.open() for gauge in self.gauges.values()))

@@ -1,0 +1,121 @@
+"""Gauges that send values by themselves: the next fresh one counts, never one from before it was asked for.
+
+A value that comes just after a move may have been measured before it: adapters, radio and the instrument
+take time. So a frame counts only if its first byte came ``delay_s`` after the reading began, or later.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from enum import Enum, auto
+from typing import ClassVar
+
+from drivers.errors import EmptyChannel, GaugeAtEnd, GaugeSilent
+from drivers.gauges.protocol import FrameRejected, GaugeState
+from drivers.gauges.serial_gauge import SerialGauge
+from drivers.interfaces import GaugeReading
+from drivers.serial.shared_port import SharedSerialPorts
+from hexacell.cell.devices import GaugeSettings
+from hexacell.errors import DeviceError
+
+
+class Origin(Enum):
+    """Whose frame it is."""
+
+    OWN = auto()
+    ANOTHER_GAUGE = auto()
+    STATUS = auto()
+    UNKNOWN = auto()
+
+
+class StreamingGauge(SerialGauge):
+    """A gauge that nobody asks. Several may send on one line, each with its channel.
+
+    Attributes:
+        usual_delay_s: how long ago a value may have been measured when it comes, unless the cell file says.
+    """
+
+    value_request = b""
+    usual_delay_s: ClassVar[float] = 0.1
+
+    def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
+        super().__init__(settings, ports)
+        self._delay_s = self.usual_delay_s if settings.delay_s is None else settings.delay_s
+        self._fresh_from_s = 0.0
+        self._latest = 0
+
+    @abstractmethod
+    def _origin(self, frame: bytes) -> Origin:
+        """Whose frame it is."""
+
+    async def read(self) -> GaugeReading:
+        """As :meth:`SerialGauge.read`, of values that came afterwards."""
+        self._begin()
+        return await super().read()
+
+    async def read_once(self) -> GaugeReading:
+        """The next value that was measured afterwards."""
+        self._begin()
+        return await super().read_once()
+
+    async def check(self) -> None:
+        """As :meth:`SerialGauge.check`; only what every value tells."""
+        self._begin()
+        await super().check()
+
+    async def _connect(self) -> None:
+        await super()._connect()
+        self._latest = self._open_port().log.count
+        self._begin()
+
+    def _begin(self) -> None:
+        self._fresh_from_s = self._open_port().now() + self._delay_s
+
+    async def _read_state(self) -> GaugeState:
+        # each value tells all there is
+        try:
+            shown = await self._read_value()
+        except GaugeAtEnd:
+            return GaugeState()
+        return GaugeState(unit=shown.unit, decimals=shown.decimals)
+
+    async def _ask(self, _request: bytes) -> bytes:
+        """The next fresh frame of this gauge."""
+        port = self._open_port()
+        deadline_s = max(port.now(), self._fresh_from_s) + self.settings.timeout_s
+        heard: dict[Origin, bytes] = {}
+        while True:
+            for frame in port.log.after(self._latest):
+                self._latest = frame.number
+                origin = self._origin(frame.data)
+                if frame.began_after_s < self._fresh_from_s:
+                    continue
+                if origin is Origin.OWN:
+                    return frame.data
+                heard[origin] = frame.data
+            if port.now() >= deadline_s:
+                raise self._missing(heard)
+            await port.listen()
+            port = self._open_port()
+
+    def _missing(self, heard: dict[Origin, bytes]) -> DeviceError | FrameRejected:
+        """Why there was no frame, from those of other origins."""
+        if Origin.UNKNOWN in heard:
+            return FrameRejected(heard[Origin.UNKNOWN])
+        waited = f"sends nothing for {self.settings.timeout_s:g} s"
+        if Origin.ANOTHER_GAUGE in heard:
+            return EmptyChannel(
+                f"channel {self.channel} {waited}, others on port {self.settings.port} do",
+                subject=self.subject,
+                action="Switch its transmitter on, move its plunger off an end, or correct channel in the "
+                "cell file",
+            )
+        return GaugeSilent(
+            f"{waited} on port {self.settings.port}",
+            subject=self.subject,
+            action="Switch it on and have it send by itself, move its plunger off an end, check its cable, "
+            "and port in the cell file",
+        )
+
+    def _require_silence(self) -> None:
+        """There is none."""

@@ -1,0 +1,52 @@
+"""Mitutoyo U-WAVE-R: the receiver of several indicators with radio transmitters.
+
+Line 57600 8N1. Each transmitter sends ``DT1``, four digits (its group and channel), sign, eleven characters
+of digits and point, and ``M`` or ``I`` for mm or inch, with a carriage return; lines that begin with ``ST``
+or ``TI`` are about transmitters (two drivers of others with captured frames, ``DT10002-0000000.001M``).
+A transmitter sends when its key is pressed, or by itself if its event-driven mode is on.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import ClassVar
+
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
+from drivers.gauges.streaming import Origin, StreamingGauge
+from drivers.serial.shared_port import SharedSerialPorts
+from hexacell.cell.devices import GaugeSettings
+
+VALUE_FRAME = re.compile(rb"DT1(\d{4})([+-])(?=.{11}[MI])(\d+\.\d+)([MI])")
+HEADER = re.compile(rb"DT1(\d{4})")
+STATUS = re.compile(rb"(ST|TI|RI)\d[ -~]*")
+UNITS = {b"M": Unit.MM, b"I": Unit.INCH}
+
+
+def channel_of(frame: bytes) -> int | None:
+    """The channel whose value a frame is; none if it is no value, to the last byte."""
+    match = VALUE_FRAME.fullmatch(frame)
+    return None if match is None else int(match[1])
+
+
+class UwaveGauge(StreamingGauge):
+    """A dial indicator with a U-WAVE transmitter; its ``channel`` is 203 for the digits 0203."""
+
+    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
+        "uwave", "Mitutoyo U-WAVE", LineSettings(57600), "DT10002-0000000.001M\r"
+    )
+    usual_delay_s: ClassVar[float] = 0.5  # its radio, and the transmitter's own interval
+
+    def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
+        super().__init__(settings, ports)
+        self.channel = settings.channel
+
+    def _origin(self, frame: bytes) -> Origin:
+        if header := HEADER.match(frame):
+            return Origin.OWN if int(header[1]) == self.channel else Origin.ANOTHER_GAUGE
+        return Origin.STATUS if STATUS.fullmatch(frame) else Origin.UNKNOWN
+
+    def _parse_value(self, frame: bytes) -> DisplayedValue:
+        match = VALUE_FRAME.fullmatch(frame)
+        if match is None:
+            raise FrameRejected(frame)
+        return DisplayedValue.of(match[2], match[3], frame, UNITS[match[4]])

@@ -1,0 +1,87 @@
+"""Simulated gauges that the cell file describes: they send their example, with other numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import ClassVar
+
+from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.instruments import Instrument, SingleIndicator
+from hexacell.cell.devices import DescribedFrame, RequestSettings, StreamSettings
+
+
+class ByRequest(SingleIndicator):
+    """One that is asked."""
+
+    at_end: ClassVar[bytes] = b"ERROR\r\n"
+
+    def __init__(self, indicators: Mapping[int, Indicator], request: RequestSettings) -> None:
+        super().__init__(indicators)
+        self._request = request
+        self._template = _Template(request)
+
+    @staticmethod
+    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
+        """Without an example a plain number."""
+        return f"{value:+.{5 if inch else 3}f}\r".encode()
+
+    def answer(self, command: bytes) -> bytes:
+        """The value; commands come without their carriage return."""
+        return self._reply(command.decode("latin-1")) if self.indicator.powered else b""
+
+    def _reply(self, command: str) -> bytes:
+        if command != self._request.ask.rstrip("\r\n"):
+            return b""
+        shown = self.indicator.shown()
+        return self.at_end if shown is None else self._template.filled(shown, 1)
+
+
+class Streaming(Instrument):
+    """One that sends by itself, or several behind one receiver."""
+
+    period_s: ClassVar[float | None] = 0.05
+    at_end: ClassVar[bytes] = b""
+
+    def __init__(self, indicators: Mapping[int, Indicator], described: StreamSettings) -> None:
+        super().__init__(indicators)
+        self._template = _Template(described)
+
+    def answer(self, command: bytes) -> bytes:
+        """None: it does not listen."""
+        del command
+        return b""
+
+    @staticmethod
+    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
+        """Without an example a plain number."""
+        return f"{value:+.{5 if inch else 3}f}\r\n".encode()
+
+    def _value(self, channel: int) -> bytes:
+        shown = self.indicators[channel].shown()
+        return self.at_end if shown is None else self._template.filled(shown, channel)
+
+
+class _Template:
+    """The example of a frame, whose number and channel are others."""
+
+    def __init__(self, described: DescribedFrame) -> None:
+        match = re.fullmatch(described.answer, described.example.strip("\r\n"))
+        if match is None:
+            raise ValueError(described.example)
+        self._example, self._mm_per_unit = described.example, described.mm_per_unit
+        self._number = match.span(described.number_group)
+        self._channel = match.span("channel") if "channel" in match.groupdict() else None
+
+    def filled(self, mm: float, channel: int) -> bytes:
+        """The frame of a value."""
+        shown = self._example[slice(*self._number)]
+        decimals = len(shown.partition(".")[2])
+        parts = [(self._number, f"{mm / self._mm_per_unit:+0{len(shown)}.{decimals}f}")]
+        if self._channel is not None:
+            width = self._channel[1] - self._channel[0]
+            parts.append((self._channel, f"{channel:0{width}d}"))
+        text = self._example
+        for (start, end), part in sorted(parts, reverse=True):
+            text = text[:start] + part + text[end:]
+        return text.encode("latin-1")

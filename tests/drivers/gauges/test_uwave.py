@@ -1,0 +1,179 @@
+"""Mitutoyo U-WAVE-R on a line where nobody asks: captured frames, freshness, channels, faults."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.errors import EmptyChannel, GaugeSilent, GaugeUnsteady, PortLost, WrongAnswer, WrongSetting
+from drivers.gauges.uwave import UwaveGauge, channel_of
+from drivers.interfaces import GaugeReading
+from drivers.serial.port import SLICE_S
+from drivers.serial.shared_port import SharedSerialPorts
+from drivers.simulated.gauges.uwave import Uwave
+from hexacell.cell.devices import GaugeSettings
+from tests.drivers.gauges.streaming_line import StreamingLine
+
+DELAY_S = 0.02
+
+
+@pytest.fixture
+def line(dialogue):
+    return StreamingLine(dialogue)
+
+
+@pytest.fixture
+async def gauge(links, settings):
+    gauge = UwaveGauge(settings("uwave", channel=2, delay_s=DELAY_S, timeout_s=0.2), links)
+    yield gauge
+    await gauge.close()
+
+
+@pytest.mark.parametrize(
+    ("frame", "value", "decimals"),
+    [
+        (b"DT10000+00000011.88M", 11.88, 2),
+        (b"DT10002-0000000.001M", -0.001, 3),
+        (b"DT10203+000.1234567I", 0.1234567, 7),
+    ],
+)
+def test_frames_that_were_captured_are_read(frame, value, decimals):
+    gauge = UwaveGauge(GaugeSettings(name="x", axis="x", protocol="uwave"), SharedSerialPorts())
+    shown = gauge._parse_value(frame)
+    assert (shown.value, shown.decimals) == (value, decimals)
+    assert shown.unit == ("inch" if frame.endswith(b"I") else "mm")
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        b"DT10002-0000000.001",
+        b"DT10002-0000000.001MM",
+        b"DT10002-000000.001M",
+        b"DT1002-00000000.001M",
+        b"DT10002 0000000.001M",
+        b"DT10002-00000000001M",
+        b"ST1000100009233899",
+        b"TI1120000009241511",
+        b"",
+    ],
+)
+def test_what_is_no_whole_value_is_none(frame):
+    assert channel_of(frame) is None
+
+
+@given(st.floats(-99, 99), st.integers(0, 9999), st.booleans())
+def test_what_the_simulated_receiver_sends_is_understood(value, channel, inch):
+    frame = Uwave.format_value(channel, value, inch=inch).rstrip(b"\r")
+    gauge = UwaveGauge(GaugeSettings(name="x", axis="x", protocol="uwave"), SharedSerialPorts())
+    assert channel_of(frame) == channel
+    assert gauge._parse_value(frame).value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
+
+
+async def test_opening_and_reading_take_what_comes(line, dialogue, gauge):
+    line.repeats(b"DT10002-0000001.234M\r")
+    assert (await gauge.open()).description == "Mitutoyo U-WAVE"
+    assert await gauge.read() == GaugeReading(-1.234, "DT10002-0000001.234M")
+    assert dialogue.settings["baudrate"] == 57600
+    await gauge.check()
+
+
+async def test_a_value_from_before_the_reading_began_is_never_taken(line, gauge):
+    line.repeats(b"DT10002+0000001.000M\r")
+    await gauge.open()
+    line.backlog(b"DT10002+0000001.000M\r" * 200 + b"DT10002+000")  # nobody listened during the move
+    line.repeats(b"DT10002+0000002.000M\r", first=b"0001.000M\r")
+    assert (await gauge.read()).value_mm == 2.0
+    line.backlog(b"DT10002+0000002.000M\r" * 200)
+    line.repeats(b"DT10002+0000003.000M\r")
+    assert (await gauge.read_once()).value_mm == 3.0
+
+
+async def test_a_value_that_was_still_on_its_way_is_not_taken_either(line, gauge):
+    line.repeats(b"DT10002+0000001.000M\r")
+    await gauge.open()
+    line.at_s(DELAY_S / 2, b"DT10002+0000001.000M\r")
+    line.at_s(DELAY_S + 2 * SLICE_S, b"DT10002+0000002.000M\r")
+    assert (await gauge.read_once()).value_mm == 2.0
+
+
+async def test_lines_about_transmitters_and_values_of_others_are_not_its_own(line, gauge):
+    line.repeats(b"ST1000100009233899\rDT10001+0000009.000M\rTI1120000009241511\rDT10002+0000001.000M\r")
+    await gauge.open()
+    assert (await gauge.read()).value_mm == 1.0
+
+
+async def test_three_gauges_find_theirs_on_one_line(line, links, settings):
+    line.repeats(b"DT10001+0000001.000M\rDT10002+0000002.000M\rDT10103+0000003.000M\r")
+    channels = {"x": 1, "y": 2, "z": 103}
+    gauges = [
+        UwaveGauge(settings("uwave", name, channel=channel, delay_s=DELAY_S), links)
+        for name, channel in channels.items()
+    ]
+    for gauge in gauges:
+        await gauge.open()
+    assert [(await gauge.read()).value_mm for gauge in gauges] == [1.0, 2.0, 3.0]
+    for gauge in gauges:
+        await gauge.close()
+
+
+async def test_a_transmitter_that_is_off_is_told_from_a_receiver_that_is(line, gauge):
+    line.repeats(b"DT10002+0000001.000M\r")
+    await gauge.open()
+    line.repeats(b"DT10001+0000001.000M\r")
+    with pytest.raises(EmptyChannel, match=r"gauge y: channel 2 sends nothing for 0\.2 s, others on"):
+        await gauge.read()
+    line.stops()
+    with pytest.raises(GaugeSilent, match=r"gauge y: sends nothing for 0\.2 s on port wire\. Switch it on"):
+        await gauge.read()
+
+
+async def test_inches_are_refused(line, gauge):
+    line.repeats(b"DT10002+000000.0394I\r")
+    with pytest.raises(WrongSetting, match="gauge y: answers in inch"):
+        await gauge.open()
+
+
+async def test_another_unit_than_at_the_first_opening_is_refused(line, gauge):
+    line.repeats(b"DT10002+0000001.000M\r")
+    await gauge.open()
+    line.repeats(b"DT10002+000001.0000M\r")
+    with pytest.raises(WrongSetting, match="shows 4 decimals"):
+        await gauge.read()
+
+
+async def test_noise_alone_is_quoted(line, gauge):
+    line.repeats(b"DT1000?+0000001.000M\r")
+    with pytest.raises(WrongAnswer, match="where protocol uwave has answers like"):
+        await gauge.open()
+
+
+async def test_damaged_values_between_others_are_left_out(line, gauge):
+    line.repeats(b"DT10002+0000001.000M\rDT10002+00000x1.000M\rDT10002+0000001.001M\r")
+    await gauge.open()
+    assert (await gauge.read()).value_mm in {1.0, 1.001}
+
+
+async def test_a_damaged_value_that_comes_twice_at_once_confirms_nothing(line, gauge):
+    line.repeats(b"DT10002+0000001.000M\r")
+    await gauge.open()
+    line.repeats(
+        b"DT10002+0000001.000M\r", first=b"DT10002+0000005.000M\r" * 2, first_at_s=DELAY_S + SLICE_S
+    )
+    assert (await gauge.read()).value_mm == 1.0
+
+
+async def test_readings_that_do_not_agree_are_an_error(line, gauge):
+    line.repeats(b"DT10002+0000001.000M\rDT10002+0000003.000M\r")
+    await gauge.open()
+    with pytest.raises(GaugeUnsteady):
+        await gauge.read()
+
+
+async def test_a_lost_port_names_the_gauge(line, dialogue, gauge):
+    line.repeats(b"DT10002+0000001.000M\r")
+    await gauge.open()
+    dialogue.broken = OSError(5, "Input/output error")
+    with pytest.raises(PortLost, match="gauge y: port wire was lost"):
+        await gauge.read()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from functools import partial
 
+from drivers.encoders.alarm_poll import AlarmPoll
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand
 from drivers.encoders.node_identity import (
@@ -14,7 +15,7 @@ from drivers.encoders.node_identity import (
     read_device_type,
     read_identity,
 )
-from drivers.encoders.node_monitor import AlarmPoll, NodeMonitor, check_nodes
+from drivers.encoders.node_monitor import NodeMonitor, check_nodes
 from drivers.encoders.node_settings import switch_sync_counter_off
 from drivers.encoders.object_dictionary import DeviceType
 from drivers.encoders.pdo_configuration import configure_position_tpdo
@@ -106,6 +107,7 @@ class EncoderSession:
     def read(self) -> EncoderSample:
         """One complete sample; valid only if no fault is found after it."""
         self.bus.check()
+        self._alarms.begin_sample()
         counts = self._sampler.sample(signed=self._settings.signed)
         self._alarms.check()
         self.bus.check()

@@ -1,7 +1,4 @@
-"""Monitoring of the nodes: boot-up, heartbeat and emergency messages (CiA 301), and alarm entries.
-
-Alarms that a device signals without an emergency message are found by reading 1001h and 6503h.
-"""
+"""Monitoring of the nodes: boot-up, heartbeat and emergency messages (CiA 301)."""
 
 from __future__ import annotations
 
@@ -12,8 +9,7 @@ from collections.abc import Sequence
 from canopen.emcy import EmcyError
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import EncoderNode, Leg, silent_nodes, subject_of
-from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, WARNINGS
+from drivers.encoders.canopen_node import Leg, silent_nodes, subject_of
 from drivers.errors import InvalidSampleError, RestartedNodeError
 
 HEARTBEAT = 0x700
@@ -128,52 +124,3 @@ def _restarted(legs: Sequence[Leg]) -> RestartedNodeError:
 def _text(code: int, register: int) -> str:
     description = _KNOWN_EMERGENCIES.get(code) or EmcyError(code, register, b"", 0.0).get_desc().lower()
     return f"emergency {code:04X} ({description}, error register {register:#04x})"
-
-
-ALARM_POLL_S = 0.1
-"""Period at which the alarm entries are read."""
-
-WARNINGS_EVERY = 10
-"""Warnings are read at each such reading only: an SDO takes as long as a position."""
-
-_COMMUNICATION = 0x10
-"""Bit of the error register for communication errors, which do not concern positions."""
-
-
-class AlarmPoll:
-    """Reads the alarm entries of all nodes: at first, then every ``ALARM_POLL_S`` and after emergencies."""
-
-    def __init__(self, nodes: Sequence[EncoderNode], monitors: Sequence[NodeMonitor]) -> None:
-        self._monitors = monitors
-        self._emergencies_seen = -1
-        self._polls = 0
-        self._due = 0.0
-        self._entries = [
-            (node, entry)
-            for node in nodes
-            for entry in (ERROR_REGISTER, ALARMS, WARNINGS)
-            if node.read_optional(entry) is not None
-        ]
-        # A warning from before is told when the encoders are opened, and need not end every run.
-        self._known = {
-            (node, entry): node.read(entry) for node, entry in self._entries if entry is WARNINGS
-        }
-        self.check()
-
-    def check(self) -> None:
-        """Read the alarm entries if they are due; an alarm is an ``InvalidSampleError``."""
-        emergencies = sum(monitor.emergencies for monitor in self._monitors)
-        if time.monotonic() < self._due and emergencies == self._emergencies_seen:
-            return
-        self._polls += 1
-        for node, entry in self._entries:
-            if entry is WARNINGS and self._polls % WARNINGS_EVERY:
-                continue
-            value = node.read(entry)
-            if entry is ERROR_REGISTER:
-                value &= ~_COMMUNICATION
-            if value & ~self._known.get((node, entry), 0):
-                word = "a warning" if entry is WARNINGS else "an alarm"
-                raise invalid_sample(f"has {word} ({entry} is {value:#06x})", node.leg)
-        self._emergencies_seen = emergencies
-        self._due = time.monotonic() + ALARM_POLL_S

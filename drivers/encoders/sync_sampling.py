@@ -46,7 +46,10 @@ class SyncSampler:
         bus.network.subscribe(SYNC, self._on_foreign_sync)
 
     def sample(self, *, signed: bool) -> tuple[int, ...]:
-        """One complete sample, the counts of all legs, after at most ``MAX_SYNCS`` SYNCs."""
+        """One complete sample, the counts of all legs, after at most ``MAX_SYNCS`` SYNCs.
+
+        It is valid if :meth:`EncoderBus.check` finds nothing after it.
+        """
         for _ in range(MAX_SYNCS):
             is_synchronized = self._await_late_responses()
             self._send_sync()
@@ -54,7 +57,6 @@ class SyncSampler:
                 continue
             if not is_synchronized:
                 self._bus.listen(LATE_RESPONSE_TIMEOUTS * self._timeout_s)
-            self._bus.check()
             return self._decode(signed=signed)
         raise self._silent()
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 
-from drivers.encoders import node_monitor
+from drivers.encoders import alarm_poll, node_monitor
 from drivers.encoders.can_bus import ERROR_FRAMES
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.errors import BusError, InvalidSampleError, RestartedNodeError, SilentNodeError
@@ -62,7 +63,7 @@ async def test_an_emergency_during_a_sample_makes_it_invalid(raw, bank):
 
 
 async def test_the_alarms_are_read_after_an_emergency(raw, bank, monkeypatch):
-    monkeypatch.setattr("drivers.encoders.node_monitor.ALARM_POLL_S", 60.0)
+    monkeypatch.setattr(alarm_poll, "ALARM_POLL_S", 60.0)
     for node in raw.nodes.values():
         node.objects[0x6503, 0] = bytes(2)
     await bank.open()
@@ -77,8 +78,14 @@ async def test_the_alarms_are_read_after_an_emergency(raw, bank, monkeypatch):
     await bank.read()
 
 
-async def test_alarms_without_an_emergency_are_found(raw, bank, monkeypatch):
-    monkeypatch.setattr("drivers.encoders.node_monitor.ALARM_POLL_S", 0.0)
+@pytest.fixture
+def alarms_read_always(monkeypatch):
+    monkeypatch.setattr(alarm_poll, "ALARM_POLL_S", 0.0)
+    monkeypatch.setattr(alarm_poll, "BUS_SHARE", math.inf)
+    monkeypatch.setattr(alarm_poll, "WARNINGS_EVERY", 1)
+
+
+async def test_alarms_without_an_emergency_are_found(raw, bank, alarms_read_always):
     for node in raw.nodes.values():
         node.objects[0x6503, 0] = bytes(2)
     await bank.open()
@@ -196,9 +203,7 @@ async def test_without_heartbeats_silence_is_no_fault(bank, heartbeats):
     await bank.read()
 
 
-async def test_a_warning_that_comes_during_a_run_makes_samples_invalid(raw, bank, monkeypatch):
-    monkeypatch.setattr(node_monitor, "ALARM_POLL_S", 0.0)
-    monkeypatch.setattr(node_monitor, "WARNINGS_EVERY", 1)
+async def test_a_warning_that_comes_during_a_run_makes_samples_invalid(raw, bank, alarms_read_always):
     for node in raw.nodes.values():
         node.objects[0x6505, 0] = b"\x01\0"  # told at opening
     await bank.open()

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Awaitable, Callable
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.encoders import node_monitor
+from drivers.encoders import alarm_poll
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
@@ -149,8 +150,9 @@ def table(found: list[Row]) -> str:
 async def test_every_fault_is_seen_or_harmless_as_the_table_says(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(node_monitor, "ALARM_POLL_S", 0.0)
-    monkeypatch.setattr(node_monitor, "WARNINGS_EVERY", 1)
+    monkeypatch.setattr(alarm_poll, "ALARM_POLL_S", 0.0)
+    monkeypatch.setattr(alarm_poll, "BUS_SHARE", math.inf)
+    monkeypatch.setattr(alarm_poll, "WARNINGS_EVERY", 1)
     made = table(await rows())
     with capsys.disabled():
         print(f"\n{made}")

@@ -23,7 +23,8 @@ from hexacell.application.offline import plan_of
 from hexacell.application.stated_poses import require_stated_poses
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell, validated
-from hexacell.cell.model import DEFAULT_MECHANISM, cell_model
+from hexacell.cell.model import cell_model
+from hexacell.cell.robot import DEFAULT_MECHANISM
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, flatten_errors
 from hexacell.kinematics.mechanism import Mechanism

@@ -17,7 +17,8 @@ from pydantic import SecretStr, ValidationError
 
 from hexacell.cell.diagnostics import Diagnosis, ModelLookup
 from hexacell.cell.fields import Section
-from hexacell.cell.model import DEFAULT_MECHANISM, CellSettings, cell_model
+from hexacell.cell.model import CellSettings, cell_model
+from hexacell.cell.robot import DEFAULT_MECHANISM
 from hexacell.errors import FileError, did_you_mean, joined
 from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text

@@ -27,7 +27,6 @@ from hexacell.cell.fields import (
     NotNegative,
     Positive,
     Section,
-    Text,
     broken_rule,
 )
 from hexacell.cell.joint_units import in_joint_unit
@@ -48,6 +47,7 @@ from hexacell.cell.measuring import (
 from hexacell.cell.notifications import MOST_NOTIFICATIONS, NotificationSettings
 from hexacell.cell.opcua import OpcUaSettings
 from hexacell.cell.recovery import RecoverySettings
+from hexacell.cell.robot import RobotSettings, mechanism_of
 from hexacell.cell.simulation import SimulatedEncoders, SimulatedMotion, SimulationSettings
 from hexacell.cell.speed import SpeedSettings
 from hexacell.cell.unattended import UnattendedSettings
@@ -57,12 +57,9 @@ from hexacell.cell.uncertainty import (
     RotaryUncertaintySettings,
     UncertaintySettings,
 )
-from hexacell.kinematics.encoder_scales import WithEncoderScales
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import LEGS, JointUnit, ParameterKind, ParameterSet
-from hexacell.plugins import Group, load
 
-DEFAULT_MECHANISM = "hexaglide"
 MOST_THERMOMETERS = 100
 
 SectionType = TypeVar("SectionType", bound=Section)
@@ -70,21 +67,6 @@ SectionType = TypeVar("SectionType", bound=Section)
 
 class ToleranceSettings(Section):
     """Largest deviations of the built robot from its drawing; has a key a kind, and ``ball_mm``."""
-
-
-class RobotSettings(Section):
-    """The mechanism and its drawing."""
-
-    mechanism: Text = Field(
-        DEFAULT_MECHANISM,
-        description="hexaglide, gough-stewart, six-rails, rotary-cranks, or one that a plug-in adds",
-    )
-    nominal: GeometrySettings = Field(description="the drawing; identification starts from it")
-    encoder_scales: bool = Field(
-        False,
-        description="whether errors of the encoders' scales are identified too: encoder_scale in drawing, "
-        "tolerances and the controller's config, which needs a place for them",
-    )
 
 
 class CellSettings(Section):
@@ -123,7 +105,7 @@ class CellSettings(Section):
     @property
     def mechanism(self) -> Mechanism:
         """The mechanism that the file names; raises ``UsageError`` if it is not installed."""
-        return mechanism_of(self.robot.mechanism, encoder_scales=self.robot.encoder_scales)
+        return self.robot.built()
 
     @property
     def reference_agreement(self) -> tuple[float, float]:
@@ -260,20 +242,6 @@ class CellSettings(Section):
         if refusals:
             raise ValidationError.from_exception_data(self.name, refusals)
         return self
-
-
-@cache
-def mechanism_named(name: str) -> Mechanism:
-    """The mechanism that is announced under a name; raises ``UsageError`` if there is none."""
-    found: Mechanism = load(Group.MECHANISMS, name)()
-    return found
-
-
-@cache
-def mechanism_of(name: str, *, encoder_scales: bool) -> Mechanism:
-    """The same, with errors of the encoders' scales if these are identified."""
-    named = mechanism_named(name)
-    return WithEncoderScales(named) if encoder_scales else named
 
 
 def cell_model(mechanism: str, *, encoder_scales: bool = False) -> type[CellSettings]:

@@ -26,14 +26,36 @@ def hurried(machine) -> None:
     machine.ini.write_text(re.sub(r"FERROR = [\d.]+", "FERROR = 100", text))
 
 
+def with_screws(machine) -> None:
+    """Its legs are screws, for LinuxCNC and for the cell."""
+    random = np.random.default_rng(17)
+    axes = {plate: np.round(random.normal(size=(6, 3)), 3).tolist() for plate in ("base", "platform")}
+    pins = ["setp genhexkins.screw-lead 10.0"] + [
+        f"setp genhexkins.{plate}-n.{leg}.{axis} {value}"
+        for plate, six in axes.items()
+        for leg, vector in enumerate(six)
+        for axis, value in zip("xyz", vector, strict=True)
+    ]
+    hal, cell = machine.folder / "hexapod.hal", machine.folder / "cell.toml"
+    hal.write_text("\n".join([hal.read_text(), *pins, ""]))
+    stated = "\n".join(f"{plate}_axes = {six}" for plate, six in axes.items())
+    cell.write_text(f"{cell.read_text()}\n[robot.screws]\nlead_mm = 10.0\n{stated}\n")
+
+
 @pytest.mark.parametrize(
-    ("name", "height", "fails"),
-    [("linuxcnc", 550.0, "hexaglidekins.fwd-kins-fail"), ("hexapod", 780.0, "genhexkins.fwd-kins-fail")],
+    ("name", "height", "fails", "changed", "count"),
+    [
+        ("linuxcnc", 550.0, "hexaglidekins.fwd-kins-fail", hurried, POSES),
+        ("hexapod", 780.0, "genhexkins.fwd-kins-fail", hurried, POSES),
+        ("hexapod", 780.0, "genhexkins.fwd-kins-fail", with_screws, POSES // 10),
+    ],
+    ids=["hexaglide", "hexapod", "screws"],
 )
-def test_a_thousand_poses_have_the_same_joints(request, name, height, fails) -> None:
+def test_random_poses_have_the_same_joints(request, name, height, fails, changed, count) -> None:
     machine = request.getfixturevalue(name)
     machine.shut_down()
     hurried(machine)
+    changed(machine)
     machine.start()
     cell = load_cell(machine.folder / "cell.toml")
     controller = config_format(cell.settings).read(cell.config_path)
@@ -41,7 +63,7 @@ def test_a_thousand_poses_have_the_same_joints(request, name, height, fails) -> 
     random = np.random.default_rng(16)
     spans = np.array([60.0, 60.0, 60.0, 20.0, 20.0, 20.0])
     middle = np.array([0.0, 0.0, height, 0.0, 0.0, 0.0])
-    commanded = np.round(middle + spans * random.uniform(-1.0, 1.0, (POSES, 6)), 6)
+    commanded = np.round(middle + spans * random.uniform(-1.0, 1.0, (count, 6)), 6)
     poses = [Pose(*row) for row in commanded.tolist()]
     with machine.connect() as client:
         client.make_ready()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from hexacell.cell import devices, limits, measuring, model, simulation
 from hexacell.cell.loader import describe, dump, schema
-from hexacell.cell.model import DEFAULT_MECHANISM
+from hexacell.cell.robot import DEFAULT_MECHANISM
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 numbers = st.floats(-1e6, 1e6)

@@ -1,0 +1,73 @@
+"""Section ``[robot.screws]``: legs that are screws."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexacell.cell.loader import load_cell
+from hexacell.errors import FileError
+from hexacell.kinematics.encoder_scales import WithEncoderScales
+from hexacell.kinematics.mechanisms.screw_legs import ScrewLegs
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.robot_model import robot_of
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+SCREWS = f"""
+[robot.screws]
+lead_mm = 5.0
+base_axes = {[[1.0, 0.5 * leg, 0.0] for leg in range(6)]}
+platform_axes = {[[0.2 * leg, 1.0, 0.0] for leg in range(6)]}
+"""
+SCALES = (
+    ("[robot]\n", "[robot]\nencoder_scales = true\n"),
+    ("[tolerances]\n", "[tolerances]\nencoder_scale = 1e-3\n"),
+)
+
+
+@pytest.fixture
+def cell_with(tmp_path: Path):
+    def write(name: str, text: str, *changes: tuple[str, str]) -> Path:
+        cell, config = ((CONFIGS / f"{name}.{kind}").read_text() for kind in ("toml", "controller.toml"))
+        for old, new in changes:
+            assert old in cell
+            cell = cell.replace(old, new, 1)
+        (tmp_path / f"{name}.controller.toml").write_text(config)
+        (tmp_path / "cell.toml").write_text(cell + text)
+        return tmp_path / "cell.toml"
+
+    return write
+
+
+def test_its_robot_has_legs_that_the_screws_correct(cell_with) -> None:
+    with_screws, without = (robot_of(load_cell(cell_with("gough-stewart", text))) for text in (SCREWS, ""))
+    pose = PoseBatch.of([Pose(0.0, 0.0, 780.0, 10.0, 5.0, 15.0)])
+    assert isinstance(with_screws.mechanism, ScrewLegs)
+    added = with_screws.mechanism.inverse(with_screws.drawing, (), pose) - without.mechanism.inverse(
+        without.drawing, (), pose
+    )
+    assert 0.01 < np.abs(added).max() < 5.0 / 4.0
+
+
+def test_every_robot_of_a_cell_has_the_same_mechanism(cell_with) -> None:
+    settings = load_cell(cell_with("gough-stewart", SCREWS)).settings
+    assert settings.mechanism is settings.mechanism
+
+
+def test_errors_of_scale_go_with_them(cell_with) -> None:
+    mechanism = load_cell(cell_with("gough-stewart", SCREWS, *SCALES)).settings.mechanism
+    assert isinstance(mechanism, WithEncoderScales)
+    assert isinstance(mechanism.exact, ScrewLegs)
+
+
+def test_a_mechanism_without_such_legs_refuses_them(cell_with) -> None:
+    with pytest.raises(FileError, match="the legs of hexaglide are no screws"):
+        load_cell(cell_with("simulated-hexaglide", SCREWS))
+
+
+def test_an_axis_without_a_direction_is_refused_by_its_line(cell_with) -> None:
+    wrong = SCREWS.replace("[1.0, 0.0, 0.0]", "[0.0, 0.0, 0.0]", 1)
+    with pytest.raises(FileError, match=r"cell\.toml:\d+: .*0, 0, 0 is no direction"):
+        load_cell(cell_with("gough-stewart", wrong))

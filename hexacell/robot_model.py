@@ -236,10 +236,9 @@ def controller_geometry(cell: Cell, path: Path | None = None) -> ControllerGeome
         FileError: one of the files is absent, or does not hold what it should.
     """
     found = config_format(cell.settings).read(path or cell.config_path)
-    ini, controller = cell.settings.limits.ini, cell.settings.controller
-    if ini is None:
+    if (ini := cell.settings.limits.ini) is None:
         return found
-    limits = limits_of_ini(cell.path.parent / ini, controller.unit_mm, controller.joint_unit_mm)
+    limits = limits_of_ini(cell.path.parent / ini, cell.settings.controller.unit_mm)
     return replace(found, limits=found.limits.narrowed(limits))
 
 

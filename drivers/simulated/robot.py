@@ -21,7 +21,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.motion.trajectory import interpolate_line
 
 LINE_STEPS = 24
-"""Number of segments of a straight line, at whose ends slider positions are computed."""
+"""Number of segments of a straight line, at whose ends joint variables are computed."""
 
 
 class SimulatedMachine:
@@ -120,10 +120,10 @@ class SimulatedMachine:
         self.keeps_geometry = on
 
     def switch_on(self) -> None:
-        """Read the geometry again; the sliders stay, so the controller's pose changes.
+        """Read the geometry again; the joints stay, so the controller's pose changes.
 
         Raises:
-            FileError: the config cannot be read, or its geometry has no pose at the slider positions.
+            FileError: the config cannot be read, or its geometry has no pose at these joint variables.
         """
         if self.keeps_geometry:
             return

@@ -40,5 +40,5 @@ class LinuxcncIni(KeyedConfig):
             keys,
             lambda text, path: IniText(text, path, options.section),
             options.unit_mm,
-            lambda text, path: limits_in(text, path, options.unit_mm, options.unit_mm),
+            lambda text, path: limits_in(text, path, options.unit_mm),
         )

@@ -13,23 +13,27 @@ from hexacell.kinematics.parameters import LEGS
 from hexacell.storage import atomic_files
 
 LINEAR, ANGULAR = "XYZ", "ABC"
+ROTARY_JOINT = "ANGULAR"
 
 
-def limits_of_ini(path: Path, unit_mm: float = 1.0, joint_unit: float = 1.0) -> ControllerLimits:
+def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
     """The limits in an INI file, in mm and deg; of axes and joints that are not all there: none.
 
-    ``unit_mm`` is one unit of length of the machine, ``joint_unit`` one of its joints.
+    ``unit_mm`` is one unit of length of the machine; angles are in degrees on every machine.
 
     Raises:
         FileError: the file cannot be read, or a limit is no number, or not above the other.
     """
     text = IniText(atomic_files.read_text(path, LARGEST_CONFIG_BYTES), path, "")
-    return limits_in(text, path, unit_mm, joint_unit)
+    return limits_in(text, path, unit_mm)
 
 
-def limits_in(ini: NumberLookup, source: Path, unit_mm: float, joint_unit: float) -> ControllerLimits:
+def limits_in(ini: NumberLookup, source: Path, unit_mm: float) -> ControllerLimits:
     """The same of a text that was read from ``source``."""
-    joints = [_range(ini, f"JOINT_{leg}", joint_unit, source) for leg in range(LEGS)]
+    joints = [
+        _range(ini, section, 1.0 if _turns(ini, section) else unit_mm, source)
+        for section in (f"JOINT_{leg}" for leg in range(LEGS))
+    ]
     axes = [
         *(_range(ini, f"AXIS_{axis}", unit_mm, source) for axis in LINEAR),
         *(_range(ini, f"AXIS_{axis}", 1.0, source) for axis in ANGULAR),
@@ -38,6 +42,12 @@ def limits_in(ini: NumberLookup, source: Path, unit_mm: float, joint_unit: float
     return ControllerLimits(
         joints=tuple(stated) if len(stated) == LEGS else None, axes=tuple(axes) if any(axes) else None
     )
+
+
+def _turns(ini: NumberLookup, joint: str) -> bool:
+    """Whether a joint is one of angles; without ``TYPE`` LinuxCNC takes it for one of lengths."""
+    key = f"{joint}/TYPE"
+    return ini.has(key) and ini.number(key).text.upper() == ROTARY_JOINT
 
 
 def _range(ini: NumberLookup, section: str, unit: float, source: Path) -> Range | None:

@@ -157,7 +157,7 @@ class LinuxcncrshController:
         await self._session.stop(self._settings.position_tolerance_mm)
 
     async def reload(self, permitted: StartupActions) -> None:
-        """Reload its config while it is switched off; sliders must not move.
+        """Reload its config while it is switched off; joints must not move.
 
         Raises:
             StartupNotPermitted: It was restarted, or came into emergency stop, and needs more than to be

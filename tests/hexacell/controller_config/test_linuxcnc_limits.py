@@ -35,10 +35,21 @@ def test_an_inch_machine_has_angles_in_degrees_too(ini) -> None:
     path = ini(
         "[AXIS_X]", "MIN_LIMIT = -2", "MAX_LIMIT = 3", "[AXIS_B]", "MIN_LIMIT = -45", "MAX_LIMIT = 45"
     )
-    found = limits_of_ini(path, 25.4, 25.4)
+    found = limits_of_ini(path, 25.4)
     assert found.axes is not None
     assert found.axes[0] == pytest.approx((-50.8, 76.2))
     assert found.axes[1:] == (None, None, None, (-45.0, 45.0), None)
+
+
+@pytest.mark.parametrize(
+    ("kind", "limits"),
+    [("TYPE = LINEAR", (-50.8, 76.2)), ("TYPE = ANGULAR", (-2.0, 3.0)), ("FERROR = 1", (-50.8, 76.2))],
+)
+def test_joints_that_turn_have_limits_in_degrees(ini, kind, limits) -> None:
+    each = [(f"[JOINT_{leg}]", kind, "MIN_LIMIT = -2", "MAX_LIMIT = 3") for leg in range(6)]
+    found = limits_of_ini(ini(*(line for lines in each for line in lines)), 25.4)
+    assert found.joints is not None
+    assert found.joints == tuple(pytest.approx(limits) for _ in range(6))
 
 
 def test_a_limit_that_is_not_there_is_none(ini) -> None:

@@ -28,6 +28,19 @@ QUICK = (
     ("encoder_mm = 0.01\ngauge_mm = 0.01", "encoder_mm = 0.014\ngauge_mm = 0.014"),
 )
 
+GAUGES = [
+    "cdi",
+    "digimatic-usb",
+    "heidenhain-nd",
+    "keyence-dl-rs1a",
+    "mitutoyo-id-h",
+    "mux10",
+    "request",
+    "stream",
+    "sylvac",
+    "uwave",
+]
+
 
 def run(*command: object, folder: Path) -> str:
     """What a command prints that ends well, in ``folder`` and without what leads to the checkout."""
@@ -93,7 +106,7 @@ print(json.dumps({"path": sys.path, "files": files, "plugins": plugins}))
     installed = site_packages(elsewhere)
     assert all(installed in Path(path).parents for path in found["files"])
     assert CHECKOUT not in {(tmp_path / path).resolve() for path in found["path"]}
-    assert found["plugins"]["hexacell.gauges"] == ["cdi", "mux10", "request", "stream", "sylvac", "uwave"]
+    assert found["plugins"]["hexacell.gauges"] == GAUGES
     empty = {group for group, plugins in found["plugins"].items() if not plugins}
     assert empty == {"hexacell.simulated_gauges"}, "those of hexacell itself are no plug-ins"
 

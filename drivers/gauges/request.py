@@ -6,23 +6,21 @@ number is. So a display counter or an amplifier with a serial line needs no driv
 
 from __future__ import annotations
 
-from drivers.errors import GaugeAtEnd
 from drivers.gauges.described_value import described_value, is_at_end
 from drivers.gauges.protocol import (
     DisplayedValue,
     FrameRejected,
-    GaugeState,
     LineSettings,
     ProtocolSpec,
 )
-from drivers.gauges.serial_gauge import SerialGauge
+from drivers.gauges.value_only import ValueOnlyGauge
 from drivers.serial.framing import LINE_ENDS
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError
 
 
-class RequestGauge(SerialGauge):
+class RequestGauge(ValueOnlyGauge):
     """A dial indicator, or what stands in its place, by request and answer."""
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
@@ -50,10 +48,3 @@ class RequestGauge(SerialGauge):
         if is_at_end(text, self._request):
             raise self._at_end(f"plunger at its end ({text})")
         raise FrameRejected(frame)
-
-    async def _read_state(self) -> GaugeState:
-        # decimals only: it has no other setting that can be asked for
-        try:
-            return GaugeState(decimals=(await self._read_value()).decimals)
-        except GaugeAtEnd:
-            return GaugeState()

@@ -10,9 +10,9 @@ from abc import abstractmethod
 from enum import Enum, auto
 from typing import ClassVar
 
-from drivers.errors import EmptyChannel, GaugeAtEnd, GaugeSilent
-from drivers.gauges.protocol import FrameRejected, GaugeState
-from drivers.gauges.serial_gauge import SerialGauge
+from drivers.errors import EmptyChannel, GaugeSilent
+from drivers.gauges.protocol import FrameRejected
+from drivers.gauges.value_only import ValueOnlyGauge
 from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
@@ -28,7 +28,7 @@ class Origin(Enum):
     UNKNOWN = auto()
 
 
-class StreamingGauge(SerialGauge):
+class StreamingGauge(ValueOnlyGauge):
     """A gauge that nobody asks. Several may send on one line, each with its channel.
 
     Attributes:
@@ -49,7 +49,7 @@ class StreamingGauge(SerialGauge):
         """Whose frame it is."""
 
     async def read(self) -> GaugeReading:
-        """As :meth:`SerialGauge.read`, of values that came afterwards."""
+        """As :meth:`drivers.gauges.serial_gauge.SerialGauge.read`, of values that came afterwards."""
         self._begin()
         return await super().read()
 
@@ -59,7 +59,7 @@ class StreamingGauge(SerialGauge):
         return await super().read_once()
 
     async def check(self) -> None:
-        """As :meth:`SerialGauge.check`; only what every value tells."""
+        """As :meth:`drivers.gauges.serial_gauge.SerialGauge.check`; only what every value tells."""
         self._begin()
         await super().check()
 
@@ -70,14 +70,6 @@ class StreamingGauge(SerialGauge):
 
     def _begin(self) -> None:
         self._fresh_from_s = self._open_port().now() + self._delay_s
-
-    async def _read_state(self) -> GaugeState:
-        # each value tells all there is
-        try:
-            shown = await self._read_value()
-        except GaugeAtEnd:
-            return GaugeState()
-        return GaugeState(unit=shown.unit, decimals=shown.decimals)
 
     async def _ask(self, _request: bytes) -> bytes:
         """The next fresh frame of this gauge."""

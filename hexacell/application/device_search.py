@@ -13,8 +13,8 @@ from drivers.discovery.gauges import PortFindings, search_port
 from drivers.serial.adapters import SerialPortFound, serial_ports
 from hexacell.plugins import Group, load, names
 
-DESCRIBED = frozenset({"request", "stream"})
-"""Protocols that nobody can try who does not know what is asked and sent."""
+UNTRIED = frozenset({"request", "stream", "keyence-dl-rs1a"})
+"""Protocols that are not tried: the cell file describes them, or the question stops machines (``M0``)."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class SearchFindings:
 async def search_devices(request: SearchRequest) -> SearchFindings:
     """Ask at every place, all ports at once; takes some seconds."""
     ports = tuple(SerialPortFound(port, port, "") for port in request.ports) or serial_ports()
-    factories = {name: load(Group.GAUGES, name) for name in names(Group.GAUGES) if name not in DESCRIBED}
+    factories = {name: load(Group.GAUGES, name) for name in names(Group.GAUGES) if name not in UNTRIED}
     gauges, controller = await asyncio.gather(
         asyncio.gather(*(search_port(port.port, factories) for port in ports)),
         search_controller(*request.controller),

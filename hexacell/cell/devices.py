@@ -134,6 +134,10 @@ class StreamSettings(DescribedFrame):
         return "channel" in re.compile(self.answer).groupindex
 
 
+WITH_CHANNELS = frozenset({"mux10", "uwave", "mitutoyo-id-h", "keyence-dl-rs1a"})
+"""Protocols in which several gauges share a port."""
+
+
 class GaugeSettings(Section):
     """One dial indicator."""
 
@@ -141,7 +145,7 @@ class GaugeSettings(Section):
     axis: Literal["x", "y", "z"] = Field(description="base axis along which its plunger moves")
     sign: Literal[1, -1] = Field(1, description="1: the reading grows when the ball moves along +axis")
     protocol: Text = Field(
-        description="sylvac, mux10, cdi, uwave, request, stream, or one that a plug-in adds"
+        description="sylvac, mux10, cdi and others of docs/drivers.md, or one that a plug-in adds"
     )
     port: Text | None = Field(None, description="device path or pyserial URL; gauges may share one")
     serial: dict[str, Any] = Field(
@@ -185,7 +189,7 @@ class GaugeSettings(Section):
     @property
     def shares_line(self) -> bool:
         """Whether others may be on its port, told apart by their channels."""
-        return self.protocol in {"mux10", "uwave"} or (self.stream is not None and self.stream.has_channel)
+        return self.protocol in WITH_CHANNELS or (self.stream is not None and self.stream.has_channel)
 
     @property
     def mounting(self) -> GaugeAxis:

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from functools import partial
 
 from drivers.simulated.gauges.described import ByRequest, Streaming
+from drivers.simulated.gauges.displays import DigimaticUsb, HeidenhainNd, IdH, KeyenceDlRs1a
 from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
 from drivers.simulated.gauges.instruments import INSTRUMENTS as ASKED
 from drivers.simulated.gauges.instruments import Instrument
@@ -21,7 +22,14 @@ from hexacell.clock import CellClock
 from hexacell.errors import FileError
 from hexacell.plugins import Group, load, names
 
-INSTRUMENTS: Mapping[str, type[Instrument]] = {**ASKED, "uwave": Uwave}
+INSTRUMENTS: Mapping[str, type[Instrument]] = {
+    **ASKED,
+    "digimatic-usb": DigimaticUsb,
+    "heidenhain-nd": HeidenhainNd,
+    "keyence-dl-rs1a": KeyenceDlRs1a,
+    "mitutoyo-id-h": IdH,
+    "uwave": Uwave,
+}
 """By the protocol in the cell file."""
 
 InstrumentFactory = Callable[[Mapping[int, Indicator]], Instrument]

@@ -22,6 +22,8 @@ class Instrument(ABC):
     """The answer with the plunger at an end of its travel."""
     introduction: ClassVar[bytes] = b""
     """What it sends when it is switched on."""
+    command_end: ClassVar[bytes] = b"\r"
+    """Ends each command."""
     period_s: ClassVar[float | None] = None
     """How often it sends unasked; none if it waits for a command."""
 
@@ -30,7 +32,7 @@ class Instrument(ABC):
 
     @abstractmethod
     def answer(self, command: bytes) -> bytes:
-        """The answer to ``command``, which has no carriage return."""
+        """The answer to ``command``, without its end."""
 
     def unasked(self) -> tuple[bytes, ...]:
         """What it sends each period, of all its indicators that are on."""

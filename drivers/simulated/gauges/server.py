@@ -17,7 +17,6 @@ from drivers.simulated.serial_line import SerialLine
 from drivers.simulated.served_device import Closeable
 from hexacell.clock import CellClock
 
-COMMAND_END = b"\r"
 COMMAND_LIMIT = 256
 SHORTEST_PERIOD_S = 0.005
 """Of what is sent unasked, in real time, however quick the cell's clock is."""
@@ -123,7 +122,7 @@ class GaugeLineServer(Closeable):
                 done.set_result(None)
 
     def _receive(self, data: bytes) -> None:
-        *commands, self._received = (self._received + data).split(COMMAND_END)
+        *commands, self._received = (self._received + data).split(self.instrument.command_end)
         self._received = self._received[-COMMAND_LIMIT:]
         for command in commands:
             self._answer(command.strip(b"\n"))
@@ -134,7 +133,7 @@ class GaugeLineServer(Closeable):
             answer = b""
         late_s = self.faults.delay_s() / self._clock.real_seconds(1.0)
         answer = self.faults.sent(command, answer)
-        wire_s = (len(command) + len(COMMAND_END) + len(answer)) * self._byte_s
+        wire_s = (len(command) + len(self.instrument.command_end) + len(answer)) * self._byte_s
         free_at = max([self._clock.now(), *(due for due, _ in self._answers)])
         self._answers.append((free_at + self._latency_s + late_s + wire_s, answer))
 

@@ -7,6 +7,10 @@ from typing import Any
 
 from drivers.conformance import GaugeConformance, GaugeTwin, served_twin
 from drivers.gauges.cdi import CdiGauge
+from drivers.gauges.digimatic_usb import DigimaticUsbGauge
+from drivers.gauges.heidenhain_nd import HeidenhainGauge
+from drivers.gauges.keyence_dl_rs1a import KeyenceGauge
+from drivers.gauges.mitutoyo_id_h import IdHGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.request import RequestGauge
 from drivers.gauges.stream import StreamGauge
@@ -60,3 +64,21 @@ class TestUwave(OfProtocol):
 class TestStream(OfProtocol):
     protocol, factory = "stream", StreamGauge
     more = {"stream": RECEIVER, "delay_s": 0.02}  # noqa: RUF012
+
+
+class TestIdH(OfProtocol):
+    protocol, factory = "mitutoyo-id-h", IdHGauge
+    more = {"channel": 7}  # noqa: RUF012
+
+
+class TestHeidenhain(OfProtocol):
+    protocol, factory = "heidenhain-nd", HeidenhainGauge
+
+
+class TestKeyence(OfProtocol):
+    protocol, factory = "keyence-dl-rs1a", KeyenceGauge
+    more = {"channel": 2}  # noqa: RUF012
+
+
+class TestDigimaticUsb(OfProtocol):
+    protocol, factory = "digimatic-usb", DigimaticUsbGauge

@@ -17,6 +17,12 @@ def test_the_echo_of_the_request_is_no_answer():
     assert cut_frame(b"?\r", b"?\r", b"\r") is None
     assert cut_frame(b"?\r+1.234\r", b"?\r", b"\r") == (b"+1.234\r", b"")
     assert cut_frame(b"R\r\n+1, MM\r\n", b"R\r", b"\r\n") == (b"+1, MM\r\n", b"")
+    assert cut_frame(b"M0\rM0,+001.0000\r\n", b"M0\r\n", b"\r") == (b"M0,+001.0000\r", b"\n")
+
+
+def test_an_answer_that_begins_like_the_request_is_none_of_its_echo():
+    assert cut_frame(b"911\r", b"9\r", b"\r") == (b"911\r", b"")
+    assert cut_frame(b"M0,+001.0000\r\n", b"M0\r\n", b"\r") == (b"M0,+001.0000\r", b"\n")
 
 
 def test_bytes_after_the_frame_are_returned_separately():

@@ -6,6 +6,10 @@ import itertools
 from collections.abc import Callable
 
 from drivers.gauges.cdi import CdiGauge
+from drivers.gauges.digimatic_usb import DigimaticUsbGauge
+from drivers.gauges.heidenhain_nd import HeidenhainGauge
+from drivers.gauges.keyence_dl_rs1a import KeyenceGauge
+from drivers.gauges.mitutoyo_id_h import IdHGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.gauges.sylvac import SylvacGauge
@@ -26,7 +30,13 @@ DRIVERS: dict[str, Callable[..., SerialGauge]] = {
 }
 
 PROTOCOLS = tuple(DRIVERS)
-STREAMS: dict[str, Callable[..., SerialGauge]] = {"uwave": UwaveGauge}
+MORE_DRIVERS: dict[str, Callable[..., SerialGauge]] = {
+    "mitutoyo-id-h": IdHGauge,
+    "heidenhain-nd": HeidenhainGauge,
+    "keyence-dl-rs1a": KeyenceGauge,
+    "digimatic-usb": DigimaticUsbGauge,
+    "uwave": UwaveGauge,
+}
 STREAM_DELAY_S = 0.02
 TRANSPORTS = ("pty", "socket")
 FAST = 100.0
@@ -56,7 +66,8 @@ class Cell:
         self.rack = SimulatedGaugeBank(settings, plungers, simulated, CellClock(FAST))
         self.links = SharedSerialPorts(worst_latency_s=WORST_LATENCY_S)
         self.gauges = {
-            each.name: (DRIVERS | STREAMS)[each.protocol](each, self.links) for each in self.rack.gauges
+            each.name: (DRIVERS | MORE_DRIVERS)[each.protocol](each, self.links)
+            for each in self.rack.gauges
         }
 
     async def open(self):

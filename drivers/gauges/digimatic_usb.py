@@ -1,0 +1,38 @@
+"""Digimatic indicators behind a microcontroller on USB: any line asks, a bare number answers.
+
+The number is in the unit of the instrument, which nothing tells; a line that begins with ``#`` is an error.
+So do open designs of such adapters (apirek/digimatic on GitHub). A USB port has no baud rate or parity.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import ClassVar
+
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec
+from drivers.gauges.value_only import ValueOnlyGauge
+from hexacell.errors import DeviceError
+
+VALUE_FRAME = re.compile(rb"([+-]?)(\d{1,5}\.\d{1,6})\r?\n")
+ERROR = re.compile(rb"# *([ -~]*)\r?\n")
+
+
+class DigimaticUsbGauge(ValueOnlyGauge):
+    """A Digimatic indicator by way of a microcontroller."""
+
+    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
+        "digimatic-usb", "Digimatic by microcontroller", LineSettings(115200), "-1.234\n"
+    )
+    value_request = b"\n"
+    terminator = b"\n"
+
+    def _parse_value(self, frame: bytes) -> DisplayedValue:
+        if match := VALUE_FRAME.fullmatch(frame):
+            return DisplayedValue.of(match[1], match[2], frame)
+        if error := ERROR.fullmatch(frame):
+            raise DeviceError(
+                f"its adapter reports: {error[1].decode('ascii')}",
+                subject=self.subject,
+                action="Switch the indicator on and check its cable",
+            )
+        raise FrameRejected(frame)

@@ -1,0 +1,39 @@
+"""Heidenhain ND display units with a length gauge (ND 221, 231, 281 and their like).
+
+Line 9600 7E2. The character STX requests the value: sign, ten characters of blanks, digits and point, a
+blank, the unit (blank for mm, ``"`` for inch, ``?`` for a fault), sorting and series status, carriage
+return and line feed (ND 281B manual, page 47). The display may be set to add blank lines.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import ClassVar
+
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
+from drivers.gauges.value_only import ValueOnlyGauge
+
+VALUE_FRAME = re.compile(rb"([+\- ])(?=.{9}\d )( *\d+\.\d+) ([ \"?])[<>=? ]?([SAGD ]?) {0,2}\r")
+ACTUAL = {b"", b" ", b"A"}
+
+
+class HeidenhainGauge(ValueOnlyGauge):
+    """A length gauge behind an ND display."""
+
+    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
+        "heidenhain-nd", "Heidenhain ND", LineSettings(9600, 7, "E", 2), "-      5.23  =A\r\n"
+    )
+    value_request = b"\x02"
+
+    def _parse_value(self, frame: bytes) -> DisplayedValue:
+        match = VALUE_FRAME.fullmatch(frame)
+        if match is None:
+            raise FrameRejected(frame)
+        if match[3] == b"?":
+            raise self._voided(f"has lost the signal of its probe ({match[0].decode('ascii').strip()})")
+        if match[4] not in ACTUAL:
+            raise self._wrong_setting(
+                f"shows a result of a series of measurements ({match[4].decode('ascii')})",
+                "Set it to the actual value",
+            )
+        return DisplayedValue.of(match[1], match[2], frame, Unit.INCH if match[3] == b'"' else Unit.MM)

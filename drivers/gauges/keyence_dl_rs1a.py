@@ -1,0 +1,58 @@
+"""Keyence GT2 probes whose amplifiers share a DL-RS1A.
+
+Line 9600 8N1 as delivered. ``M0`` requests all values at once: ``M0``, then a comma, sign, three digits,
+point and decimals in mm for each amplifier from number 00 on, carriage return and line feed; ``ER,M0,nn``
+is an error (DL-RS1A manual, pages 9 to 15). Values are within 199.9999; others are none.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import ClassVar
+
+from drivers.errors import EmptyChannel
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
+from drivers.gauges.value_only import ValueOnlyGauge
+from drivers.serial.shared_port import SharedSerialPorts
+from hexacell.cell.devices import GaugeSettings
+from hexacell.errors import DeviceError
+
+FRAME = re.compile(rb"M0((?:,[+-]\d{3}\.\d{1,4}){1,15})\r")
+ERROR = re.compile(rb"ER,M0,(\d\d)\r")
+LARGEST_MM = 200.0
+
+
+class KeyenceGauge(ValueOnlyGauge):
+    """A probe; ``channel`` is its place in the answer: 1 for the amplifier 00."""
+
+    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
+        "keyence-dl-rs1a", "Keyence DL-RS1A", LineSettings(9600), "M0,+001.2345,-000.0010\r\n"
+    )
+    value_request = b"M0\r\n"
+
+    def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
+        super().__init__(settings, ports)
+        self._place = self.channel = settings.channel
+
+    def _parse_value(self, frame: bytes) -> DisplayedValue:
+        if error := ERROR.fullmatch(frame):
+            raise DeviceError(
+                f"reports error {error[1].decode('ascii')} instead of its value",
+                subject=self.subject,
+                action="Look it up in the manual of the DL-RS1A",
+            )
+        match = FRAME.fullmatch(frame)
+        if match is None:
+            raise FrameRejected(frame)
+        values = match[1].split(b",")[1:]
+        if not 1 <= self._place <= len(values):
+            raise EmptyChannel(
+                f"has channel {self._place}, where {len(values)} amplifiers answer",
+                subject=self.subject,
+                action="Correct channel in the cell file: 1 for the amplifier 00",
+            )
+        value = values[self._place - 1]
+        shown = DisplayedValue.of(value[:1], value[1:], value, Unit.MM)
+        if abs(shown.value) >= LARGEST_MM:
+            raise self._at_end(f"shows {shown.text}, no value, as at an end of its travel")
+        return shown

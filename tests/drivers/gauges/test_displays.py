@@ -1,0 +1,113 @@
+"""Displays and adapters of which only the value is asked, in dialogues as their manuals have them."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.errors import EmptyChannel, GaugeAtEnd, WrongAnswer, WrongSetting, ZeroVoid
+from drivers.gauges.digimatic_usb import DigimaticUsbGauge
+from drivers.gauges.heidenhain_nd import HeidenhainGauge
+from drivers.gauges.keyence_dl_rs1a import KeyenceGauge
+from drivers.gauges.mitutoyo_id_h import IdHGauge
+from drivers.gauges.protocol import FrameRejected
+from drivers.interfaces import GaugeReading
+from drivers.serial.shared_port import SharedSerialPorts
+from drivers.simulated.gauges.bank import simulated_instrument
+from drivers.simulated.gauges.indicator import Indicator
+from hexacell.cell.devices import GaugeSettings
+from hexacell.errors import DeviceError, HexacellError
+
+ID_H = (IdHGauge, "mitutoyo-id-h", b"GA07\r\n")
+ND = (HeidenhainGauge, "heidenhain-nd", b"\x02")
+KEYENCE = (KeyenceGauge, "keyence-dl-rs1a", b"M0\r\n")
+DIGIMATIC = (DigimaticUsbGauge, "digimatic-usb", b"\n")
+ALL = (ID_H, ND, KEYENCE, DIGIMATIC)
+
+VALUES = [
+    (ID_H, 7, b"GN07,+0016.2345\r\n", 16.2345),
+    (ID_H, 7, b"GN07,-0000.0005\r\n", -0.0005),
+    (ND, 1, b"-      5.23  =A\r\n", -5.23),
+    (ND, 1, b"\r\n+    5.2305    \r\n", 5.2305),
+    (ND, 1, b"-    0.0001   \r\n", -0.0001),
+    (KEYENCE, 1, b"M0,+001.2345\r\n", 1.2345),
+    (KEYENCE, 3, b"M0,+001.2345,-000.0010,-012.0000\r\n", -12.0),
+    (DIGIMATIC, 1, b"-1.234\n", -1.234),
+    (DIGIMATIC, 1, b"12.34\r\n", 12.34),
+]
+
+FAULTS = [
+    (ID_H, 7, b"GX07,+0016.2345\r\n", WrongSetting, "gauge y: shows its maximum. Set it to normal"),
+    (ID_H, 7, b"GN07,+000.63956\r\n", WrongSetting, "gauge y: answers in inch"),
+    (ID_H, 7, b"GN08,+0016.2345\r\n", WrongAnswer, "where protocol mitutoyo-id-h has answers like"),
+    (ND, 1, b'-   0.20591 "=A\r\n', WrongSetting, "gauge y: answers in inch"),
+    (ND, 1, b"-      5.23  =D\r\n", WrongSetting, r"result of a series of measurements \(D\)"),
+    (ND, 1, b"-      5.23 ?=A\r\n", ZeroVoid, "gauge y: has lost the signal of its probe"),
+    (ND, 1, b"-     5.23  =A\r\n", WrongAnswer, "where protocol heidenhain-nd has answers like"),
+    (KEYENCE, 3, b"M0,+001.2345,-000.0010\r\n", EmptyChannel, "has channel 3, where 2 amplifiers answer"),
+    (KEYENCE, 1, b"M0,+999.9999\r\n", GaugeAtEnd, r"gauge y: shows \+999\.9999, no value"),
+    (KEYENCE, 1, b"ER,M0,29\r\n", DeviceError, "gauge y: reports error 29 instead of its value"),
+    (KEYENCE, 1, b"M0,+01.2345\r\n", WrongAnswer, "where protocol keyence-dl-rs1a has answers like"),
+    (DIGIMATIC, 1, b"# timeout\n", DeviceError, "gauge y: its adapter reports: timeout"),
+    (DIGIMATIC, 1, b"0.12345\n", WrongSetting, "gauge y: answers in inch"),
+    (DIGIMATIC, 1, b"hello\n", WrongAnswer, "where protocol digimatic-usb has answers like"),
+]
+
+
+@pytest.mark.parametrize(("instrument", "channel", "frame", "value"), VALUES)
+async def test_it_is_asked_and_read(dialogue, links, settings, instrument, channel, frame, value):
+    factory, protocol, request = instrument
+    gauge = factory(settings(protocol, channel=channel), links)
+    dialogue.expect(*[(request, frame)] * 3)
+    await gauge.open()
+    reading = await gauge.read()
+    assert reading == GaugeReading(value, reading.raw)
+    assert reading.raw in frame.decode()
+    await gauge.close()
+
+
+@pytest.mark.parametrize(("instrument", "channel", "frame", "error", "message"), FAULTS)
+async def test_what_is_no_value_is_told(
+    dialogue, links, settings, instrument, channel, frame, error, message
+):
+    factory, protocol, request = instrument
+    gauge = factory(settings(protocol, channel=channel, resolution_mm=None), links)
+    good = next(frame for one, place, frame, _ in VALUES if one is instrument and place == channel)
+    dialogue.expect((request, good))
+    await gauge.open()
+    dialogue.expected += [(request, frame)] * 3
+    with pytest.raises(error, match=message):
+        await gauge.read()
+    dialogue.expected.clear()
+    await gauge.close()
+
+
+async def test_the_line_of_a_display_has_seven_bits_and_a_parity(dialogue, links, settings):
+    gauge = HeidenhainGauge(settings("heidenhain-nd"), links)
+    dialogue.expect((b"\x02", b"-      5.23  =A\r\n"))
+    await gauge.open()
+    assert [dialogue.settings[key] for key in ("baudrate", "bytesize", "parity", "stopbits")] == [
+        9600,
+        7,
+        "E",
+        2,
+    ]
+    await gauge.close()
+
+
+@pytest.mark.parametrize(("factory", "protocol", "question"), ALL)
+@given(value=st.floats(-6.0, 6.0), noise=st.binary(max_size=3), place=st.integers(0, 30))
+def test_what_its_twin_answers_is_read_and_damage_is_rejected_or_a_number(
+    factory, protocol, question, value, noise, place
+):
+    channel = 7 if factory is IdHGauge else 1
+    twin = simulated_instrument(protocol, {channel: Indicator(lambda: value)})
+    settings = GaugeSettings(name="x", axis="x", protocol=protocol, channel=channel)
+    gauge = factory(settings, SharedSerialPorts())
+    frame = twin.answer(question.strip(b"\r\n\x02")).partition(gauge.terminator)[0] + gauge.terminator
+    assert gauge._parse_value(frame).value == pytest.approx(value, abs=0.51e-3)
+    with suppress(FrameRejected, HexacellError):
+        assert abs(gauge._parse_value(frame[:place] + noise + frame[place + 1 :]).value) < 1e6

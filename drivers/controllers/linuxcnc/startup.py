@@ -22,6 +22,7 @@ _MODAL_ACTION = "Put it into RS274NGC_STARTUP_CODE, or send it in MDI"
 _OFFSET_MM = 1e-6
 _UNITS_MM = {"MM": 1.0, "CM": 10.0, "INCH": 25.4}
 _FULL_FEED_PERCENT = 100.0
+_MOST_REQUESTS = 2
 
 
 async def acknowledge_on_completion(commands: ControllerCommands) -> None:
@@ -108,17 +109,21 @@ async def home_joints(
 async def enter_mdi_mode(commands: ControllerCommands, timeouts: Timeouts) -> None:
     """Enter MDI mode, in which single blocks are executed.
 
+    What is asked for while homing ends may be acknowledged without effect, so it is asked for again.
+
     Raises:
         DeviceError: It stays in another mode.
     """
-    await commands.set("mode mdi")
 
     async def is_mdi() -> bool:
         return (await commands.get("mode")).upper() == "MDI"
 
-    if not await _becomes_true(is_mdi, timeouts):
-        problem = f"does not enter MDI mode: {await commands.reason()}"
-        raise DeviceError(problem, subject=commands.subject)
+    for _ in range(_MOST_REQUESTS):
+        await commands.set("mode mdi")
+        if await _becomes_true(is_mdi, timeouts):
+            return
+    problem = f"does not enter MDI mode: {await commands.reason()}"
+    raise DeviceError(problem, subject=commands.subject)
 
 
 async def check_coordinate_system(commands: ControllerCommands) -> str:

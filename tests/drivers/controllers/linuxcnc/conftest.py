@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from enum import Enum, auto
 
@@ -67,7 +67,7 @@ class ScriptedServer:
 
     def __init__(self, *conversations: list[Exchange]) -> None:
         self.deviations: list[str] = []
-        self.afterwards: dict[str, bytes | list[bytes]] = {}
+        self.afterwards: dict[str, bytes | list[bytes] | Callable[[], bytes]] = {}
         self.port = 0
         self.connections = 0
         self._conversing: set[asyncio.Task[None]] = set()
@@ -132,6 +132,8 @@ class ScriptedServer:
         answer = self.afterwards[line]
         if isinstance(answer, bytes):
             return answer
+        if callable(answer):
+            return answer()
         return answer.pop(0) if len(answer) > 1 else answer[0]
 
 

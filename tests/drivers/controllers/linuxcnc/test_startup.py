@@ -112,6 +112,20 @@ async def test_prepare_waits_until_each_state_is_reached(play):
     await driver.prepare(ALL)
 
 
+async def test_a_mode_that_was_asked_for_without_effect_is_asked_for_again(play):
+    play.patience = play.IMPATIENT
+    driver = await play.opened([*UNTIL_HOMED, *READY, MDI[0]])
+    afterwards = play.servers[0].afterwards
+
+    def second_request() -> bytes:
+        afterwards["get mode"] = b"MODE MDI\r\n"
+        return MDI[0][1]
+
+    afterwards |= {"get mode": b"MODE MANUAL\r\n", "set mode mdi": second_request}
+    afterwards |= dict([UNITS, CODES, OFFSETS, OVERRIDE])
+    await driver.prepare(ALL)
+
+
 async def test_prepare_accepts_a_server_without_the_optional_queries(play):
     unknown = [
         ("get user_linear_units", b"GET USER_LINEAR_UNITS NAK\r\n\r\n"),
@@ -141,8 +155,9 @@ async def test_prepare_accepts_a_server_without_the_optional_queries(play):
             "does not switch on: it is switched off",
         ),
         (
-            [*UNTIL_HOMED, *READY, ("set mode mdi", b"SET MODE ACK\n\r")],
+            [*UNTIL_HOMED, *READY, MDI[0]],
             {
+                "set mode mdi": MDI[0][1],
                 "get mode": b"MODE MANUAL\r\n",
                 "get estop": b"ESTOP OFF\r\n",
                 "get machine": b"MACHINE ON\r\n",

@@ -8,7 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
-CAPACITY_BYTES = 4 << 20
+CAPACITY_BYTES = 16 << 20
+"""Of memory."""
+
+ENTRY_BYTES = 250
+"""What an entry takes in memory beside its bytes: the most are of a few bytes."""
 
 
 class TrafficDirection(StrEnum):
@@ -39,7 +43,7 @@ TraceRecorder = Callable[[TraceEntry], None]
 
 
 class WireTrace:
-    """A recorder that keeps the latest entries, at most ``capacity`` bytes of traffic. Thread-safe.
+    """A recorder that keeps the latest entries, in about ``capacity`` bytes of memory. Thread-safe.
 
     Attributes:
         dropped: how many older entries were dropped.
@@ -56,9 +60,9 @@ class WireTrace:
         """Keep ``entry``; the oldest entries are dropped if necessary."""
         with self._lock:
             self._entries.append(entry)
-            self._size += len(entry.data)
+            self._size += _size(entry)
             while self._size > self._capacity:
-                self._size -= len(self._entries.popleft().data)
+                self._size -= _size(self._entries.popleft())
                 self.dropped += 1
 
     def entries(self) -> tuple[TraceEntry, ...]:
@@ -71,6 +75,10 @@ class WireTrace:
         entries = self.entries()
         head = [f"# {self.dropped} earlier entries were forgotten"] if self.dropped else []
         return "".join(f"{line}\n" for line in (*head, *entries))
+
+
+def _size(entry: TraceEntry) -> int:
+    return ENTRY_BYTES + len(entry.data)
 
 
 def _readable(data: bytes) -> str:

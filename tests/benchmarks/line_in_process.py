@@ -6,9 +6,11 @@ parity has a terminal behind it that checks it, as the kernel does with INPCK an
 
 from __future__ import annotations
 
+import errno
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from random import Random
 
@@ -17,9 +19,13 @@ import serial
 
 from drivers.serial import port
 from drivers.simulated.gauges.instruments import Instrument
+from drivers.simulated.gauges.line_faults import LineFaults
 
 MARK = b"\xff\0"
 """What a terminal puts before a byte of wrong parity."""
+
+LATE_S = 0.75
+"""A late answer comes so long after the others: later than a driver waits by default."""
 
 ODD_BITS = {"E": 0, "O": 1}
 ONE_BIT, BURST, LOST = 0.7, 0.85, 0.95
@@ -65,14 +71,18 @@ class LineTime(threading.local):
     """The time of each line, which has a thread of its own: it passes while the line waits for bytes.
 
     ``with_processor_time``: it also passes while the thread works, which it may do between two bytes.
+    ``elsewhere_s`` gives how long all lines were left alone.
     """
 
-    def __init__(self, *, with_processor_time: bool = False) -> None:
+    def __init__(
+        self, *, with_processor_time: bool = False, elsewhere_s: Callable[[], float] = float
+    ) -> None:
         self.waited_s = 0.0
+        self._elsewhere_s = elsewhere_s
         self._works = time.thread_time if with_processor_time else lambda: 0.0
 
     def monotonic(self) -> float:
-        return self.waited_s + self._works()
+        return self.waited_s + self._works() + self._elsewhere_s()
 
     time = monotonic
 
@@ -86,6 +96,9 @@ class InstrumentLine:
     Attributes:
         elapsed_s: simulated seconds up to the latest byte.
         asked: how many requests came.
+        faults: of the line, by name.
+        unplugged: whether it is.
+        silent: whether all answers are lost.
     """
 
     def __init__(
@@ -96,6 +109,8 @@ class InstrumentLine:
         self.timeout = self.write_timeout = 0.0
         self.elapsed_s = 0.0
         self.asked = 0
+        self.faults = LineFaults(LATE_S)
+        self.unplugged = self.silent = False
         self.instrument = instrument
         self._damage = damage
         self._latency_s = latency_s
@@ -110,6 +125,7 @@ class InstrumentLine:
         return self
 
     def open(self) -> None:
+        self._require_plugged()
         self.is_open = True
         self._coming.clear()
 
@@ -118,10 +134,12 @@ class InstrumentLine:
 
     @property
     def in_waiting(self) -> int:
+        self._require_plugged()
         now_s = self._time.monotonic()
         return sum(due_s <= now_s for due_s, _ in self._coming)
 
     def read(self, size: int) -> bytes:
+        self._require_plugged()
         time, coming = self._time, self._coming
         until_s = time.monotonic() + self.timeout
         time.wait_until(min(until_s, coming[0][0]) if coming else until_s)
@@ -132,12 +150,23 @@ class InstrumentLine:
         return bytes(data)
 
     def write(self, request: bytes) -> None:
+        self._require_plugged()
         self.asked += 1
-        answer = self._damage.of(self._with_parity(self.instrument.answer(request.rstrip(b"\r\n"))))
-        due_s = self._time.monotonic() + len(request) * self._byte_s + self._latency_s
-        for character in answer:
+        command = request.rstrip(b"\r\n")
+        late_s = self.faults.delay_s()
+        answer = self.faults.sent(command, self.instrument.answer(command))
+        due_s = self._time.monotonic() + len(request) * self._byte_s + self._latency_s + late_s
+        for character in self._damage.of(self._with_parity(b"" if self.silent else answer)):
             due_s += self._byte_s
             self._coming += [(due_s, byte) for byte in self._received(character)]
+
+    def introduce(self) -> None:
+        """Have the instrument say what it says when it is switched on."""
+        self._coming += [(0.0, byte) for byte in self.instrument.introduction]
+
+    def _require_plugged(self) -> None:
+        if self.unplugged:
+            raise serial.SerialException(errno.ENOENT, "unplugged")
 
     def _with_parity(self, answer: bytes) -> bytes:
         if self._odd is None:
@@ -155,10 +184,10 @@ class InstrumentLine:
 
 
 def have_lines(
-    monkeypatch: pytest.MonkeyPatch, lines: dict[str, InstrumentLine], *, with_processor_time: bool = False
+    monkeypatch: pytest.MonkeyPatch, lines: dict[str, InstrumentLine], line_time: LineTime | None = None
 ) -> None:
     """Let pyserial open these lines by their URL."""
-    line_time = LineTime(with_processor_time=with_processor_time)
+    line_time = line_time or LineTime()
 
     def opened(url: str, *, do_not_open: bool, parity: str = "N", **_: object) -> InstrumentLine:
         assert do_not_open

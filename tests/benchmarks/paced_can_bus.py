@@ -30,8 +30,6 @@ from tests.drivers.encoders.raw_node import (
 OPERATIONAL = 0x05
 NODES = range(1, 7)
 COUNTS = tuple(1000 * node for node in NODES)
-IDLE_S = 0.2
-"""So long nobody sends, in real time, before the time of the bus passes by as much."""
 
 
 def frame_bits(data_bytes: int) -> int:
@@ -82,13 +80,20 @@ class Pending:
 class PacedBus:
     """A bus with six encoders, and the driver as the other participant.
 
+    When nobody has sent for ``patience_s`` in real time, the time of the bus passes by ``idle_s``.
+
     Attributes:
         syncs: how many SYNCs were on the bus.
         busy_s: how long there was a frame on it.
+        unplugged: the nodes that are not on the bus.
     """
 
-    def __init__(self, bitrate: int, heartbeat_s: float) -> None:
+    def __init__(
+        self, bitrate: int, heartbeat_s: float, idle_s: float = 0.2, patience_s: float = 0.2
+    ) -> None:
         self.bitrate = bitrate
+        self.unplugged: set[int] = set()
+        self._idle_s, self._patience_s = idle_s, patience_s
         self.time = BusTime()
         self.syncs = 0
         self.busy_s = 0.0
@@ -119,8 +124,8 @@ class PacedBus:
     def recv(self, timeout: float | None = None) -> can.Message | None:
         del timeout
         with self.time.simulating(), self._sent:
-            if not self._pending and not self._sent.wait(IDLE_S):
-                self.time.wait_until(self.time.monotonic() + IDLE_S)
+            if not self._pending and not self._sent.wait(self._patience_s):
+                self.time.wait_until(self.time.monotonic() + self._idle_s)
             self._put_heartbeats()
             while self._pending:
                 frame = self._transmit()
@@ -132,7 +137,18 @@ class PacedBus:
         return None
 
     def shutdown(self) -> None:
-        pass
+        with self._sent:
+            self._pending.clear()
+
+    def say(self, can_id: int, data: bytes) -> None:
+        """Have a node send something by itself."""
+        with self._sent:
+            self._put(self.time.monotonic(), can_id, data)
+            self._sent.notify()
+
+    @property
+    def _on_the_bus(self) -> dict[int, RawNode]:
+        return {number: node for number, node in self.nodes.items() if number not in self.unplugged}
 
     def _put(self, ready_s: float, can_id: int, data: bytes, *, is_from_driver: bool = False) -> None:
         self._pending.append(Pending(ready_s, can_id, data, is_from_driver))
@@ -152,18 +168,18 @@ class PacedBus:
     def _react(self, frame: Pending) -> None:
         if frame.can_id == SYNC:
             self.syncs += 1
-            for node in self.nodes.values():
+            for node in self._on_the_bus.values():
                 for data in node.positions(self.syncs) if node.state == OPERATIONAL else ():
                     self._put(self._free_s, node.tpdo, data)
-        elif frame.can_id == NMT and frame.data[1] in self.nodes:
+        elif frame.can_id == NMT and frame.data[1] in self._on_the_bus:
             self.nodes[frame.data[1]].state = {1: OPERATIONAL, 0x80: 0x7F}[frame.data[0]]
-        elif frame.can_id - SDO_REQUEST in self.nodes and frame.data[0] != 0x80:
+        elif frame.can_id - SDO_REQUEST in self._on_the_bus and frame.data[0] != 0x80:
             node = self.nodes[frame.can_id - SDO_REQUEST]
             self._put(self._free_s, SDO_ANSWER + node.node, node.answer_sdo(frame.data))
 
     def _put_heartbeats(self) -> None:
         while self._next_heartbeat_s <= self.time.monotonic():
-            for node in self.nodes.values():
+            for node in self._on_the_bus.values():
                 self._put(self._next_heartbeat_s, HEARTBEAT + node.node, bytes((node.state,)))
             self._next_heartbeat_s += self._heartbeat_s
 

@@ -39,6 +39,7 @@ GAUGES = [
     "stream",
     "sylvac",
     "uwave",
+    "visa",
 ]
 
 

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from drivers.discovery import visa
 from drivers.discovery.streams import a_number, uwave_channels
 from drivers.errors import (
     EmptyChannel,
@@ -24,6 +25,7 @@ from hexacell.errors import DeviceError, HexacellError
 TIMEOUT_S = 0.5
 UWAVE = "uwave"
 BAUD_RATES = (9600, 115200)
+DESCRIBE_QUESTION = 'Say what it is asked with protocol = "visa" (docs/drivers.md)'
 DESCRIBE = 'Describe its lines with protocol = "stream" (docs/drivers.md)'
 
 CHANNELS = range(1, 5)
@@ -61,6 +63,8 @@ class PortFindings:
 
 async def search_port(port: str, factories: Mapping[str, GaugeFactory]) -> PortFindings:
     """Ask in every protocol, then listen; the first that is answered is the port's."""
+    if visa.SEPARATOR in port:
+        return await _identify(port)
     for protocol, factory in factories.items():
         if protocol == UWAVE:
             continue
@@ -71,6 +75,15 @@ async def search_port(port: str, factories: Mapping[str, GaugeFactory]) -> PortF
         if found:
             return PortFindings(port, tuple(found))
     return await _listen(port, factories.get(UWAVE))
+
+
+async def _identify(resource: str) -> PortFindings:
+    """The instrument with VISA."""
+    try:
+        answer = await asyncio.to_thread(visa.identification, resource)
+    except HexacellError as error:
+        return PortFindings(resource, problem=f"{error.problem}. {error.action}")
+    return PortFindings(resource, problem=f"is {answer}. {DESCRIBE_QUESTION}" if answer else "")
 
 
 async def _listen(port: str, uwave: GaugeFactory | None) -> PortFindings:

@@ -24,7 +24,8 @@ from drivers.gauges.protocol import (
 )
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.serial.adapters import adapter_at
-from drivers.serial.port import NoAnswer
+from drivers.serial.port import NoAnswer, SerialPort
+from drivers.serial.request_port import PortFactory
 from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, FileError
@@ -47,6 +48,7 @@ class SerialGauge(ABC):
     Attributes:
         value_request: the request for the displayed value.
         terminator: ends an answer.
+        port_factory: makes the line behind its port.
         channel: the input of a shared multiplexer; None if the gauge uses the line alone.
     """
 
@@ -54,6 +56,7 @@ class SerialGauge(ABC):
     normal_modes: ClassVar[frozenset[str]] = frozenset()
     value_request: bytes
     terminator: bytes = TERMINATOR
+    port_factory: PortFactory = SerialPort
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         self.settings = settings
@@ -155,11 +158,19 @@ class SerialGauge(ABC):
     async def _connect(self) -> None:
         if self.settings.port is None:
             raise FileError("has no port", subject=self.subject, action="Name it in the cell file")
-        serial = {**asdict(self.spec.line), **self.settings.serial}
-        port = self._ports.acquire(self.settings.port, self.name, serial, channel=self.channel)
+        port = self._ports.acquire(
+            self.settings.port,
+            self.name,
+            self._line_settings(),
+            channel=self.channel,
+            factory=self.port_factory,
+        )
         self._port = port
         self._session = await port.open()
         port.take_unsolicited()
+
+    def _line_settings(self) -> dict[str, object]:
+        return {**asdict(self.spec.line), **self.settings.serial}
 
     async def _read_state_when_awake(self) -> GaugeState:
         try:

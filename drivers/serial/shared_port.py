@@ -8,6 +8,7 @@ from functools import partial
 
 from drivers.serial.frame_log import FrameLog
 from drivers.serial.port import WORST_LATENCY_S, SerialPort
+from drivers.serial.request_port import PortFactory
 from drivers.wire_trace import TraceRecorder
 from drivers.worker_thread import Result, WorkerThread
 from hexacell.errors import FileError
@@ -29,12 +30,13 @@ class SharedSerialPort:
         settings: Mapping[str, object],
         trace: TraceRecorder | None = None,
         worst_latency_s: float = WORST_LATENCY_S,
+        factory: PortFactory = SerialPort,
     ) -> None:
         self.url = url
         self._settings = settings
         self._channels: dict[str, int | None] = {}
         self._worker = WorkerThread(f"serial {url}")
-        self._port = SerialPort(url, settings, self._worker.closing, trace, worst_latency_s)
+        self._port = factory(url, settings, self._worker.closing, trace, worst_latency_s)
 
     @property
     def open_count(self) -> int:
@@ -83,16 +85,23 @@ class SharedSerialPort:
 
     async def listen(self) -> None:
         """As :meth:`SerialPort.listen`."""
-        await self._run(self._port.listen)
+        await self._run(self._serial_port.listen)
 
     @property
     def log(self) -> FrameLog:
         """As that of :class:`SerialPort`: several gauges may find theirs in it."""
-        return self._port.log
+        return self._serial_port.log
 
     def now(self) -> float:
         """As :meth:`SerialPort.now`."""
-        return self._port.now()
+        return self._serial_port.now()
+
+    @property
+    def _serial_port(self) -> SerialPort:
+        """The port as one that can be listened to; others are only asked."""
+        if not isinstance(self._port, SerialPort):
+            raise TypeError(f"{self.url} is no serial port")
+        return self._port
 
     def require_silence(self) -> None:
         """Wait for a short silence before the next exchange, after a garbled frame."""
@@ -128,17 +137,25 @@ class SharedSerialPorts:
         self._ports: dict[str, SharedSerialPort] = {}
 
     def acquire(
-        self, url: str, gauge: str, settings: Mapping[str, object], *, channel: int | None = None
+        self,
+        url: str,
+        gauge: str,
+        settings: Mapping[str, object],
+        *,
+        channel: int | None = None,
+        factory: PortFactory = SerialPort,
     ) -> SharedSerialPort:
         """The port at ``url``, not opened yet if ``gauge`` is the first one to use it.
 
-        ``channel`` is the gauge's input of a multiplexer; None if the gauge uses the port alone. Must be
-        followed by :meth:`release`.
+        ``channel`` is the gauge's input of a multiplexer; None if the gauge uses the port alone.
+        ``factory`` makes the line behind it. Must be followed by :meth:`release`.
 
         Raises:
             FileError: Another gauge uses the port with other settings, alone, or on this channel.
         """
-        port = self._ports.get(url) or SharedSerialPort(url, settings, self._trace, self._worst_latency_s)
+        port = self._ports.get(url) or SharedSerialPort(
+            url, settings, self._trace, self._worst_latency_s, factory
+        )
         port.add_gauge(gauge, settings, channel)
         self._ports[url] = port
         return port

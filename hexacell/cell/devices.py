@@ -134,6 +134,35 @@ class StreamSettings(DescribedFrame):
         return "channel" in re.compile(self.answer).groupindex
 
 
+CHANNEL_PLACE = "{channel}"
+
+
+class VisaSettings(Section):
+    """What an instrument of protocol ``visa`` is asked, and how it must be set."""
+
+    ask: Text = Field(
+        min_length=1,
+        description="SCPI query of the value: MEAS:DIST?, or READ? (@{channel}) where gauges share it",
+    )
+    mm_per_unit: Positive = Field(1.0, description="what a unit of the number is, mm: 1000 for metres")
+    expect: dict[Text, Text] = Field(
+        default_factory=dict,
+        max_length=20,
+        description='what it must answer to queries of its settings: { "UNIT:LENG?" = "M" }',
+    )
+    identify: bool = Field(True, description="it is asked *IDN?")
+    backend: Text = Field("@py", description="of PyVISA: @py is pure Python, @ivi the library of a maker")
+
+    @property
+    def has_channel(self) -> bool:
+        """Whether several gauges share the instrument."""
+        return CHANNEL_PLACE in self.ask
+
+    def question(self, channel: int) -> str:
+        """What is asked for the value of a channel."""
+        return self.ask.replace(CHANNEL_PLACE, str(channel))
+
+
 WITH_CHANNELS = frozenset({"mux10", "uwave", "mitutoyo-id-h", "keyence-dl-rs1a"})
 """Protocols in which several gauges share a port."""
 
@@ -147,7 +176,9 @@ class GaugeSettings(Section):
     protocol: Text = Field(
         description="sylvac, mux10, cdi and others of docs/drivers.md, or one that a plug-in adds"
     )
-    port: Text | None = Field(None, description="device path or pyserial URL; gauges may share one")
+    port: Text | None = Field(
+        None, description="device path, pyserial URL or VISA resource; gauges may share one"
+    )
     serial: dict[str, Any] = Field(
         default_factory=dict, description="passed to pyserial; overrides the protocol's defaults"
     )
@@ -178,6 +209,7 @@ class GaugeSettings(Section):
     serial_number: Text = Field("", description="of the instrument, where it does not tell it itself")
     request: RequestSettings | None = Field(None, description="of protocol request: what is asked")
     stream: StreamSettings | None = Field(None, description="of protocol stream: what it sends")
+    visa: VisaSettings | None = Field(None, description="of protocol visa: what it is asked")
     certificate: CertificateSettings | None = Field(None, description="of its calibration")
 
     @model_validator(mode="after")
@@ -189,7 +221,8 @@ class GaugeSettings(Section):
     @property
     def shares_line(self) -> bool:
         """Whether others may be on its port, told apart by their channels."""
-        return self.protocol in WITH_CHANNELS or (self.stream is not None and self.stream.has_channel)
+        described = self.stream or self.visa
+        return self.protocol in WITH_CHANNELS or (described is not None and described.has_channel)
 
     @property
     def mounting(self) -> GaugeAxis:

@@ -11,7 +11,7 @@ import pytest
 from serial.tools import list_ports
 
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
-from hexacell.cell.devices import GaugeSettings, StreamSettings
+from hexacell.cell.devices import GaugeSettings, StreamSettings, VisaSettings
 from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
@@ -112,6 +112,18 @@ def test_gauges_that_send_unasked_are_heard(typed_here, streams) -> None:
     assert "channel 203: uwave: Mitutoyo U-WAVE, shows DT10203+0000001.250M" in said
     assert "sends '+01.25 mm' by itself at 9600 baud" in said
     assert 'protocol = "stream" (docs/drivers.md)' in said
+
+
+@pytest.mark.usefixtures("no_ports")
+def test_an_instrument_with_visa_is_asked_its_name(typed_here) -> None:
+    gauge = GaugeSettings(name="x", axis="x", protocol="visa", visa=VisaSettings(ask="MEAS:DIST?"))
+    simulated = SimulatedGauges(transport="socket")
+    with SimulatedGaugeBank([gauge], {"x": lambda: 1.25}, simulated, CellClock(1.0)) as bank:
+        [at] = [one.port for one in bank.gauges]
+        outcome = typed_here("devices", at, "--controller", NOBODY)
+    assert outcome.code == 0, outcome.err
+    said = " ".join(outcome.out.split())
+    assert f"{at}: is HEXACELL,SIMULATED,0,1. Say what it is asked with protocol" in said
 
 
 @pytest.mark.usefixtures("no_ports")

@@ -25,6 +25,7 @@ GAUGES = (
     "stream",
     "sylvac",
     "uwave",
+    "visa",
 )
 
 

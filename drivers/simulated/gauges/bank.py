@@ -12,11 +12,18 @@ from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
 from drivers.simulated.gauges.instruments import INSTRUMENTS as ASKED
 from drivers.simulated.gauges.instruments import Instrument
 from drivers.simulated.gauges.line_faults import LATE_TIMEOUTS, LineFault, LineFaults
+from drivers.simulated.gauges.scpi import Scpi, visa_resource
 from drivers.simulated.gauges.server import GaugeLineServer
 from drivers.simulated.gauges.uwave import Uwave
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.served_device import Closeable, Switch
-from hexacell.cell.devices import DescribedFrame, GaugeSettings, RequestSettings, StreamSettings
+from hexacell.cell.devices import (
+    DescribedFrame,
+    GaugeSettings,
+    RequestSettings,
+    StreamSettings,
+    VisaSettings,
+)
 from hexacell.cell.simulation import FaultKind, SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import FileError
@@ -32,12 +39,17 @@ INSTRUMENTS: Mapping[str, type[Instrument]] = {
 }
 """By the protocol in the cell file."""
 
+DESCRIBED = ("request", "stream", "visa")
+"""Protocols whose instruments the cell file describes."""
+
 InstrumentFactory = Callable[[Mapping[int, Indicator]], Instrument]
 """Makes an instrument of its indicators by channel."""
 
 
 def simulated_instrument(
-    protocol: str, indicators: Mapping[int, Indicator], described: DescribedFrame | None = None
+    protocol: str,
+    indicators: Mapping[int, Indicator],
+    described: DescribedFrame | VisaSettings | None = None,
 ) -> Instrument:
     """An instrument with ``protocol``, with ``indicators`` by channel; of this program or of a plug-in.
 
@@ -49,6 +61,8 @@ def simulated_instrument(
         return ByRequest(indicators, described)
     if protocol == "stream" and isinstance(described, StreamSettings):
         return Streaming(indicators, described)
+    if protocol == "visa" and isinstance(described, VisaSettings):
+        return Scpi(indicators, described)
     if protocol in INSTRUMENTS:
         return INSTRUMENTS[protocol](indicators)
     others = names(Group.SIMULATED_GAUGES)
@@ -57,7 +71,7 @@ def simulated_instrument(
         return made
     raise FileError(
         f"no simulated gauge speaks protocol {protocol}",
-        action=f"Choose one of {', '.join(sorted({*INSTRUMENTS, 'request', 'stream', *others}))}",
+        action=f"Choose one of {', '.join(sorted({*INSTRUMENTS, *DESCRIBED, *others}))}",
     )
 
 
@@ -90,9 +104,7 @@ class SimulatedGaugeBank(Closeable):
                 line = served.enter_context(self._serve(group))
                 self._lines |= {gauge.name: line for gauge in group}
             self._served = served.pop_all()
-        self.gauges = tuple(
-            gauge.model_copy(update={"port": self._lines[gauge.name].url}) for gauge in gauges
-        )
+        self.gauges = tuple(gauge.model_copy(update={"port": self._address(gauge)}) for gauge in gauges)
         """The settings of the gauges with the ports on which they are served."""
 
     def line(self, gauge: str) -> GaugeLineServer:
@@ -127,6 +139,10 @@ class SimulatedGaugeBank(Closeable):
         other = names[(names.index(gauge) + 1) % len(names)]
         self.indicators[gauge].exchange_with(self.indicators[other])
 
+    def _address(self, gauge: GaugeSettings) -> str:
+        url = self._lines[gauge.name].url
+        return visa_resource(url) if gauge.protocol == "visa" else url
+
     def _serve(self, group: Sequence[GaugeSettings]) -> GaugeLineServer:
         indicators = {_channel(gauge): self.indicators[gauge.name] for gauge in group}
         first = group[0]
@@ -134,7 +150,9 @@ class SimulatedGaugeBank(Closeable):
         instrument = (
             own(indicators)
             if own
-            else simulated_instrument(first.protocol, indicators, first.request or first.stream)
+            else simulated_instrument(
+                first.protocol, indicators, first.request or first.stream or first.visa
+            )
         )
         name = "-".join(gauge.name for gauge in group)
         return GaugeLineServer(

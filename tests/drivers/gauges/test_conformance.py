@@ -16,6 +16,7 @@ from drivers.gauges.request import RequestGauge
 from drivers.gauges.stream import StreamGauge
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.gauges.uwave import UwaveGauge
+from drivers.gauges.visa import VisaGauge
 from drivers.interfaces import Gauge
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
@@ -82,3 +83,9 @@ class TestKeyence(OfProtocol):
 
 class TestDigimaticUsb(OfProtocol):
     protocol, factory = "digimatic-usb", DigimaticUsbGauge
+
+
+class TestVisa(OfProtocol):
+    tolerance_mm = 1e-6
+    protocol, factory = "visa", VisaGauge
+    more = {"visa": {"ask": "MEAS:DIST?", "mm_per_unit": 1000.0}}  # noqa: RUF012

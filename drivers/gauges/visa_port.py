@@ -1,0 +1,190 @@
+"""An instrument with VISA as a line with requests and answers; all calls come from one thread.
+
+PyVISA is imported when such a line is opened. Its pure-Python backend needs no library of a maker's.
+"""
+
+from __future__ import annotations
+
+import termios
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from drivers.errors import PortLost
+from drivers.extras import optional
+from drivers.serial.port import FRAME_LIMIT, SLICE_S, NoAnswer
+from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
+from hexacell.errors import DeviceError
+
+EXTRA = "visa"
+PURE_PYTHON = "@py"
+MS = 1000.0
+BYTE_STREAMS = ("::SOCKET", "ASRL")
+SERIAL = "ASRL"
+LINE_ATTRIBUTES = {"baudrate": "baud_rate", "bytesize": "data_bits"}
+PARITIES = {"N": "none", "E": "even", "O": "odd", "M": "mark", "S": "space"}
+STOP_BITS = {1: "one", 1.5: "one_and_a_half", 2: "two"}
+
+
+class VisaPort:
+    """One VISA resource; ``settings`` are ``backend`` and, of a serial one, those of the line.
+
+    Sockets and serial lines are read byte by byte, so that closing never waits long, and are silent for
+    ``worst_latency_s`` after a time-out before the next request. Others (USB, LAN, GPIB) carry whole
+    messages: they are read with the time-out at once, and cleared after one.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        settings: Mapping[str, object],
+        closing: threading.Event,
+        recorder: TraceRecorder | None = None,
+        worst_latency_s: float = 2.0,
+    ) -> None:
+        self.url = url
+        self.subject = f"port {url}"
+        self.unsolicited: deque[bytes] = deque(maxlen=64)
+        self.open_count = 0
+        self.surplus_count = 0
+        self._settings = dict(settings)
+        self._closing = closing
+        self._recorder = recorder
+        self._worst_latency_s = worst_latency_s
+        self._is_stream = any(word in url.upper() for word in BYTE_STREAMS)
+        self._resource: Any = None
+        self._must_clear = False
+        self._visa: Any = None
+
+    def open(self) -> int:
+        """Open the resource unless it is open; how often it has been opened.
+
+        Raises:
+            UsageError: PyVISA is not installed.
+            PortLost: the resource cannot be opened.
+        """
+        self.require_not_closed()
+        if self._resource is None:
+            self._visa = optional("pyvisa", EXTRA, self.subject)
+            self._resource = self._opened()
+            self.open_count += 1
+            self._must_clear = False
+        return self.open_count
+
+    def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
+        """Send ``request``; its answer up to ``terminator``.
+
+        Raises:
+            NoAnswer: none came in time.
+            PortLost: the resource is not open, or was lost.
+        """
+        self.require_not_closed()
+        if self._resource is None:
+            raise self._lost("it is not open")
+        with self._visa_errors():
+            if self._must_clear:
+                self._clear()
+            self._record(TrafficDirection.SENT, request)
+            self._resource.write_raw(request)
+            return self._answer(terminator, timeout_s)
+
+    def require_silence(self) -> None:
+        """Drop what comes before the next request."""
+        self._must_clear = True
+
+    def require_not_closed(self) -> None:
+        """Raise if this program has closed the resource or is closing it."""
+        if self._closing.is_set():
+            raise PortLost(f"port {self.url} is closed", subject=self.subject)
+
+    def close(self) -> None:
+        """Close the resource; closing twice is harmless."""
+        resource, self._resource = self._resource, None
+        if resource is not None:
+            with suppress(Exception):  # it may be gone already
+                resource.close()
+
+    def _opened(self) -> Any:  # noqa: ANN401 - of a library that may be missing
+        try:
+            backend = str(self._settings.get("backend", PURE_PYTHON))
+            resource = self._visa.ResourceManager(backend).open_resource(self.url)
+            if self.url.upper().startswith(SERIAL):
+                self._set_line(resource)
+        except Exception as error:  # its backends raise anything, also Exception itself
+            raise PortLost(
+                f"port {self.url} cannot be opened: {error}",
+                subject=self.subject,
+                action="Check the instrument and port in the cell file",
+            ) from error
+        return resource
+
+    def _set_line(self, resource: Any) -> None:  # noqa: ANN401
+        constants = self._visa.constants
+        for name, attribute in LINE_ATTRIBUTES.items():
+            if name in self._settings:
+                setattr(resource, attribute, self._settings[name])
+        if "parity" in self._settings:
+            resource.parity = constants.Parity[PARITIES[str(self._settings["parity"])]]
+        if "stopbits" in self._settings:
+            stop_bits: Any = self._settings["stopbits"]
+            resource.stop_bits = constants.StopBits[STOP_BITS[stop_bits]]
+        resource.end_input = constants.SerialTermination.none
+
+    def _answer(self, terminator: bytes, timeout_s: float) -> bytes:
+        received = b""
+        deadline_s = time.monotonic() + timeout_s
+        while not received.endswith(terminator):
+            if time.monotonic() > deadline_s or len(received) > FRAME_LIMIT:
+                self._must_clear = True
+                raise NoAnswer(received)
+            received += self._some(timeout_s).lstrip(b"\r\n\0" if not received else b"")
+        return received
+
+    def _some(self, timeout_s: float) -> bytes:
+        """A byte of a stream, or a message; nothing if none comes in time."""
+        self.require_not_closed()
+        self._resource.timeout = MS * (SLICE_S if self._is_stream else timeout_s)
+        try:
+            data: bytes = self._resource.read_bytes(1) if self._is_stream else self._resource.read_raw()
+        except self._visa.errors.VisaIOError as error:
+            if error.error_code == self._visa.constants.StatusCode.error_timeout:
+                return b""
+            raise
+        self._record(TrafficDirection.RECEIVED, data)
+        return data
+
+    def _clear(self) -> None:
+        """Let late answers come and go."""
+        if not self._is_stream:
+            self._resource.clear()
+        quiet_from_s = time.monotonic()
+        give_up_s = quiet_from_s + 5 * self._worst_latency_s
+        while self._is_stream and time.monotonic() < quiet_from_s + self._worst_latency_s:
+            if self._some(SLICE_S):
+                quiet_from_s = time.monotonic()
+                self.surplus_count += 1
+            if quiet_from_s > give_up_s:
+                raise DeviceError(f"the device on {self.url} keeps sending unasked", subject=self.subject)
+        self._must_clear = False
+
+    def _record(self, direction: TrafficDirection, data: bytes) -> None:
+        if data and self._recorder is not None:
+            self._recorder(TraceEntry(time.time(), self.url, direction, data))
+
+    @contextmanager
+    def _visa_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, termios.error, self._visa.errors.Error) as error:
+            self.close()
+            raise self._lost(str(error)) from error
+
+    def _lost(self, reason: str) -> PortLost:
+        return PortLost(
+            f"port {self.url} was lost ({reason})",
+            subject=self.subject,
+            action="Connect it and open the device again; its zero is void",
+        )

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from operator import itemgetter
+
+from hexacell.errors import FileError
 
 CAPACITY_BYTES = 16 << 20
-"""Of memory."""
+"""Of memory, for each line."""
 
-ENTRY_BYTES = 250
+ENTRY_BYTES = 300
 """What an entry takes in memory beside its bytes: the most are of a few bytes."""
+
+ENTRY = re.compile(
+    r"(?P<time_s>\d+\.\d+) (?P<line>.+) (?P<direction>[<>]) (?P<bytes>[0-9a-f]{2}(?: [0-9a-f]{2})*)  .*"
+)
 
 
 class TrafficDirection(StrEnum):
@@ -43,38 +51,82 @@ TraceRecorder = Callable[[TraceEntry], None]
 
 
 class WireTrace:
-    """A recorder that keeps the latest entries, in about ``capacity`` bytes of memory. Thread-safe.
+    """A recorder that keeps the latest entries of each line, in about ``capacity`` bytes of memory a line.
 
-    Attributes:
-        dropped: how many older entries were dropped.
+    Thread-safe. A busy line, such as that of encoders, takes nothing from the others.
     """
 
     def __init__(self, capacity: int = CAPACITY_BYTES) -> None:
-        self.dropped = 0
         self._capacity = capacity
-        self._size = 0
-        self._entries: deque[TraceEntry] = deque()
+        self._lines: dict[str, _LineTrace] = {}
+        self._count = 0
         self._lock = threading.Lock()
 
     def __call__(self, entry: TraceEntry) -> None:
-        """Keep ``entry``; the oldest entries are dropped if necessary."""
+        """Keep ``entry``; the oldest entries of its line are dropped if necessary."""
         with self._lock:
-            self._entries.append(entry)
-            self._size += _size(entry)
-            while self._size > self._capacity:
-                self._size -= _size(self._entries.popleft())
-                self.dropped += 1
+            self._count += 1
+            line = self._lines.setdefault(entry.line, _LineTrace(self._capacity))
+            line.add(self._count, entry)
+
+    @property
+    def dropped(self) -> dict[str, int]:
+        """How many older entries were dropped, by line."""
+        with self._lock:
+            return {name: line.dropped for name, line in self._lines.items() if line.dropped}
 
     def entries(self) -> tuple[TraceEntry, ...]:
-        """The kept entries, oldest first."""
+        """The kept entries of all lines, as they came."""
         with self._lock:
-            return tuple(self._entries)
+            kept = [each for line in self._lines.values() for each in line.entries]
+        return tuple(entry for _, entry in sorted(kept, key=itemgetter(0)))
 
     def text(self) -> str:
-        """The trace as text, one entry a line; the first line says how many were dropped."""
-        entries = self.entries()
-        head = [f"# {self.dropped} earlier entries were forgotten"] if self.dropped else []
-        return "".join(f"{line}\n" for line in (*head, *entries))
+        """The trace as text, one entry a line; the first lines say how many were dropped."""
+        head = [
+            f"# {count} earlier entries of {name} were forgotten" for name, count in self.dropped.items()
+        ]
+        return "".join(f"{line}\n" for line in (*head, *self.entries()))
+
+
+class _LineTrace:
+    """The latest entries of one line, each with its number among all."""
+
+    def __init__(self, capacity: int) -> None:
+        self.dropped = 0
+        self.entries: deque[tuple[int, TraceEntry]] = deque()
+        self._capacity = capacity
+        self._size = 0
+
+    def add(self, number: int, entry: TraceEntry) -> None:
+        self.entries.append((number, entry))
+        self._size += _size(entry)
+        while self._size > self._capacity:
+            self._size -= _size(self.entries.popleft()[1])
+            self.dropped += 1
+
+
+def read_trace(text: str) -> tuple[TraceEntry, ...]:
+    """The entries of a trace from its text, the inverse of :meth:`WireTrace.text`.
+
+    Raises:
+        FileError: a line is no entry.
+    """
+    entries = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.startswith("#"):
+            continue
+        match = ENTRY.fullmatch(line)
+        if match is None:
+            raise FileError(
+                f"line {number} is no entry of a wire trace: {line[:60]!r}",
+                action="Take it from a run's `wire`",
+            )
+        data = bytes.fromhex(match["bytes"])
+        entries.append(
+            TraceEntry(float(match["time_s"]), match["line"], TrafficDirection(match["direction"]), data)
+        )
+    return tuple(entries)
 
 
 def _size(entry: TraceEntry) -> int:

@@ -218,9 +218,8 @@ class SerialGauge(ABC):
         except NoAnswer as missing:
             beside_echo = missing.received.replace(request, b"")
             echo = beside_echo != missing.received
-            if beside_echo.strip() or (
-                beside_echo and not echo
-            ):  # also a lone line end: its answer was lost
+            is_lone_line_end = bool(beside_echo) and not echo  # the answer before it was lost
+            if beside_echo.strip() or is_lone_line_end:
                 raise FrameRejected(beside_echo) from missing
             raise silent_gauge(self.subject, port.url, self.settings.timeout_s, echo=echo) from missing
 

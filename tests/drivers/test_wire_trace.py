@@ -1,6 +1,11 @@
 import tracemalloc
 
-from drivers.wire_trace import ENTRY_BYTES, TraceEntry, TrafficDirection, WireTrace
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.wire_trace import ENTRY_BYTES, TraceEntry, TrafficDirection, WireTrace, read_trace
+from hexacell.errors import FileError
 
 
 def entry(data, time_s=1.5):
@@ -17,8 +22,8 @@ def test_the_latest_bytes_are_kept_and_the_rest_is_counted():
     for number in range(5):
         trace(entry(b"abcd", number))
     assert [kept.time_s for kept in trace.entries()] == [3, 4]
-    assert trace.dropped == 3
-    assert trace.text().splitlines()[0] == "# 3 earlier entries were forgotten"
+    assert trace.dropped == {"/dev/ttyUSB0": 3}
+    assert trace.text().splitlines()[0] == "# 3 earlier entries of /dev/ttyUSB0 were forgotten"
     assert len(trace.text().splitlines()) == 3
 
 
@@ -32,7 +37,7 @@ def test_more_than_fits_at_once_is_not_kept():
     trace = WireTrace(capacity=ENTRY_BYTES + 3)
     trace(entry(b"abcd"))
     assert trace.entries() == ()
-    assert trace.dropped == 1
+    assert trace.dropped == {"/dev/ttyUSB0": 1}
 
 
 def test_what_is_kept_is_bounded_in_memory():
@@ -46,3 +51,37 @@ def test_what_is_kept_is_bounded_in_memory():
         tracemalloc.stop()
     assert trace.dropped
     assert held < 1.3 * (1 << 20)
+
+
+def test_a_busy_line_takes_nothing_from_the_others():
+    trace = WireTrace(capacity=3 * (ENTRY_BYTES + 4))
+    trace(entry(b"?\r", 0))
+    for number in range(1, 9):
+        trace(TraceEntry(number, "encoder bus", TrafficDirection.RECEIVED, b"181#"))
+    trace(entry(b"?\r", 9))
+    assert [kept.time_s for kept in trace.entries()] == [0, 6, 7, 8, 9]
+    assert trace.dropped == {"encoder bus": 5}
+
+
+@given(
+    st.lists(
+        st.builds(
+            TraceEntry,
+            st.floats(0.0, 2e9).map(lambda seconds: round(seconds, 6)),
+            st.sampled_from(["/dev/ttyUSB0", "socket://10.0.0.1:4001", "encoder bus slcan /dev/a > b"]),
+            st.sampled_from(TrafficDirection),
+            st.binary(min_size=1, max_size=40),
+        ),
+        max_size=20,
+    )
+)
+def test_the_text_of_a_trace_is_read_back(entries):
+    trace = WireTrace()
+    for one in entries:
+        trace(one)
+    assert read_trace(f"# a remark\n{trace.text()}") == tuple(entries)
+
+
+def test_what_is_no_entry_is_named_with_its_line():
+    with pytest.raises(FileError, match="line 2 is no entry of a wire trace: 'hello'"):
+        read_trace("1.500000 /dev/ttyUSB0 > 3f 0d  ?.\nhello\n")

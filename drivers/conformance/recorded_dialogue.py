@@ -18,7 +18,7 @@ class DialogueDiffers(AssertionError):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class RecordedAnswer:
     """Bytes that came, so long after the request before them."""
 
     delay_s: float
@@ -26,27 +26,27 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
-class Exchange:
+class RecordedExchange:
     """A request, its number among those of the line, when it was sent, and what came after it."""
 
     number: int
     time_s: float
     request: bytes
-    answers: tuple[Answer, ...]
+    answers: tuple[RecordedAnswer, ...]
 
     def __str__(self) -> str:
         return f"request {self.number} of the trace, at {self.time_s:.6f}"
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class RecordedTraffic:
     """All of one line: what came before the first request, and the exchanges in their order."""
 
-    unasked: tuple[Answer, ...]
-    exchanges: tuple[Exchange, ...]
+    unasked: tuple[RecordedAnswer, ...]
+    exchanges: tuple[RecordedExchange, ...]
 
     @classmethod
-    def of(cls, entries: Iterable[TraceEntry], line: str) -> Recorded:
+    def of(cls, entries: Iterable[TraceEntry], line: str) -> RecordedTraffic:
         """What was said on ``line``.
 
         Raises:
@@ -62,7 +62,7 @@ class Recorded:
         return cls(
             _answers(said[: sent[0] if sent else len(said)], said[0].time_s - UNASKED_DELAY_S),
             tuple(
-                Exchange(
+                RecordedExchange(
                     number, said[at].time_s, said[at].data, _answers(said[at + 1 : end], said[at].time_s)
                 )
                 for number, (at, end) in enumerate(zip(sent, ends, strict=True), 1)
@@ -73,7 +73,7 @@ class Recorded:
 class Script(Protocol):
     """What is answered to each request of a driver."""
 
-    def answers_to(self, request: bytes) -> tuple[Answer, ...]:
+    def answers_to(self, request: bytes) -> tuple[RecordedAnswer, ...]:
         """What came after this request.
 
         Raises:
@@ -82,10 +82,10 @@ class Script(Protocol):
         ...
 
 
-class InOrder:
+class AnswersInOrder:
     """Answers the requests of a line in the order in which they were recorded."""
 
-    def __init__(self, recorded: Recorded) -> None:
+    def __init__(self, recorded: RecordedTraffic) -> None:
         self._left = deque(recorded.exchanges)
 
     @property
@@ -93,7 +93,7 @@ class InOrder:
         """The next request; nothing at the end of the trace."""
         return self._left[0].request if self._left else b""
 
-    def answers_to(self, request: bytes) -> tuple[Answer, ...]:
+    def answers_to(self, request: bytes) -> tuple[RecordedAnswer, ...]:
         """Those to the next request, which must be this one."""
         if not self._left:
             raise DialogueDiffers(f"asks {request!r} after the last request of the trace")
@@ -102,18 +102,18 @@ class InOrder:
         return self._left.popleft().answers
 
 
-class ByRequest:
+class AnswersByRequest:
     """Answers each request as the same one was answered, the first time, the second time and so on.
 
     For a bus, on which the time of day decides when alarm entries are read. The last answers are repeated.
     """
 
-    def __init__(self, recorded: Recorded) -> None:
-        self._left: defaultdict[bytes, deque[Exchange]] = defaultdict(deque)
+    def __init__(self, recorded: RecordedTraffic) -> None:
+        self._left: defaultdict[bytes, deque[RecordedExchange]] = defaultdict(deque)
         for exchange in recorded.exchanges:
             self._left[exchange.request].append(exchange)
 
-    def answers_to(self, request: bytes) -> tuple[Answer, ...]:
+    def answers_to(self, request: bytes) -> tuple[RecordedAnswer, ...]:
         """Those to the same request, in their turn."""
         if request not in self._left:
             raise DialogueDiffers(f"asks {request!r}, which the trace has nowhere")
@@ -121,5 +121,5 @@ class ByRequest:
         return (left.popleft() if len(left) > 1 else left[0]).answers
 
 
-def _answers(entries: Iterable[TraceEntry], since_s: float) -> tuple[Answer, ...]:
-    return tuple(Answer(max(0.0, entry.time_s - since_s), entry.data) for entry in entries)
+def _answers(entries: Iterable[TraceEntry], since_s: float) -> tuple[RecordedAnswer, ...]:
+    return tuple(RecordedAnswer(max(0.0, entry.time_s - since_s), entry.data) for entry in entries)

@@ -15,7 +15,12 @@ from typing import Any
 
 import can
 
-from drivers.conformance.recorded_dialogue import Answer, ByRequest, InOrder, Recorded
+from drivers.conformance.recorded_dialogue import (
+    AnswersByRequest,
+    AnswersInOrder,
+    RecordedAnswer,
+    RecordedTraffic,
+)
 from drivers.simulated.serial_line import PtyLine
 from drivers.simulated.served_device import Closeable
 from drivers.wire_trace import TraceEntry
@@ -36,7 +41,7 @@ def recorded_line(entries: Iterable[TraceEntry], line: str) -> Iterator[str]:
         DialogueDiffers: at the end, whatever else was raised, if the driver asked something else. The line
             is broken from there on.
     """
-    with RecordedLine(Recorded.of(entries, line)) as served, _in_agreement(served):
+    with RecordedLine(RecordedTraffic.of(entries, line)) as served, _in_agreement(served):
         yield served.url
 
 
@@ -50,7 +55,7 @@ def recorded_bus(entries: Iterable[TraceEntry], line: str) -> Iterator[Mapping[s
         ValueError: as :func:`recorded_line`.
         DialogueDiffers: as :func:`recorded_line`.
     """
-    with RecordedBus(Recorded.of(entries, line)) as served, _in_agreement(served):
+    with RecordedBus(RecordedTraffic.of(entries, line)) as served, _in_agreement(served):
         yield served.settings
 
 
@@ -67,7 +72,7 @@ def _in_agreement(served: _Served) -> Iterator[None]:
 class _Served(Closeable, ABC):
     """A thread that answers until it is closed, or until the driver asks something else."""
 
-    def __init__(self, name: str, unasked: Iterable[Answer]) -> None:
+    def __init__(self, name: str, unasked: Iterable[RecordedAnswer]) -> None:
         self._failure: Exception | None = None
         self._stopping = threading.Event()
         self._due: deque[tuple[float, bytes]] = deque()
@@ -105,7 +110,7 @@ class _Served(Closeable, ABC):
             self._failure = error
             self._break()
 
-    def _schedule(self, answers: Iterable[Answer]) -> None:
+    def _schedule(self, answers: Iterable[RecordedAnswer]) -> None:
         """Answers to come; those to the request before come first, whatever is left of their delay."""
         now_s = time.monotonic()
         self._due = deque((now_s, data) for _, data in self._due)
@@ -124,11 +129,11 @@ class _Served(Closeable, ABC):
 class RecordedLine(_Served):
     """A serial line of a trace, on a pseudo-terminal at ``url``."""
 
-    def __init__(self, recorded: Recorded) -> None:
+    def __init__(self, recorded: RecordedTraffic) -> None:
         super().__init__("recorded line", recorded.unasked)
         self._line = PtyLine("recorded")
         self.url = self._line.url
-        self._script = InOrder(recorded)
+        self._script = AnswersInOrder(recorded)
         self._received = b""
         self._thread.start()
 
@@ -162,11 +167,11 @@ class RecordedLine(_Served):
 class RecordedBus(_Served):
     """The encoders' bus of a trace, on a virtual bus that ``settings`` open."""
 
-    def __init__(self, recorded: Recorded) -> None:
+    def __init__(self, recorded: RecordedTraffic) -> None:
         super().__init__("recorded bus", recorded.unasked)
         self.settings: dict[str, Any] = {"interface": "virtual", "channel": f"recorded-{uuid.uuid4().hex}"}
         self._bus = can.Bus(**self.settings)
-        self._script = ByRequest(recorded)
+        self._script = AnswersByRequest(recorded)
         self._thread.start()
 
     def close(self) -> None:

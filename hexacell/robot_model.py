@@ -6,13 +6,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry, ControllerLimits
+from hexacell.controller_config.interface import ControllerGeometry, ControllerLimits
+from hexacell.controller_config.layout import ConfigLayout, FormatOfFile
 from hexacell.controller_config.linuxcnc_limits import limits_of_ini
 from hexacell.errors import FileError, UsageError
 from hexacell.identification.belief import RobotBelief
@@ -29,6 +31,7 @@ from hexacell.identification.solver.result import GeometryEstimate, Identificati
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
+from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array
@@ -217,25 +220,41 @@ class Robot:
         return self.frames.inverse().poses(PoseBatch.of([pose])).pose(0)
 
 
-def config_format(settings: CellSettings) -> ConfigFormat:
-    """The reader and writer of a cell's controller config.
+def config_layout(settings: CellSettings) -> ConfigLayout:
+    """The readers and writers of the files of a cell's controller config.
 
     Raises:
-        UsageError: there is no such format, or its options are wrong.
+        UsageError: there is no such format, its options are wrong, or it cannot be one of several.
     """
     controller, parameters = settings.controller, settings.mechanism.parameters
-    factory = load(Group.CONFIG_FORMATS, controller.config_format)
-    made: ConfigFormat = factory(parameters, controller.config_options)
-    return made
+    is_part = bool(controller.further_files)
+    files = [(controller.config_format, controller.config_options)]
+    files += [(one.config_format, one.config_options) for one in controller.further_files]
+    formats = (_format_of(*file, parameters, is_part=is_part) for file in files)
+    return ConfigLayout(parameters, tuple(formats))
 
 
-def controller_geometry(cell: Cell, path: Path | None = None) -> ControllerGeometry:
-    """What a cell's config states, or a copy of it; with the limits of the INI file that the cell names.
+def _format_of(
+    name: str, options: Mapping[str, Any], parameters: ParameterSet, *, is_part: bool
+) -> FormatOfFile:
+    factory = load(Group.CONFIG_FORMATS, name)
+    if not is_part:
+        return FormatOfFile(name, factory(parameters, options))
+    if not hasattr(factory, "read_part"):
+        raise UsageError(
+            f"the config format '{name}' cannot have a part of the geometry only",
+            action="Remove [[controller.further_files]], or use another format",
+        )
+    return FormatOfFile(name, factory(parameters, options, is_part=True))
+
+
+def controller_geometry(cell: Cell, *paths: Path) -> ControllerGeometry:
+    """What a cell's config states, or a copy of its files; with the limits of the INI file of the cell.
 
     Raises:
         FileError: one of the files is absent, or does not hold what it should.
     """
-    found = config_format(cell.settings).read(path or cell.config_path)
+    found = config_layout(cell.settings).read(*(paths or cell.config_paths))
     if (ini := cell.settings.limits.ini) is None:
         return found
     limits = limits_of_ini(cell.path.parent / ini, cell.settings.controller.unit_mm)
@@ -248,7 +267,8 @@ def robot_of(cell: Cell) -> Robot:
     Raises:
         FileError: the config, or that of the time of teaching, is absent or does not hold a geometry.
     """
-    controller, taught = controller_geometry(cell), config_format(cell.settings).read(cell.taught_path)
+    controller = controller_geometry(cell)
+    taught = config_layout(cell.settings).read(*cell.taught_paths)
     if taught.branch != controller.branch:
         raise FileError(
             "its branch is not that of the controller's config, so it is not of this robot",

@@ -15,7 +15,7 @@ from drivers.simulated.served_device import Closeable
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
-from hexacell.controller_config.interface import ConfigFormat
+from hexacell.controller_config.layout import ConfigLayout
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import Pose
 
@@ -36,19 +36,19 @@ class SimulatedCell(Closeable):
         settings: CellSettings,
         simulation: SimulationSettings,
         mechanism: Mechanism,
-        config_format: ConfigFormat,
-        config: Path,
+        layout: ConfigLayout,
+        config: tuple[Path, ...],
         *,
         other_processes: bool,
     ) -> None:
         clock = CellClock(settings.timing.clock_factor)
         home = Pose(*settings.identification.points[0])
-        commanding, fixture = config_format.read(config), settings.length_check
+        commanding, fixture = layout.read(*config), settings.length_check
         self.physics = RobotPhysics(mechanism, simulation, clock, commanding, home, fixture)
         soft_limits = simulation.soft_limits
         self.machine = SimulatedMachine(
             mechanism,
-            config_format,
+            layout,
             config,
             self.physics,
             clock,

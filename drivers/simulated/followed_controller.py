@@ -13,7 +13,7 @@ from drivers.simulated.served_device import Closeable
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
-from hexacell.controller_config.interface import ConfigFormat
+from hexacell.controller_config.layout import ConfigLayout
 from hexacell.errors import UsageError
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import Pose
@@ -33,15 +33,15 @@ class FollowedController(Closeable):
         settings: CellSettings,
         simulation: SimulationSettings,
         mechanism: Mechanism,
-        config_format: ConfigFormat,
-        config: Path,
+        layout: ConfigLayout,
+        config: tuple[Path, ...],
         *,
         other_processes: bool,
     ) -> None:
         _require_real(settings, simulation)
         clock = CellClock(1.0)
         home = Pose(*settings.identification.points[0])
-        commanding, fixture = config_format.read(config), settings.length_check
+        commanding, fixture = layout.read(*config), settings.length_check
         with ExitStack() as served:
             source = served.enter_context(JointSource(simulation.joints_command))
             self.physics = FollowingPhysics(source, mechanism, simulation, clock, commanding, home, fixture)

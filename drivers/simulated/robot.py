@@ -11,7 +11,8 @@ from drivers.simulated.linuxcnc.state import KinematicsFailure, SoftLimitExceede
 from drivers.simulated.physics import RobotPhysics
 from hexacell.cell.simulation import SoftLimits
 from hexacell.clock import CellClock
-from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry
+from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.controller_config.layout import ConfigLayout
 from hexacell.errors import FileError
 from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import continue_solution
@@ -35,8 +36,8 @@ class SimulatedMachine:
     def __init__(
         self,
         mechanism: Mechanism,
-        config_format: ConfigFormat,
-        config: Path,
+        layout: ConfigLayout,
+        config: tuple[Path, ...],
         physics: RobotPhysics,
         clock: CellClock,
         home: Pose,
@@ -47,11 +48,11 @@ class SimulatedMachine:
         self._includes_zeros = includes_zeros
         self._soft_limits = soft_limits or SoftLimits()
         self._mechanism = mechanism
-        self._format = config_format
+        self._layout = layout
         self._config = config
         self._physics = physics
         self._clock = clock
-        self._geometry = config_format.read(config)
+        self._geometry = layout.read(*config)
         self._home = home
         self._line = PoseBatch.of([home, home])
         self.fails_forward = False
@@ -130,13 +131,13 @@ class SimulatedMachine:
         with self._lock:
             here = self._pose_now()
             joints = self._joints(here)
-            new = self._format.read(self._config)
+            new = self._layout.read(*self._config)
             found = continue_solution(
                 self._mechanism, new.geometry, joints, start=here, start_geometry=self._geometry.geometry
             )
             if not found.found[0]:
                 raise FileError(
-                    "this geometry has no pose at the present joint variables", subject=self._config
+                    "this geometry has no pose at the present joint variables", subject=self._config[0]
                 )
             self._geometry = new
             self._line = found.poses[[0, 0]]

@@ -11,8 +11,8 @@ from hexacell.application.proposals import later_approval
 from hexacell.application.started_robot import started_robot
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.change import fingerprint
-from hexacell.controller_config.write_back import Receipt
+from hexacell.controller_config.contents import fingerprint
+from hexacell.controller_config.receipt import Receipt
 from hexacell.decision import Verdict
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
@@ -35,7 +35,7 @@ def last_accepted_result(cell: Cell) -> AcceptedResult | None:
     Raises:
         FileError: the controller's config cannot be read.
     """
-    written = fingerprint(cell.config_path)
+    written = fingerprint(*cell.config_paths)
     folder = runs_folder(cell)
     paths = sorted(folder.iterdir()) if folder.is_dir() else []
     found = (_accepted(cell, path) for path in paths if _wrote(path, written))

@@ -12,19 +12,19 @@ from drivers.interfaces import DeviceIdentity
 from hexacell import __version__
 from hexacell.application.accepted_results import last_accepted_result
 from hexacell.application.device_setup import Connected, device_addresses, open_devices
+from hexacell.application.held_config import held_config
 from hexacell.application.journal_soundness import require_sound
 from hexacell.application.run_ownership import require_own_run
 from hexacell.application.started_robot import started_robot
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses, require_enough
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.change import fingerprint
+from hexacell.controller_config.contents import fingerprint
 from hexacell.controller_config.current import CurrentConfig
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
-from hexacell.robot_model import config_format, controller_geometry, robot_of
+from hexacell.robot_model import config_layout, controller_geometry, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
-from hexacell.storage.cell_lock import cell_lock
 from procedures.calibration.preflight import (
     device_failures,
     plan_failures,
@@ -81,7 +81,7 @@ async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[Device
         HexacellError: every failure, in one report.
     """
     calibration = new_calibration(cell, mode)
-    with cell_lock(cell.config_path):
+    with held_config(*cell.config_paths):
         async with _checked_devices(cell, calibration, runs_folder(cell), unattended) as connected:
             raise_all(await _position_failures(cell, connected))
             return connected.identities
@@ -108,8 +108,9 @@ async def calibrate(
         HexacellError: it could not begin, or a step failed.
     """
     cell, folder = request.cell, request.folder
-    with cell_lock(cell.config_path):
-        remove_stale_temporaries(cell.config_path)
+    with held_config(*cell.config_paths):
+        for path in cell.config_paths:
+            remove_stale_temporaries(path)
         started = _resumed_start(request) if request.resume else None
         if started is None:
             _require_own_geometry(cell)
@@ -155,7 +156,7 @@ async def _checked_devices(
 
 async def _position_failures(cell: Cell, connected: Connected) -> list[HexacellError]:
     """See :func:`~procedures.calibration.preflight.position_failures`."""
-    config = CurrentConfig(cell.config_path, config_format(cell.settings))
+    config = CurrentConfig(cell.config_paths, config_layout(cell.settings))
     check = PositionCheck(connected.settings, connected.devices, connected.clock, config)
     return await position_failures(check)
 
@@ -176,7 +177,7 @@ def _require_own_geometry(cell: Cell) -> None:
     """
     folder = runs_folder(cell)
     for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-        if holds_provisional(RunFolder(path), cell.config_path):
+        if holds_provisional(RunFolder(path), cell.config_paths):
             raise UsageError(
                 f"the run {path} was interrupted and left its provisional geometry here",
                 subject=cell.config_path,
@@ -232,7 +233,8 @@ def run_started(
         cell_text=cell.text_without_secrets,
         mode=calibration.mode.value,
         config=str(cell.config_path),
-        config_sha256=fingerprint(cell.config_path),
+        further_configs=tuple(map(str, cell.config_paths[1:])),
+        config_sha256=fingerprint(*cell.config_paths),
         controller=robot.controller.document(),
         branch=robot.branch,
         devices=identities,

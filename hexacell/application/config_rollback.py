@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from hexacell.application.held_config import held_config
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.change import diff
+from hexacell.controller_config.change import diff_of_files
+from hexacell.controller_config.contents import Contents, are_same_files, fingerprint_of, read_contents
+from hexacell.controller_config.receipt import AFTER, BEFORE, Receipt
 from hexacell.controller_config.three_way import ConfigEditedSince, compare_versions
-from hexacell.controller_config.write_back import AFTER, BEFORE, Receipt, restore
+from hexacell.controller_config.write_back import restore
 from hexacell.errors import FileError, HexacellError, UsageError
-from hexacell.robot_model import config_format
+from hexacell.robot_model import config_layout
 from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
-from hexacell.storage import atomic_files
-from hexacell.storage.cell_lock import cell_lock
 from procedures.engine.config_transactions import holds_provisional
 from procedures.journal.line_format import RESTORE
 
@@ -25,14 +25,15 @@ class ConfigRollback:
     """What a rollback did.
 
     Attributes:
+        paths: the files of the config.
         undone: the run whose geometry the config had; none where it had that of before all runs.
-        restored: the file in a run folder that the config is a copy of now.
+        restored: the files in a run folder that the config is a copy of now.
         change: the change of the text, as a unified diff; empty where nothing had to be written.
     """
 
-    path: Path
+    paths: tuple[Path, ...]
     undone: Path | None
-    restored: Path
+    restored: tuple[Path, ...]
     change: str
 
 
@@ -45,18 +46,20 @@ def roll_back_config(cell: Cell, to: str | None = None) -> ConfigRollback:
         CellBusy: the cell is in use.
         FileError: a file cannot be read or written, or the kept one is damaged.
     """
-    path = cell.config_path
-    with cell_lock(path):
+    paths = cell.config_paths
+    with held_config(*cell.config_paths):
         receipts = list(_receipts(cell))
-        found = atomic_files.read_bytes(path)
+        found = read_contents(paths)
         undone = _written_by(receipts, found)
-        restored = _written_file(cell, to) if to is not None else _file_before(cell, undone, receipts)
-        data = atomic_files.read_bytes(restored)
+        if to is not None:
+            restored, contents = _written_files(cell, to)
+        else:
+            restored, contents = _files_before(cell, undone, receipts)
         _require_known(cell, receipts, found)
-        if data != found:
-            restore(path, data, expected=found)
-    change = diff(found.decode(errors="replace"), data.decode(errors="replace"))
-    return ConfigRollback(path, None if undone is None else undone.backup_folder, restored, change)
+        if contents != found:
+            restore(paths, contents, expected=found)
+    change = diff_of_files(paths, found, contents)
+    return ConfigRollback(paths, None if undone is None else undone.backup_folder, restored, change)
 
 
 def _receipts(cell: Cell) -> Iterator[Receipt]:
@@ -67,22 +70,24 @@ def _receipts(cell: Cell) -> Iterator[Receipt]:
             receipt = Receipt.of(path)
         except HexacellError:
             continue
-        if os.path.realpath(receipt.path) == os.path.realpath(cell.config_path):
+        if are_same_files(receipt.paths, cell.config_paths):
             yield receipt
 
 
-def _written_by(receipts: list[Receipt], found: bytes) -> Receipt | None:
+def _written_by(receipts: list[Receipt], found: Contents) -> Receipt | None:
     """The newest run that wrote this config."""
-    sha256 = atomic_files.sha256(found)
+    sha256 = fingerprint_of(found)
     return next((one for one in reversed(receipts) if one.sha256_after == sha256), None)
 
 
-def _file_before(cell: Cell, undone: Receipt | None, receipts: list[Receipt]) -> Path:
+def _files_before(
+    cell: Cell, undone: Receipt | None, receipts: list[Receipt]
+) -> tuple[tuple[Path, ...], Contents]:
+    """The copies of the config before a run wrote it, and what they hold."""
     if undone is not None:
-        undone.backup()
-        return undone.backup_folder / BEFORE
+        return undone.kept(BEFORE), undone.backup()
     if receipts:
-        _require_known(cell, receipts, atomic_files.read_bytes(cell.config_path))
+        _require_known(cell, receipts, read_contents(cell.config_paths))
     raise UsageError(
         "no run of this cell wrote the config that is there now: nothing is to be undone",
         subject=cell.config_path,
@@ -90,8 +95,8 @@ def _file_before(cell: Cell, undone: Receipt | None, receipts: list[Receipt]) ->
     )
 
 
-def _written_file(cell: Cell, named: str) -> Path:
-    """The config as a run wrote it."""
+def _written_files(cell: Cell, named: str) -> tuple[tuple[Path, ...], Contents]:
+    """The copies of the config as a run wrote it, and what they hold."""
     folder = find_run(cell, named)
     try:
         receipt = Receipt.of(folder.path)
@@ -99,25 +104,25 @@ def _written_file(cell: Cell, named: str) -> Path:
         raise UsageError(
             f"the run {folder.path} wrote no config", action="Name a run that wrote one"
         ) from error
-    if os.path.realpath(receipt.path) != os.path.realpath(cell.config_path):
+    if not are_same_files(receipt.paths, cell.config_paths):
         raise UsageError(
-            f"the run {folder.path} is of another config, {receipt.path}", action="Name a run of this cell"
+            f"the run {folder.path} is of another config, {' and '.join(map(str, receipt.paths))}",
+            action="Name a run of this cell",
         )
-    written = folder.path / AFTER
-    data = atomic_files.read_bytes(written)
-    if written.is_symlink() or atomic_files.sha256(data) != receipt.sha256_after:
-        raise FileError("this copy of the config is damaged", subject=written, action=RESTORE)
-    return written
+    written = receipt.kept(AFTER)
+    if link := next((path for path in written if path.is_symlink()), None):
+        raise FileError("this copy of the config is damaged", subject=link, action=RESTORE)
+    return written, receipt.written()
 
 
-def _require_known(cell: Cell, receipts: list[Receipt], found: bytes) -> None:
+def _require_known(cell: Cell, receipts: list[Receipt], found: Contents) -> None:
     """What a rollback replaces must be kept in a run folder; else an edit would be lost."""
-    path, sha256 = cell.config_path, atomic_files.sha256(found)
+    path, sha256 = cell.config_path, fingerprint_of(found)
     if any(sha256 in {one.sha256_before, one.sha256_after} for one in receipts):
         return
     folder = runs_folder(cell)
     for run in sorted(folder.iterdir()) if folder.is_dir() else ():
-        if holds_provisional(RunFolder(run), path):
+        if holds_provisional(RunFolder(run), cell.config_paths):
             raise UsageError(
                 f"the run {run} left its provisional geometry here",
                 subject=path,
@@ -131,14 +136,14 @@ def _require_known(cell: Cell, receipts: list[Receipt], found: bytes) -> None:
 
 
 def _edited_since(cell: Cell, latest: Receipt) -> ConfigEditedSince:
-    form, folder = config_format(cell.settings), latest.backup_folder
+    layout = config_layout(cell.settings)
     before, written = (
-        (form.read(kept).geometry, atomic_files.read_text(kept))
-        for kept in (folder / BEFORE, folder / AFTER)
+        (layout.read(*latest.kept(name)).geometry, read_contents(latest.kept(name)))
+        for name in (BEFORE, AFTER)
     )
     return ConfigEditedSince(
-        f"the config was edited since {folder.name} wrote it; rolling back would lose that",
-        compare_versions(cell.config_path, form, before, written),
+        f"the config was edited since {latest.backup_folder.name} wrote it; rolling back would lose that",
+        compare_versions(cell.config_paths, layout, before, written),
         path=cell.config_path,
         action="Nothing was written: undo the edit, or keep a copy and calibrate again",
     )

@@ -12,6 +12,7 @@ from typing import get_args
 from hexacell.application.calibration_run import RunRequest
 from hexacell.application.device_setup import device_addresses
 from hexacell.cell.bundled import CONTROLLER, bundled_config
+from hexacell.cell.devices import FurtherFileSettings
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.passwords import password_path
 from hexacell.cell.simulation import FaultKind, SimulatedFault
@@ -83,8 +84,18 @@ def served_cell(cell: Cell) -> Iterator[str]:
             paths["taught"] = str(cell.taught_path.resolve())
         if (passwords := password_path(settings.controller, cell.path.parent)) is not None:
             paths["password_file"] = str(passwords.resolve())
-        controller = settings.controller.model_copy(update=paths)
+        further = {"further_files": tuple(_absolute_files(cell))}
+        controller = settings.controller.model_copy(update=paths | further)
         yield dump(settings.model_copy(update={"controller": controller}))
+
+
+def _absolute_files(cell: Cell) -> Iterator[FurtherFileSettings]:
+    files = zip(
+        cell.settings.controller.further_files, cell.config_paths[1:], cell.taught_paths[1:], strict=True
+    )
+    for one, config, taught in files:
+        paths = {"config": str(config.resolve()), "taught": one.taught and str(taught.resolve())}
+        yield one.model_copy(update=paths)
 
 
 def prepare_demo(folder: Path, config_name: str) -> RunRequest:

@@ -79,7 +79,7 @@ async def diagnose(cell: Cell, device: str, seconds: float) -> DeviceDiagnosis:
     known = [gauge.name for gauge in cell.settings.gauges] + [ENCODERS]
     if device not in known:
         raise UsageError(f"the cell has no device '{device}'", action=f"Name one of {', '.join(known)}")
-    with cell_lock(cell.config_path), device_addresses(cell, other_processes=False) as settings:
+    with cell_lock(*cell.config_paths), device_addresses(cell, other_processes=False) as settings:
         async with _devices(settings) as devices:
             if device == ENCODERS:
                 return await _watch_encoders(devices, settings, seconds)

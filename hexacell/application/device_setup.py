@@ -20,7 +20,7 @@ from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
 from hexacell.errors import FileError, HexacellError
 from hexacell.plugins import Group, load
-from hexacell.robot_model import config_format
+from hexacell.robot_model import config_layout
 from hexacell.storage.toml_locations import KeyPath
 from procedures.calibration.preflight import raise_all
 from procedures.devices.device_set import Devices, MountedGauge, Thermometers
@@ -48,8 +48,8 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
         settings,
         settings.simulation,
         settings.mechanism,
-        config_format(settings),
-        cell.config_path,
+        config_layout(settings),
+        cell.config_paths,
         other_processes=other_processes,
     ) as simulated:
         yield simulated.settings
@@ -81,6 +81,9 @@ def _plugins(settings: CellSettings) -> Iterator[tuple[KeyPath, Group, str]]:
     yield ("encoders", "protocol"), Group.ENCODERS, settings.encoders.protocol
     yield ("controller", "protocol"), Group.CONTROLLERS, settings.controller.protocol
     yield ("controller", "config_format"), Group.CONFIG_FORMATS, settings.controller.config_format
+    for n, file in enumerate(settings.controller.further_files):
+        path = ("controller", "further_files", n, "config_format")
+        yield path, Group.CONFIG_FORMATS, file.config_format
     yield ("robot", "mechanism"), Group.MECHANISMS, settings.robot.mechanism
 
 

@@ -13,8 +13,8 @@ from hexacell.application.proposals import later_approval
 from hexacell.application.run_index import RunIndex
 from hexacell.cell.fields import Frozen
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.change import fingerprint
-from hexacell.controller_config.write_back import RECEIPT, Receipt
+from hexacell.controller_config.contents import fingerprint
+from hexacell.controller_config.receipt import RECEIPT, Receipt
 from hexacell.decision import Verdict
 from hexacell.errors import HexacellError, UsageError
 from hexacell.reporting.result import IdentificationResult
@@ -81,7 +81,7 @@ def past_runs(cell: Cell, index: RunIndex | None = None) -> tuple[PastRun, ...]:
     Raises:
         FileError: the controller's config, or the folder of the runs, cannot be read.
     """
-    config, folder = fingerprint(cell.config_path), runs_folder(cell)
+    config, folder = fingerprint(*cell.config_paths), runs_folder(cell)
     found = (index or RunIndex(cell)).documents(DocumentKind.SUMMARY, RunSummary, _summary)
     runs = [_past_run(RunFolder(folder / name), summary, config) for name, summary in found.items()]
     return tuple(sorted(runs, key=_age_rank, reverse=True))
@@ -137,7 +137,7 @@ def compare_runs(cell: Cell, before: str, after: str) -> tuple[PastRun, PastRun,
         UsageError: there is no such run, it identified nothing, or their frames differ.
         FileError: the controller's config cannot be read.
     """
-    config = fingerprint(cell.config_path)
+    config = fingerprint(*cell.config_paths)
     one, other = (past_run(find_run(cell, named), config) for named in (before, after))
     parameters = cell.settings.mechanism.parameters
     return one, other, compare_results(parameters, _result_of(one), _result_of(other))

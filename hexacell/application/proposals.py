@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import ClassVar
 
 from hexacell.acceptance import AcceptanceGate
+from hexacell.application.held_config import held_config
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.loader import load_cell
 from hexacell.controller_config.change import ConfigChange, JsonRecord
-from hexacell.controller_config.interface import ConfigFormat
+from hexacell.controller_config.contents import are_same_files, fingerprint
+from hexacell.controller_config.layout import ConfigLayout
 from hexacell.controller_config.three_way import ConfigEditedSince, compare_versions
 from hexacell.controller_config.write_back import commit
 from hexacell.decision import Verdict
 from hexacell.errors import FileError, LimitError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet
-from hexacell.robot_model import config_format
+from hexacell.robot_model import config_layout
 from hexacell.runs.run_folder import RunFolder
-from hexacell.storage import atomic_files
-from hexacell.storage.cell_lock import cell_lock
 from procedures.engine.config_transactions import holds_provisional
 from procedures.journal.journal import read_journal
 from procedures.journal.line_format import RESTORE, now
@@ -52,7 +51,7 @@ class Proposal:
     cell: str
     change: ConfigChange
     gates: tuple[AcceptanceGate, ...]
-    config_format: ConfigFormat
+    layout: ConfigLayout
     parameters: ParameterSet
     state: RunState
 
@@ -92,7 +91,7 @@ def read_proposal(folder: RunFolder) -> Proposal:
         state.started.cell,
         change,
         (*state.proposed.gates, _verification_gate(state)),
-        config_format(settings),
+        config_layout(settings),
         settings.mechanism.parameters,
         state,
     )
@@ -124,8 +123,8 @@ async def apply_proposal(
         CellBusy, FileError, WriteBackUndone: see :func:`~hexacell.controller_config.write_back.commit`.
     """
     change = proposal.change
-    with cell_lock(change.path):
-        if atomic_files.sha256(atomic_files.read_bytes(change.path)) == change.sha256_after:
+    with held_config(*change.paths):
+        if fingerprint(*change.paths) == change.sha256_after:
             return AppliedProposal(proposal, "")
         _require_unedited(proposal)
         by = await _approval(proposal, operator, typed_by)
@@ -176,19 +175,19 @@ def _verification_gate(state: RunState) -> AcceptanceGate:
 
 def _require_unedited(proposal: Proposal) -> None:
     change = proposal.change
-    if atomic_files.sha256(atomic_files.read_bytes(change.path)) == change.sha256_before:
+    if fingerprint(*change.paths) == change.sha256_before:
         return
-    if holds_provisional(proposal.folder, change.path):
+    if holds_provisional(proposal.folder, change.paths):
         raise UsageError(
             "the run was interrupted and left its provisional geometry here",
             subject=change.path,
             action="Resume that run, which takes it back",
         )
     versions = compare_versions(
-        change.path,
-        proposal.config_format,
-        (Geometry.of(proposal.parameters, change.before), change.text_before),
-        (Geometry.of(proposal.parameters, change.after), change.text_after),
+        change.paths,
+        proposal.layout,
+        (Geometry.of(proposal.parameters, change.before), change.before_contents),
+        (Geometry.of(proposal.parameters, change.after), change.after_contents),
     )
     raise ConfigEditedSince(
         "the config changed since the run began; its geometry does not belong to it",
@@ -202,7 +201,8 @@ def _require_together(
     folder: RunFolder, started: events.RunStarted, proposed: events.Proposed, change: ConfigChange
 ) -> None:
     """The proposal is the one of the journal, and for the config that the run began with."""
-    is_same_config = os.path.realpath(change.path) == os.path.realpath(started.config)
+    files = tuple(Path(name) for name in (started.config, *started.further_configs))
+    is_same_config = are_same_files(change.paths, files)
     is_same_text = change.sha256_before == started.config_sha256
     if folder.proposal.is_symlink() or not (is_same_config and is_same_text) or _differs(proposed, change):
         raise FileError(

@@ -9,14 +9,15 @@ from tempfile import TemporaryDirectory
 
 from hexacell.application.calibration_run import calibration_of_run
 from hexacell.application.journal_soundness import require_sound
+from hexacell.cell.devices import ControllerSettings
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.measuring import IdentificationSettings
 from hexacell.cell.model import CellSettings, geometry_settings
 from hexacell.controller_config.change import ConfigChange
-from hexacell.controller_config.write_back import BEFORE
+from hexacell.controller_config.contents import Contents, fingerprint_of, read_contents_if_present
+from hexacell.controller_config.receipt import BEFORE, kept_paths
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.runs.run_folder import CELL_FILE, RunFolder
-from hexacell.storage import atomic_files
 from procedures.journal.journal import read_entries, read_version
 from procedures.journal.line_format import RESTORE, RULES_SINCE, Entry
 from procedures.replay.comparison import TOLERANCE, ReplayReport
@@ -84,23 +85,34 @@ def _set_up(
     """The procedure with recorded devices, and the run's start with the config of the temporary folder."""
     cell = _cell(scratch, started, folder.journal)
     require_sound((entry.event for entry in entries), cell.settings, folder.journal)
-    text = _config_text(folder, started)
+    contents = _config_contents(folder, started, len(cell.config_paths))
     settings = cell.settings.model_copy(
         update={
-            "controller": cell.settings.controller.model_copy(update={"config": CONFIG}),
+            "controller": _in_scratch(cell.settings.controller),
             "identification": _identification(cell, started),
         }
     )
-    if text is None:
-        native = settings.controller.model_copy(update={"config_format": "toml"})
-        settings = settings.model_copy(update={"controller": native})
-        text = _native_config(settings, started)
+    if contents is None:
+        native = {"config_format": "toml", "config_options": {}, "further_files": ()}
+        controller = settings.controller.model_copy(update=native)
+        settings = settings.model_copy(update={"controller": controller})
+        contents = (_native_config(settings, started),)
     cell = replace(cell, settings=settings)
-    cell.config_path.write_bytes(text)
+    for path, data in zip(cell.config_paths, contents, strict=True):
+        path.write_bytes(data)
     run = RunFolder(scratch / "run")
     run.path.mkdir()
     executor = RecordedStepExecutor.of(cell, calibration_of_run(cell, started), run)
-    return executor, started.model_copy(update={"config_sha256": atomic_files.sha256(text)})
+    return executor, started.model_copy(update={"config_sha256": fingerprint_of(contents)})
+
+
+def _in_scratch(controller: ControllerSettings) -> ControllerSettings:
+    """The controller with the files of its config beside the cell file, under names of their own."""
+    further = (
+        one.model_copy(update={"config": f"{CONFIG}-{number}"})
+        for number, one in enumerate(controller.further_files, start=2)
+    )
+    return controller.model_copy(update={"config": CONFIG, "further_files": tuple(further)})
 
 
 def _cell(scratch: Path, started: RunStarted, journal: Path) -> Cell:
@@ -131,12 +143,12 @@ def _identification(cell: Cell, started: RunStarted) -> IdentificationSettings:
     return plan.model_copy(update={"poses": POSES})
 
 
-def _config_text(folder: RunFolder, started: RunStarted) -> bytes | None:
-    """The controller's config at the start of the run, if the run folder kept it."""
-    kept = atomic_files.read_if_present(folder.path / BEFORE)
+def _config_contents(folder: RunFolder, started: RunStarted, count: int) -> Contents | None:
+    """What the files of the controller's config held at the start of the run, if the run folder kept it."""
+    kept = read_contents_if_present(kept_paths(folder.path, BEFORE, count))
     if kept is None and folder.proposal.is_file():
-        kept = ConfigChange.load(folder.proposal).text_before.encode()
-    return kept if kept is not None and atomic_files.sha256(kept) == started.config_sha256 else None
+        kept = ConfigChange.load(folder.proposal).before_contents
+    return kept if kept is not None and fingerprint_of(kept) == started.config_sha256 else None
 
 
 def _native_config(settings: CellSettings, started: RunStarted) -> bytes:

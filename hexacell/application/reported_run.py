@@ -13,7 +13,7 @@ from hexacell.application.journal_soundness import require_sound
 from hexacell.application.started_robot import geometry_before
 from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.write_back import AFTER, BEFORE
+from hexacell.controller_config.receipt import AFTER, BEFORE
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.runs.run_folder import CELL_FILE, JOURNAL, MEASUREMENTS, RESULT, RunFolder
@@ -23,7 +23,7 @@ from procedures.run import events
 from procedures.run.state import RunState
 
 FINGERPRINTED = (JOURNAL, CELL_FILE, MEASUREMENTS, RESULT, BEFORE, AFTER)
-"""Files of a run folder that the report vouches for, where they are there."""
+"""Files of a run folder that the report vouches for, where they are there; of a config every file."""
 
 IDENTIFIER_DIGITS = 12
 
@@ -116,5 +116,6 @@ def _document(path: Path) -> Mapping[str, Any]:
 
 
 def _fingerprints(run: Path) -> dict[str, str]:
-    contents = {name: atomic_files.read_if_present(run / name) for name in FINGERPRINTED}
+    further = (path.name for name in (BEFORE, AFTER) for path in sorted(run.glob(f"{name}-*")))
+    contents = {name: atomic_files.read_if_present(run / name) for name in (*FINGERPRINTED, *further)}
     return {name: atomic_files.sha256(data) for name, data in contents.items() if data is not None}

@@ -14,12 +14,12 @@ from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
 
+from hexacell.application.held_config import held_config
 from hexacell.application.history import PastRun, is_applied_later, past_runs
 from hexacell.application.run_index import RunIndex
 from hexacell.cell.loader import Cell
 from hexacell.runs.run_folder import runs_folder
 from hexacell.storage.atomic_files import os_error_to_file_error
-from hexacell.storage.cell_lock import cell_lock
 
 LEAVING = ".leaving-"
 """Begins the name of a folder that is being deleted; what a power cut leaves of it is deleted next time."""
@@ -80,7 +80,7 @@ def delete_runs(cell: Cell, runs: Sequence[PastRun]) -> None:
         CellBusy: a run is going on.
         FileError: a folder cannot be deleted.
     """
-    with cell_lock(cell.config_path):
+    with held_config(*cell.config_paths):
         now = {run.name: run for run in past_runs(cell)}
         for run in runs:
             present = now.get(run.name)

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from hexacell.controller_config.change import ConfigChange
-from hexacell.controller_config.write_back import AFTER, BEFORE, RECEIPT
+from hexacell.controller_config.contents import fingerprint_of
+from hexacell.controller_config.receipt import AFTER, BEFORE, RECEIPT
 from hexacell.errors import FileError, UsageError
 from hexacell.runs.run_folder import CELL_FILE, MEASUREMENTS, RESULT, RunFolder
 from hexacell.storage import atomic_files
@@ -22,7 +23,9 @@ from procedures.journal.journal import read_entries
 from procedures.journal.line_format import with_event
 from procedures.run.events import RunStarted
 
-_CONFIGS = (BEFORE, AFTER, f"{PROVISIONAL_FOLDER}/{BEFORE}", f"{PROVISIONAL_FOLDER}/{AFTER}")
+_CONFIG = re.compile(f"({BEFORE}|{AFTER})(-[0-9]+)?")
+"""A file of a config, as it was or as it was written."""
+
 _AS_THEY_ARE = (MEASUREMENTS, RESULT, RECEIPT, f"{PROVISIONAL_FOLDER}/{RECEIPT}")
 _WIRE_LINE = re.compile(r"(?P<head>\S+ .+ [<>] )(?P<bytes>[0-9a-f]{2}(?: [0-9a-f]{2})*)  .*")
 _HALF_MASKED = re.compile(rb"\*\*\*[^\s]+")
@@ -56,7 +59,7 @@ def _files(folder: RunFolder, cell_text: str) -> Iterator[tuple[str, bytes]]:
     yield folder.journal.name, _journal(folder.journal, cell_text)
     if (text := _kept(folder, CELL_FILE)) is not None:
         yield CELL_FILE, _text(text)
-    for name in _CONFIGS:
+    for name in _configs(folder.path):
         if (text := _kept(folder, name)) is not None:
             yield name, _text(text)
     for name in _AS_THEY_ARE:
@@ -68,6 +71,14 @@ def _files(folder: RunFolder, cell_text: str) -> Iterator[tuple[str, bytes]]:
     for path in sorted(folder.path.glob(f"{folder.wire.name}*")):
         if (data := _kept(folder, path.name)) is not None:
             yield path.name, _wire(data, passwords)
+
+
+def _configs(folder: Path) -> Iterator[str]:
+    """The names of the versions of the config that a run keeps."""
+    for one in (folder, folder / PROVISIONAL_FOLDER):
+        for path in sorted(one.iterdir()) if one.is_dir() else ():
+            if _CONFIG.fullmatch(path.name):
+                yield str(path.relative_to(folder))
 
 
 def _kept(folder: RunFolder, name: str) -> bytes | None:
@@ -99,10 +110,19 @@ def _text(data: bytes) -> bytes:
 
 def _proposal(path: Path) -> bytes:
     change = ConfigChange.load(path)
-    before, after = _text(change.text_before.encode()), _text(change.text_after.encode())
-    texts = {"text_before": before.decode(), "text_after": after.decode()}
-    sums = {"sha256_before": atomic_files.sha256(before), "sha256_after": atomic_files.sha256(after)}
-    return change.model_copy(update=texts | sums).to_json()
+    first, *further = (
+        {"text_before": _text(before).decode(), "text_after": _text(after).decode()}
+        for before, after in zip(change.before_contents, change.after_contents, strict=True)
+    )
+    files = zip(change.further, further, strict=True)
+    masked = change.model_copy(
+        update=first | {"further": tuple(one.model_copy(update=texts) for one, texts in files)}
+    )
+    sums = {
+        "sha256_before": fingerprint_of(masked.before_contents),
+        "sha256_after": fingerprint_of(masked.after_contents),
+    }
+    return masked.model_copy(update=sums).to_json()
 
 
 def _passwords_in(cell_text: str) -> list[bytes]:

@@ -7,7 +7,6 @@ to again.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,8 +15,9 @@ import numpy as np
 from hexacell.application.started_robot import started_robot
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import ConfigChange
+from hexacell.controller_config.contents import are_same_files, fingerprint_of, read_contents_if_present
 from hexacell.controller_config.interface import ControllerGeometry, ControllerLimits
-from hexacell.controller_config.write_back import BEFORE, RECEIPT, Receipt
+from hexacell.controller_config.receipt import BEFORE, RECEIPT, Receipt, kept_paths
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -25,7 +25,6 @@ from hexacell.limits.limits import SAME_FRAMES
 from hexacell.robot_model import Robot, controller_geometry
 from hexacell.runs.run_folder import RunFolder
 from hexacell.stated_limits import stated_limits
-from hexacell.storage import atomic_files
 from procedures.engine.config_edits import PROVISIONAL_FOLDER
 from procedures.journal.line_format import RESTORE
 from procedures.run import events
@@ -44,9 +43,9 @@ def require_own_run(cell: Cell, folder: RunFolder, state: RunState) -> None:
     for path in folders:
         _require_no_links(path)
         if (path / RECEIPT).exists():
-            _require_own_config(cell, path / RECEIPT, Receipt.of(path).path)
+            _require_own_config(cell, path / RECEIPT, Receipt.of(path).paths)
     if folder.proposal.exists():
-        _require_own_config(cell, folder.proposal, ConfigChange.load(folder.proposal).path)
+        _require_own_config(cell, folder.proposal, ConfigChange.load(folder.proposal).paths)
     assert state.started is not None  # noqa: S101 - a journal without a start is not resumed
     _require_own_geometry(cell, folder, state, state.started)
     _require_own_poses(cell, folder, state, state.started)
@@ -60,12 +59,13 @@ def _require_no_links(folder: Path) -> None:
             raise FileError("is a link; a run's files are no links", subject=path, action=RESTORE)
 
 
-def _require_own_config(cell: Cell, path: Path, named: Path) -> None:
-    if os.path.realpath(named) != os.path.realpath(cell.config_path):
+def _require_own_config(cell: Cell, path: Path, named: tuple[Path, ...]) -> None:
+    if not are_same_files(named, cell.config_paths):
         raise FileError(
-            f"is for another config, {named}",
+            f"is for another config, {' and '.join(map(str, named))}",
             subject=path,
-            action=f"Resume the run of {cell.config_path}, or restore the run folder from a copy",
+            action=f"Resume the run of {' and '.join(map(str, cell.config_paths))}, or restore the run "
+            "folder from a copy",
         )
 
 
@@ -73,22 +73,26 @@ def _require_own_geometry(
     cell: Cell, folder: RunFolder, state: RunState, started: events.RunStarted
 ) -> None:
     """The journal must state the geometry of the config that the run began with."""
-    paths = (cell.config_path, folder.path / BEFORE, folder.path / PROVISIONAL_FOLDER / BEFORE)
-    path = next((one for one in paths if _has_fingerprint(one, started.config_sha256)), None)
-    if path is None:
+    count = len(cell.config_paths)
+    kept = (kept_paths(one, BEFORE, count) for one in (folder.path, folder.path / PROVISIONAL_FOLDER))
+    candidates = (cell.config_paths, *kept)
+    paths = next((one for one in candidates if _have_fingerprint(one, started.config_sha256)), None)
+    if paths is None:
         if state.committed or state.provisional or state.rolling_back or state.config_write_pending:
             raise FileError(
                 "the config of before the run is not in it", subject=folder.path, action=RESTORE
             )
         return
-    found = controller_geometry(cell, path)
+    found = controller_geometry(cell, *paths)
     stated = Geometry.of(cell.settings.mechanism.parameters, started.controller)
     if not _is_same(found, stated, started):
-        raise _differs(folder, f"another geometry than {path}")
+        raise _differs(folder, f"another geometry than {paths[0]}")
     own = stated_limits(cell.settings, found, SAME_FRAMES).joint_ranges
     limits = started.limits or ControllerLimits(joints=found.limits.joints)  # of older versions: no axes
     if started.joint_ranges != own or limits != found.limits:
-        raise _differs(folder, f"other limits than the cell file, {path} and [limits] ini, if one is named")
+        raise _differs(
+            folder, f"other limits than the cell file, {paths[0]} and [limits] ini, if one is named"
+        )
 
 
 def _differs(folder: RunFolder, what: str) -> FileError:
@@ -96,9 +100,9 @@ def _differs(folder: RunFolder, what: str) -> FileError:
     return FileError(problem, subject=folder.journal, line=1, action=RESTORE)
 
 
-def _has_fingerprint(path: Path, sha256: str) -> bool:
-    data = atomic_files.read_if_present(path)
-    return data is not None and atomic_files.sha256(data) == sha256
+def _have_fingerprint(paths: tuple[Path, ...], sha256: str) -> bool:
+    contents = read_contents_if_present(paths)
+    return contents is not None and fingerprint_of(contents) == sha256
 
 
 def _is_same(found: ControllerGeometry, stated: Geometry, started: events.RunStarted) -> bool:

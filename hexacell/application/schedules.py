@@ -72,7 +72,7 @@ def scheduled_run(cell: Cell, request: ScheduleRequest) -> ScheduledRun:
     if (retries + 1) * (longest + request.retry_minutes) > MOST_MINUTES:
         raise UsageError("all tries together last longer than a day", action="Lower --longest or --retries")
     path = cell.path.resolve()
-    config = cell.config_path.resolve().parent
+    configs = [path.resolve().parent for path in cell.config_paths]
     metrics = None if request.metrics is None else request.metrics.resolve()
     return ScheduledRun(
         cell=path,
@@ -86,7 +86,7 @@ def scheduled_run(cell: Cell, request: ScheduleRequest) -> ScheduledRun:
         retries=retries,
         metrics=metrics,
         writable=tuple(
-            dict.fromkeys((path.parent, config, *([] if metrics is None else [metrics.parent])))
+            dict.fromkeys((path.parent, *configs, *([] if metrics is None else [metrics.parent])))
         ),
     )
 

@@ -32,7 +32,7 @@ async def watch_devices(cell: Cell) -> AsyncIterator[LiveSnapshot]:
         CellBusy: a run has them.
         HexacellError: a protocol has no driver, or a simulated cell cannot start.
     """
-    with cell_lock(cell.config_path), device_addresses(cell) as settings:
+    with cell_lock(*cell.config_paths), device_addresses(cell) as settings:
         links = SharedSerialPorts(trace=WireTrace())
         devices = devices_of(settings, links, WireTrace(), cell.path.parent)
         feed = LiveFeed(devices.live, settings.gauges)

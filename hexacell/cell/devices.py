@@ -317,8 +317,23 @@ class RotaryEncoderSettings(EncoderSettings):
         return 360.0 / self.counts_per_turn
 
 
+class FurtherFileSettings(Section):
+    """A file beside ``config`` that has the rest of the geometry; the keys mean what they mean there."""
+
+    config: Text = Field(description="the file, relative to the cell file")
+    config_format: Text = Field(
+        description="linuxcnc-ini, linuxcnc-hal, template, toml, or one that a plug-in adds"
+    )
+    config_options: dict[str, Any] = Field(
+        default_factory=dict, description="where that format finds the numbers, see docs/linuxcnc.md"
+    )
+    taught: Text | None = Field(
+        None, description="copy of this file, from the same day as that of the first one"
+    )
+
+
 class ControllerSettings(Section):
-    """The robot's controller and the file with its geometry."""
+    """The robot's controller and the file, or the files, with its geometry."""
 
     protocol: Text = Field("linuxcncrsh", description="linuxcncrsh, or one that a plug-in adds")
     host: Text = Field("127.0.0.1", description="its network name or address")
@@ -348,6 +363,12 @@ class ControllerSettings(Section):
         description="copy of config from when points and frames were taught last, relative to the cell "
         "file; without it, the config that runs when a run begins",
     )
+    further_files: tuple[FurtherFileSettings, ...] = Field(
+        (),
+        max_length=8,
+        description="files that have a part of the geometry each, if it is not all in config: every number "
+        "must be in one of them, and in no other",
+    )
     reload_command: tuple[Text, ...] = Field(
         (), description="run with the machine off, so that the controller reads its config again"
     )
@@ -371,6 +392,18 @@ class ControllerSettings(Section):
     move_timeout_s: Positive | None = Field(
         None, exclude=True, description="no longer used: how long a move may last follows from its duration"
     )
+
+    @model_validator(mode="after")
+    def _files_are_together(self) -> ControllerSettings:
+        files = (self.config, *(one.config for one in self.further_files))
+        if twice := next((name for name in files if files.count(name) > 1), None):
+            raise broken_rule(f"the file {twice} is named twice", "Name each file once")
+        taught = [self.taught, *(one.taught for one in self.further_files)]
+        if any(taught) and not all(taught):
+            raise broken_rule(
+                "taught is stated for some of the files only", "State it for all of them, or for none"
+            )
+        return self
 
     @property
     def joint_unit_mm(self) -> float:

@@ -58,13 +58,28 @@ class Cell:
 
     @property
     def config_path(self) -> Path:
-        """The controller's config; its name in the cell file is relative to the cell file."""
+        """The controller's config, or its first file; its name is relative to the cell file."""
         return self.path.parent / self.settings.controller.config
 
     @property
+    def config_paths(self) -> tuple[Path, ...]:
+        """All files of the controller's config, that one first."""
+        further = self.settings.controller.further_files
+        return (self.config_path, *(self.path.parent / one.config for one in further))
+
+    @property
     def taught_path(self) -> Path:
-        """The config with which points and frames were taught last."""
-        return self.path.parent / (self.settings.controller.taught or self.settings.controller.config)
+        """The config with which points and frames were taught last, or its first file."""
+        return self.taught_paths[0]
+
+    @property
+    def taught_paths(self) -> tuple[Path, ...]:
+        """All files of that config."""
+        controller = self.settings.controller
+        if controller.taught is None:
+            return self.config_paths
+        further = (one.taught for one in controller.further_files if one.taught is not None)
+        return tuple(self.path.parent / name for name in (controller.taught, *further))
 
 
 def load_cell(path: Path) -> Cell:

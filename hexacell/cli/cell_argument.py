@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from hexacell.application.certificate_warnings import certificate_warnings
+from hexacell.application.held_config import settle_config
 from hexacell.application.security_warnings import exposure_warnings, telling_warnings
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.passwords import password_warnings
@@ -16,6 +17,8 @@ def cell_at(path: Path, console: Console) -> Cell:
     cell = load_cell(path)
     for warning in (*password_warnings(cell), *telling_warnings(cell)):
         console.warn(warning)
+    if (settled := settle_config(*cell.config_paths)) is not None:
+        console.warn(settled)
     return cell
 
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import difflib
 import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
 from pydantic import ValidationError, model_validator
 
 from hexacell.cell.fields import Frozen, GeometryDocument, first_mistake
-from hexacell.controller_config.interface import ConfigFormat
+from hexacell.controller_config.contents import Contents, fingerprint_of, names_of, read_contents
+from hexacell.controller_config.layout import ConfigLayout
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.storage import atomic_files
@@ -42,6 +44,15 @@ class JsonRecord(Frozen):
             raise FileError(problem, subject=path, action="Restore the file") from error
 
 
+class FileChange(Frozen):
+    """What a change puts into one further file of a config."""
+
+    path: Path
+    format: str
+    text_before: str
+    text_after: str
+
+
 class ConfigChange(JsonRecord):
     """A new geometry for a controller, and the exact text that it puts into the config.
 
@@ -59,60 +70,75 @@ class ConfigChange(JsonRecord):
     sha256_after: str
     text_before: str
     text_after: str
+    further: tuple[FileChange, ...] = ()
 
     @model_validator(mode="after")
     def _texts_are_whole(self) -> Self:
-        for name, text, expected in (
-            ("text_before", self.text_before, self.sha256_before),
-            ("text_after", self.text_after, self.sha256_after),
+        for name, contents, expected in (
+            ("text_before", self.before_contents, self.sha256_before),
+            ("text_after", self.after_contents, self.sha256_after),
         ):
-            if atomic_files.sha256(text.encode()) != expected:
+            if fingerprint_of(contents) != expected:
                 raise ValueError(f"{name} does not have the checksum stated for it")
         return self
 
     @property
+    def paths(self) -> tuple[Path, ...]:
+        """All files of the config, the first one first."""
+        return (self.path, *(one.path for one in self.further))
+
+    @property
+    def before_contents(self) -> Contents:
+        """What the files held."""
+        return (self.text_before.encode(), *(one.text_before.encode() for one in self.further))
+
+    @property
+    def after_contents(self) -> Contents:
+        """What they are to hold."""
+        return (self.text_after.encode(), *(one.text_after.encode() for one in self.further))
+
+    @property
     def diff(self) -> str:
-        """The exact change of the text."""
-        return diff(self.text_before, self.text_after)
-
-
-def fingerprint(path: Path) -> str:
-    """The SHA-256 of a config, for the start of a run; raises ``FileError``."""
-    return atomic_files.sha256(atomic_files.read_bytes(path))
+        """The exact change of the text, file by file."""
+        return diff_of_files(self.paths, self.before_contents, self.after_contents)
 
 
 def propose(
-    path: Path, config_format: ConfigFormat, format_name: str, after: Geometry, *, fingerprint_at_start: str
+    paths: Sequence[Path], layout: ConfigLayout, after: Geometry, *, fingerprint_at_start: str
 ) -> ConfigChange:
     """The change that gives the controller the geometry ``after``, mm; nothing is written.
 
-    ``format_name`` is the name of ``config_format`` in the cell file, ``fingerprint_at_start`` the
-    :func:`fingerprint` of the config when the run began: the measurements were commanded with that
-    geometry and are meaningless with another one.
+    ``fingerprint_at_start`` is the :func:`~hexacell.controller_config.contents.fingerprint` of the config
+    when the run began: the measurements were commanded with that geometry and are meaningless with another.
 
     Raises:
         FileError: the config changed since, or is invalid.
     """
-    data = atomic_files.read_bytes(path)
-    require_fingerprint(path, data, fingerprint_at_start)
-    before = config_format.read(path).geometry
-    text_before = atomic_files.decode_utf8(data, path)
-    text_after = config_format.rewrite(text_before, after)
+    contents = read_contents(paths)
+    require_fingerprint(paths[0], contents, fingerprint_at_start)
+    before = layout.read(*paths).geometry
+    texts = [atomic_files.decode_utf8(data, path) for data, path in zip(contents, paths, strict=True)]
+    new = layout.rewrite(texts, after)
+    first, *further = (
+        FileChange(path=path.absolute(), format=one.name, text_before=old, text_after=text)
+        for path, one, old, text in zip(paths, layout.formats, texts, new, strict=True)
+    )
     return ConfigChange(
-        path=path.absolute(),
-        format=format_name,
+        path=first.path,
+        format=first.format,
         before=before.document(),
         after=after.document(),
         sha256_before=fingerprint_at_start,
-        sha256_after=atomic_files.sha256(text_after.encode()),
-        text_before=text_before,
-        text_after=text_after,
+        sha256_after=fingerprint_of(tuple(text.encode() for text in new)),
+        text_before=first.text_before,
+        text_after=first.text_after,
+        further=tuple(further),
     )
 
 
-def require_fingerprint(path: Path, data: bytes, expected: str) -> None:
-    """Raise ``FileError`` if ``data``, the content of ``path``, changed since the run began."""
-    if atomic_files.sha256(data) != expected:
+def require_fingerprint(path: Path, contents: Contents, expected: str) -> None:
+    """Raise ``FileError`` if the config, whose first file is ``path``, changed since the run began."""
+    if fingerprint_of(contents) != expected:
         raise FileError(
             "the config changed since the run began; the new geometry does not belong to it",
             subject=path,
@@ -120,9 +146,18 @@ def require_fingerprint(path: Path, data: bytes, expected: str) -> None:
         )
 
 
-def diff(before: str, after: str) -> str:
+def diff_of_files(paths: Sequence[Path], before: Contents, after: Contents) -> str:
+    """The text change as a unified diff, each of several files under its name; empty if there is none."""
+    texts = [[data.decode(errors="replace") for data in contents] for contents in (before, after)]
+    if len(paths) == 1:
+        return diff(texts[0][0], texts[1][0])
+    named = zip(names_of(paths), *texts, strict=True)
+    return "".join(diff(old, new, (name, name)) for name, old, new in named)
+
+
+def diff(before: str, after: str, names: tuple[str, str] = ("config-before", "config-after")) -> str:
     """The text change as a unified diff that ``patch`` accepts; empty if there is none."""
-    lines = difflib.unified_diff(_lines(before), _lines(after), "config-before", "config-after")
+    lines = difflib.unified_diff(_lines(before), _lines(after), *names)
     return "".join(
         line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in lines
     )

@@ -27,6 +27,9 @@ from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
 SETP = re.compile(r"[ \t]*setp[ \t]+(?P<pin>\S+)[ \t]+(?P<value>\S+)[ \t]*(?:#.*)?\r?")
 """A line that sets a pin."""
 
+VARIABLE = "["
+"""Begins a variable of the INI file: ``[SECTION]NAME``."""
+
 
 class HalPinsOptions(KeyedOptions):
     """Options of the format; ``component`` is that of the pins without a pattern of their own."""
@@ -37,9 +40,13 @@ class HalPinsOptions(KeyedOptions):
 class HalPins(KeyedConfig):
     """A :class:`~hexacell.controller_config.interface.ConfigFormat`; raises ``UsageError`` for options."""
 
-    def __init__(self, parameters: ParameterSet, given: Mapping[str, Any]) -> None:
+    def __init__(
+        self, parameters: ParameterSet, given: Mapping[str, Any], *, is_part: bool = False
+    ) -> None:
         options = options_of(HalPinsOptions, "linuxcnc-hal", given)
-        keys = NumberKeys.of(parameters, options, lambda parameter: _pin(options.component, parameter))
+        keys = NumberKeys.of(
+            parameters, options, lambda parameter: _pin(options.component, parameter), is_part=is_part
+        )
         super().__init__(parameters, keys, HalText, options.unit_mm)
 
 
@@ -72,7 +79,7 @@ class HalText:
         if len(tokens) > 1:
             problem = f"{key} is set a second time, after line {tokens[0].line}"
             raise FileError(problem, subject=self.source, line=tokens[1].line, action="Remove one")
-        if tokens[0].text.startswith("["):
+        if tokens[0].text.startswith(VARIABLE):
             raise FileError(
                 f"{key} is set to {tokens[0].text}, a variable of the INI file",
                 subject=self.source,
@@ -82,8 +89,8 @@ class HalText:
         return tokens[0]
 
     def has(self, key: str) -> bool:
-        """Whether a line sets a pin."""
-        return key in self._tokens
+        """Whether a line sets a pin to a number: to a variable of the INI file, it is that which has it."""
+        return any(not token.text.startswith(VARIABLE) for token in self._tokens.get(key, ()))
 
     @cached_property
     def _tokens(self) -> Mapping[str, list[NumberToken]]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from hexacell.cell.fields import Frozen
 from hexacell.kinematics.geometry import Geometry
@@ -76,5 +77,45 @@ class ConfigFormat(Protocol):
 
         Raises:
             FileError: ``text`` is not such a config, or cannot hold ``geometry``.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigPart:
+    """What one of several files has of a geometry.
+
+    Attributes:
+        values: by the parameters' names, each in its unit.
+        branch: that of the robot; none where the file has nothing to do with it.
+        limits: those that the file has, if any.
+    """
+
+    values: Mapping[str, float]
+    branch: Branch | None
+    limits: ControllerLimits = field(default=ControllerLimits())
+
+
+@runtime_checkable
+class PartFormat(Protocol):
+    """A format whose files may have a part of the geometry each.
+
+    Its class takes ``is_part`` beside what that of a :class:`ConfigFormat` takes: then its options need not
+    say where all parameters are.
+    """
+
+    def read_part(self, text: str, source: Path | None) -> ConfigPart:
+        """The parameters that a text has, whichever they are; ``source`` is what errors name.
+
+        Raises:
+            FileError: one of them is there twice, or no number.
+        """
+        ...
+
+    def rewrite_part(self, text: str, values: Mapping[str, float]) -> str:
+        """``text`` with other values of parameters that it has; every other character is kept.
+
+        Raises:
+            FileError: it has one of them not, or cannot hold its value.
         """
         ...

@@ -23,7 +23,12 @@ from typing import Any, Protocol, Self, TypeVar, cast
 from pydantic import Field, ValidationError
 
 from hexacell.cell.fields import Positive, Section, Text, first_mistake
-from hexacell.controller_config.interface import LARGEST_CONFIG_BYTES, ControllerGeometry, ControllerLimits
+from hexacell.controller_config.interface import (
+    LARGEST_CONFIG_BYTES,
+    ConfigPart,
+    ControllerGeometry,
+    ControllerLimits,
+)
 from hexacell.controller_config.number_tokens import (
     NumberToken,
     number_of,
@@ -55,7 +60,7 @@ class NumberLookup(Protocol):
 
 OpenText = Callable[[str, Path | None], NumberLookup]
 DefaultKey = Callable[[GeometricParameter], str]
-ReadLimits = Callable[[NumberLookup, Path], ControllerLimits]
+ReadLimits = Callable[[NumberLookup, Path | None], ControllerLimits]
 
 
 class KeyedOptions(Section):
@@ -110,14 +115,19 @@ def _filled(pattern: str, values: Mapping[str, str | int]) -> str:
 
 @dataclass(frozen=True)
 class NumberKeys:
-    """The key of each parameter, of its correction if it has one, and of the signs or the signs."""
+    """The key of each parameter, of its correction if it has one, and of the signs or the signs.
+
+    ``branch`` is none of a file that is one of several and has no signs.
+    """
 
     values: Mapping[str, str]
     corrections: Mapping[str, str]
-    branch: tuple[str, ...] | Branch
+    branch: tuple[str, ...] | Branch | None
 
     @classmethod
-    def of(cls, parameters: ParameterSet, options: KeyedOptions, default: DefaultKey) -> Self:
+    def of(
+        cls, parameters: ParameterSet, options: KeyedOptions, default: DefaultKey, *, is_part: bool
+    ) -> Self:
         """By the options; a parameter without a pattern of its own has the ``default`` key.
 
         Raises:
@@ -131,12 +141,13 @@ class NumberKeys:
             )
         every = parameters.parameters
         keys = {one.name: default(one) for one in every} | _keys_by(options.names, every)
-        found = cls(keys, _keys_by(options.corrections, every), _branch_of(parameters, options))
+        branch = None if is_part and options.branch is None else _branch_of(parameters, options)
+        found = cls(keys, _keys_by(options.corrections, every), branch)
         found._require_different()
         return found
 
     def _require_different(self) -> None:
-        named = [one for one in self.branch if isinstance(one, str)]
+        named = [one for one in self.branch or () if isinstance(one, str)]
         every = [*self.values.values(), *self.corrections.values(), *named]
         if twice := next((one for one in every if every.count(one) > 1), None):
             raise UsageError(
@@ -168,7 +179,7 @@ def _branch_of(parameters: ParameterSet, options: KeyedOptions) -> tuple[str, ..
 
 
 class KeyedConfig:
-    """A :class:`~hexacell.controller_config.interface.ConfigFormat` of such texts."""
+    """A :class:`~hexacell.controller_config.interface.ConfigFormat` of such texts, and a ``PartFormat``."""
 
     def __init__(
         self,
@@ -187,10 +198,9 @@ class KeyedConfig:
     def read(self, path: Path) -> ControllerGeometry:
         """The geometry in the file; raises ``FileError`` with file and line."""
         text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
-        lookup = self._open(text, path)
-        values = [self._value(lookup, one, path) for one in self._parameters.parameters]
-        geometry, branch = Geometry(self._parameters, values), self._branch(lookup, path)
-        return ControllerGeometry(geometry, branch, self._read_limits(lookup, path))
+        part = self._part(self._open(text, path), path, self._parameters.parameters)
+        geometry = Geometry(self._parameters, list(part.values.values()))
+        return ControllerGeometry(geometry, part.branch or (), part.limits)
 
     def rewrite(self, text: str, geometry: Geometry) -> str:
         """``text`` with ``geometry`` in it, to 1 nm; a number that agrees to half of that is kept.
@@ -199,36 +209,59 @@ class KeyedConfig:
             FileError: a value is not finite, a length not above zero, or the text is no such config.
         """
         require_physical(geometry)
-        lookup = self._open(text, None)
-        changed = replace_tokens(text, dict(self._changed(lookup, geometry)))
-        self._require_kept(self._open(changed, None), geometry)
+        values = geometry.vector.tolist()
+        return self.rewrite_part(text, dict(zip(self._parameters.names, values, strict=True)))
+
+    def read_part(self, text: str, source: Path | None) -> ConfigPart:
+        """The parameters whose keys are in the text; raises ``FileError`` with the line."""
+        lookup = self._open(text, source)
+        there = [one for one in self._parameters.parameters if any(map(lookup.has, self._keys_of(one)))]
+        return self._part(lookup, source, there)
+
+    def rewrite_part(self, text: str, values: Mapping[str, float]) -> str:
+        """``text`` with these values of parameters, as :meth:`rewrite` writes them."""
+        new = [(one, values[one.name]) for one in self._parameters.parameters if one.name in values]
+        changed = replace_tokens(text, dict(self._changed(self._open(text, None), new)))
+        self._require_kept(self._open(changed, None), new)
         return changed
 
-    def _changed(self, lookup: NumberLookup, geometry: Geometry) -> Iterator[tuple[NumberToken, str]]:
-        for parameter, new in zip(self._parameters.parameters, geometry.vector.tolist(), strict=True):
-            difference = new - self._value(lookup, parameter, None)
+    def _part(
+        self, lookup: NumberLookup, source: Path | None, there: Iterable[GeometricParameter]
+    ) -> ConfigPart:
+        values = {one.name: self._value(lookup, one, source) for one in there}
+        return ConfigPart(values, self._branch(lookup, source), self._read_limits(lookup, source))
+
+    def _changed(
+        self, lookup: NumberLookup, new: Iterable[tuple[GeometricParameter, float]]
+    ) -> Iterator[tuple[NumberToken, str]]:
+        for parameter, wanted in new:
+            difference = wanted - self._value(lookup, parameter, None)
             if abs(difference) > 0.5 * _resolution(parameter):
                 token = lookup.number(self._written_key(parameter))
                 unit = self._unit(parameter)
                 value = number_of(token, None) + difference / unit
                 yield token, write_number(value, parameter.kind.unit.decimals + _more_decimals(unit))
 
-    def _require_kept(self, lookup: NumberLookup, geometry: Geometry) -> None:
-        for parameter, new in zip(self._parameters.parameters, geometry.vector.tolist(), strict=True):
-            if abs(self._value(lookup, parameter, None) - new) > _resolution(parameter):
+    def _require_kept(self, lookup: NumberLookup, new: Iterable[tuple[GeometricParameter, float]]) -> None:
+        for parameter, wanted in new:
+            if abs(self._value(lookup, parameter, None) - wanted) > _resolution(parameter):
                 raise FileError(
                     f"the new geometry reads back with another {parameter.name}",
                     action="Nothing was written; please report this with the config",
                 )
 
     def _value(self, lookup: NumberLookup, parameter: GeometricParameter, source: Path | None) -> float:
-        keys = (self._keys.values[parameter.name], self._keys.corrections.get(parameter.name))
-        tokens = [lookup.number(key) for key in keys if key is not None]
+        tokens = [lookup.number(key) for key in self._keys_of(parameter)]
         value = self._unit(parameter) * sum(number_of(token, source) for token in tokens)
         if parameter.kind.is_positive and value <= 0.0:
             problem = f"{parameter.name} is {value:g}, but must be above zero"
             raise token_error(tokens[-1], problem, source, "Correct it")
         return value
+
+    def _keys_of(self, parameter: GeometricParameter) -> tuple[str, ...]:
+        """Of the numbers whose sum it is."""
+        keys = (self._keys.values[parameter.name], self._keys.corrections.get(parameter.name))
+        return tuple(key for key in keys if key is not None)
 
     def _written_key(self, parameter: GeometricParameter) -> str:
         return self._keys.corrections.get(parameter.name, self._keys.values[parameter.name])
@@ -236,10 +269,12 @@ class KeyedConfig:
     def _unit(self, parameter: GeometricParameter) -> float:
         return self._unit_mm if parameter.kind.unit is ParameterUnit.MM else 1.0
 
-    def _branch(self, lookup: NumberLookup, source: Path) -> Branch:
+    def _branch(self, lookup: NumberLookup, source: Path | None) -> Branch | None:
+        if self._keys.branch is None:
+            return None
         return cast("Branch", tuple(self._sign(lookup, one, source) for one in self._keys.branch))
 
-    def _sign(self, lookup: NumberLookup, key: str | int, source: Path) -> int:
+    def _sign(self, lookup: NumberLookup, key: str | int, source: Path | None) -> int:
         if isinstance(key, int):
             return key
         token = lookup.number(key)

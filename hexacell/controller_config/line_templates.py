@@ -44,7 +44,9 @@ class LineTemplatesOptions(KeyedOptions):
 class LineTemplates(KeyedConfig):
     """A :class:`~hexacell.controller_config.interface.ConfigFormat`; raises ``UsageError`` for options."""
 
-    def __init__(self, parameters: ParameterSet, given: Mapping[str, Any]) -> None:
+    def __init__(
+        self, parameters: ParameterSet, given: Mapping[str, Any], *, is_part: bool = False
+    ) -> None:
         options = options_of(LineTemplatesOptions, "template", given)
         if options.names or options.corrections:
             raise UsageError(
@@ -55,8 +57,8 @@ class LineTemplates(KeyedConfig):
         names = Counter(name for template in templates for name in template.names)
         if options.branch is None and f"{BRANCH}1" in names:
             options = options.model_copy(update={"branch": f"{BRANCH}{{leg}}"})
-        keys = NumberKeys.of(parameters, options, lambda parameter: parameter.name)
-        _require_each_once(names, parameters)
+        keys = NumberKeys.of(parameters, options, lambda parameter: parameter.name, is_part=is_part)
+        _require_each_once(names, parameters, is_part=is_part)
         super().__init__(
             parameters, keys, lambda text, path: _MatchedLines.of(text, path, templates), options.unit_mm
         )
@@ -112,9 +114,9 @@ def _literal(text: str) -> str:
     return r"\s+".join(re.escape(part) for part in re.split(r"\s+", text))
 
 
-def _require_each_once(names: Counter[str], parameters: ParameterSet) -> None:
+def _require_each_once(names: Counter[str], parameters: ParameterSet, *, is_part: bool) -> None:
     for name in parameters.names:
-        if names[name] != 1:
+        if names[name] > 1 or not (names[name] or is_part):
             often = "in no line" if not names[name] else "in more than one line"
             raise UsageError(f"config_options: {name} is {often}", action="Put it into one")
 

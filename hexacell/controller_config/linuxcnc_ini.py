@@ -32,9 +32,11 @@ class LinuxcncIniOptions(KeyedOptions):
 class LinuxcncIni(KeyedConfig):
     """A :class:`~hexacell.controller_config.interface.ConfigFormat`; raises ``UsageError`` for options."""
 
-    def __init__(self, parameters: ParameterSet, given: Mapping[str, Any]) -> None:
+    def __init__(
+        self, parameters: ParameterSet, given: Mapping[str, Any], *, is_part: bool = False
+    ) -> None:
         options = options_of(LinuxcncIniOptions, "linuxcnc-ini", given)
-        keys = NumberKeys.of(parameters, options, lambda parameter: parameter.name.upper())
+        keys = NumberKeys.of(parameters, options, lambda parameter: parameter.name.upper(), is_part=is_part)
         super().__init__(
             parameters,
             keys,

@@ -28,7 +28,7 @@ def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
     return limits_in(text, path, unit_mm)
 
 
-def limits_in(ini: NumberLookup, source: Path, unit_mm: float) -> ControllerLimits:
+def limits_in(ini: NumberLookup, source: Path | None, unit_mm: float) -> ControllerLimits:
     """The same of a text that was read from ``source``."""
     joints = [
         _range(ini, section, 1.0 if _turns(ini, section) else unit_mm, source)
@@ -50,7 +50,7 @@ def _turns(ini: NumberLookup, joint: str) -> bool:
     return ini.has(key) and ini.number(key).text.upper() == ROTARY_JOINT
 
 
-def _range(ini: NumberLookup, section: str, unit: float, source: Path) -> Range | None:
+def _range(ini: NumberLookup, section: str, unit: float, source: Path | None) -> Range | None:
     """Both limits of a joint or an axis; LinuxCNC takes one that is not there for none."""
     low, high = (_limit(ini, f"{section}/{name}", source) for name in ("MIN_LIMIT", "MAX_LIMIT"))
     if low is None and high is None:
@@ -63,7 +63,7 @@ def _range(ini: NumberLookup, section: str, unit: float, source: Path) -> Range 
     return lowest, highest
 
 
-def _limit(ini: NumberLookup, key: str, source: Path) -> NumberToken | None:
+def _limit(ini: NumberLookup, key: str, source: Path | None) -> NumberToken | None:
     if not ini.has(key):
         return None
     token = ini.number(key)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from hexacell.controller_config.change import diff
-from hexacell.controller_config.interface import ConfigFormat
+from hexacell.controller_config.change import diff_of_files
+from hexacell.controller_config.contents import Contents, read_contents
+from hexacell.controller_config.layout import ConfigLayout
 from hexacell.errors import FileError, HexacellError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.storage.atomic_files import read_bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,23 +58,26 @@ class ConfigEditedSince(FileError):
 
 
 def compare_versions(
-    path: Path, config_format: ConfigFormat, before: tuple[Geometry, str], written: tuple[Geometry, str]
+    paths: tuple[Path, ...],
+    layout: ConfigLayout,
+    before: tuple[Geometry, Contents],
+    written: tuple[Geometry, Contents],
 ) -> ConfigVersions:
-    """Compare the config at ``path`` with two versions of it, each a geometry and the whole text.
+    """Compare the config in these files with two versions of it, each a geometry and what the files held.
 
     Raises:
-        FileError: it cannot be read.
+        FileError: a file cannot be read.
     """
-    text = read_bytes(path).decode(errors="replace")
-    edits = [diff(version, text) for _, version in (before, written)]
+    now = read_contents(paths)
+    edits = [diff_of_files(paths, version, now) for _, version in (before, written)]
     is_from_written = len(edits[1]) <= len(edits[0])
-    numbers = _numbers(before[0], written[0], _geometry_now(path, config_format))
+    numbers = _numbers(before[0], written[0], _geometry_now(paths, layout))
     return ConfigVersions(numbers, edits[is_from_written], is_from_written)
 
 
-def _geometry_now(path: Path, config_format: ConfigFormat) -> Geometry | None:
+def _geometry_now(paths: tuple[Path, ...], layout: ConfigLayout) -> Geometry | None:
     try:
-        return config_format.read(path).geometry
+        return layout.read(*paths).geometry
     except HexacellError:
         return None
 

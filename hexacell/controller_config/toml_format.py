@@ -27,6 +27,7 @@ import numpy as np
 from hexacell.cell.fields import LARGEST_NUMBER
 from hexacell.controller_config.interface import (
     LARGEST_CONFIG_BYTES,
+    ConfigPart,
     ControllerGeometry,
     ControllerLimits,
     JointRanges,
@@ -49,7 +50,13 @@ class NativeToml:
         UsageError: options are given; it has none.
     """
 
-    def __init__(self, parameters: ParameterSet, given: Mapping[str, Any] = MappingProxyType({})) -> None:
+    def __init__(
+        self,
+        parameters: ParameterSet,
+        given: Mapping[str, Any] = MappingProxyType({}),
+        *,
+        is_part: bool = False,  # noqa: ARG002 - it has no options that could be incomplete
+    ) -> None:
         if given:
             raise UsageError(
                 f"the config format 'toml' has no options, but '{next(iter(given))}' is given",
@@ -83,6 +90,30 @@ class NativeToml:
                 action="Nothing was written; please report this with the config",
             )
         return changed
+
+    def read_part(self, text: str, source: Path | None) -> ConfigPart:
+        """The kinds of parameters that ``[geometry]`` has; raises ``FileError`` with the line."""
+        document = TomlDocument.parse(text, source)
+        there = self._kinds_in(document)
+        content = _Content(document, there)
+        values = (
+            dict(zip(there.names, content.geometry().vector.tolist(), strict=True)) if there.kinds else {}
+        )
+        branch = content.branch() if there.has_branch else None
+        return ConfigPart(values, branch, ControllerLimits(joints=content.joint_ranges()))
+
+    def rewrite_part(self, text: str, values: Mapping[str, float]) -> str:
+        """``text`` with these values, of all parameters of some kinds, as :meth:`rewrite` writes them."""
+        there = self._kinds_in(TomlDocument.parse(text))
+        return NativeToml(there).rewrite(text, Geometry(there, [values[name] for name in there.names]))
+
+    def _kinds_in(self, document: TomlDocument) -> ParameterSet:
+        """Those of the mechanism that the document has, and whether it has the branch."""
+        section = document.data.get("geometry")
+        names = {*section} if isinstance(section, dict) else set()
+        has_branch = self._parameters.has_branch and "branch" in names | {*document.data}
+        kinds = tuple(kind for kind in self._parameters.kinds if kind.symbol in names)
+        return ParameterSet(kinds, has_branch)
 
 
 def _changed_tokens(before: Geometry, after: Geometry) -> Iterator[tuple[KeyPath, str]]:

@@ -3,70 +3,31 @@
 The order makes it safe. First the backup, the new text and the receipt are written to the disk; then the
 config is replaced in one step; then it is read back. If the process or the power fails at any moment, the
 config is the old one or the new one, and if it is the new one, the receipt that undoes it exists.
+
+Of several files, each is replaced in a step of its own. What a process that dies between two steps leaves
+behind, the next one settles (:mod:`~hexacell.controller_config.pending_write`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import ClassVar, NoReturn
+from typing import NoReturn
 
-from hexacell.controller_config.change import ConfigChange, JsonRecord, require_fingerprint
+from hexacell.controller_config.change import ConfigChange, require_fingerprint
+from hexacell.controller_config.contents import Contents, fingerprint_of, read_contents
+from hexacell.controller_config.receipt import AFTER, BEFORE, RECEIPT, Receipt
+from hexacell.controller_config.replacement import Replacement
 from hexacell.errors import FileError, HexacellError, WriteBackUndone
 from hexacell.storage import atomic_files
-
-BEFORE = "config-before"
-AFTER = "config-after"
-RECEIPT = "write-back.json"
-
-
-class Receipt(JsonRecord):
-    """What a commit did, and where the backup is.
-
-    ``backup_folder`` is where the receipt was found; a run folder may be moved.
-    """
-
-    noun: ClassVar[str] = "receipt of a write-back"
-
-    path: Path
-    format: str
-    sha256_before: str
-    sha256_after: str
-    backup_folder: Path
-
-    @classmethod
-    def of(cls, folder: Path) -> Receipt:
-        """The receipt kept in a run folder; raises ``FileError``."""
-        return cls.load(folder / RECEIPT).model_copy(update={"backup_folder": folder.absolute()})
-
-    @classmethod
-    def for_change(cls, change: ConfigChange, backup_folder: Path) -> Receipt:
-        """The receipt that a commit of ``change`` keeps in ``backup_folder``."""
-        return cls(
-            path=change.path,
-            format=change.format,
-            sha256_before=change.sha256_before,
-            sha256_after=change.sha256_after,
-            backup_folder=backup_folder.absolute(),
-        )
-
-    def backup(self) -> bytes:
-        """The config before the change; raises ``FileError`` if the backup is gone or damaged."""
-        data = atomic_files.read_bytes(self.backup_folder / BEFORE)
-        if atomic_files.sha256(data) != self.sha256_before:
-            raise FileError(
-                "the backup is damaged",
-                subject=self.backup_folder / BEFORE,
-                action="Restore it from another backup",
-            )
-        return data
 
 
 def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
     """Write ``change`` into the controller's config.
 
-    ``backup_folder`` gets the text before and after and the receipt. A commit that is complete already, and
-    was interrupted before it returned, returns its receipt again.
+    ``backup_folder`` gets the texts before and after and the receipt. A commit that is complete already,
+    and was interrupted before it returned, returns its receipt again.
 
     Raises:
         FileError: nothing was replaced: the config changed since the run began, or something cannot be
@@ -74,14 +35,13 @@ def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
         WriteBackUndone: it failed after the replacement; the config is unchanged.
     """
     receipt = Receipt.for_change(change, backup_folder)
-    before, after = change.text_before.encode(), change.text_after.encode()
-    found = atomic_files.read_bytes(change.path)
+    before, after = change.before_contents, change.after_contents
+    found = read_contents(change.paths)
     if found == after and _is_complete(receipt):
         return receipt
-    require_fingerprint(change.path, found, change.sha256_before)
+    _require_unchanged(change.paths, found, before)
     _back_up(receipt, before, after)
-    if before != after:
-        _replace(receipt, before, after)
+    _replace(receipt, Replacement(change.paths, before, after))
     return receipt
 
 
@@ -93,26 +53,51 @@ def rollback(receipt: Receipt) -> None:
             be written; the message says so if it was replaced nevertheless.
     """
     before = receipt.backup()
-    found = atomic_files.read_bytes(receipt.path)
+    found = read_contents(receipt.paths)
     if found == before:
         return
-    if atomic_files.sha256(found) != receipt.sha256_after:
+    if fingerprint_of(found) != receipt.sha256_after:
+        path, copy = _edited(receipt, found, before)
         raise FileError(
             "the config was changed since it was written; rolling back would lose that change",
-            subject=receipt.path,
-            action=f"Review it; if it may be lost, copy {receipt.backup_folder / BEFORE} over it",
+            subject=path,
+            action=f"Review it; if it may be lost, copy {copy} over it",
         )
-    restore(receipt.path, before, expected=found)
+    restore(receipt.paths, before, expected=found)
 
 
-def restore(path: Path, data: bytes, *, expected: bytes) -> None:
-    """Replace the config by an earlier version in one step, while it is as ``expected``, and read it back.
+def restore(paths: tuple[Path, ...], contents: Contents, *, expected: Contents) -> None:
+    """Replace the config by an earlier version, while it is as ``expected``, and read it back.
 
     Raises:
-        FileError: it has changed, or cannot be written.
+        FileError: it has changed, or cannot be written; of several files none is replaced then. If even
+            that fails, the next command that uses the cell does it.
     """
-    atomic_files.write_atomically(path, data, expected=expected)
-    _require_written(path, data)
+    replacement = Replacement(paths, expected, contents)
+    try:
+        replacement.write()
+        replacement.finish()
+    except BaseException:
+        if len(replacement.changed) > 1:
+            with suppress(FileError):
+                replacement.put_back(all_of_them=False)
+        raise
+
+
+def _require_unchanged(paths: Sequence[Path], found: Contents, before: Contents) -> None:
+    """Raise ``FileError``, with the file, if the config changed since the run began."""
+    for path, data, expected in zip(paths, found, before, strict=True):
+        require_fingerprint(path, (data,), fingerprint_of((expected,)))
+
+
+def _edited(receipt: Receipt, found: Contents, before: Contents) -> tuple[Path, Path]:
+    """A file that is neither as before nor as written, and its copy of before."""
+    files = list(zip(receipt.paths, receipt.kept(BEFORE), strict=True))
+    with suppress(FileError):
+        for file, data, *known in zip(files, found, before, receipt.written(), strict=True):
+            if data not in known:
+                return file
+    return files[0]
 
 
 def _is_complete(receipt: Receipt) -> bool:
@@ -122,41 +107,46 @@ def _is_complete(receipt: Receipt) -> bool:
         return False
 
 
-def _back_up(receipt: Receipt, before: bytes, after: bytes) -> None:
+def _back_up(receipt: Receipt, before: Contents, after: Contents) -> None:
     folder = receipt.backup_folder
     atomic_files.create_folder_durably(folder)
-    if atomic_files.read_if_present(folder / BEFORE) not in {None, before}:
-        raise FileError(
-            "this folder already holds the backup of another version",
-            subject=folder / BEFORE,
-            action="Use another folder for each write-back",
-        )
-    for name, data in ((BEFORE, before), (AFTER, after), (RECEIPT, receipt.to_json())):
-        atomic_files.write_atomically(folder / name, data, like=receipt.path)
+    for path, data in zip(receipt.kept(BEFORE), before, strict=True):
+        if atomic_files.read_if_present(path) not in {None, data}:
+            raise FileError(
+                "this folder already holds the backup of another version",
+                subject=path,
+                action="Use another folder for each write-back",
+            )
+    for name, contents in ((BEFORE, before), (AFTER, after)):
+        for path, data, like in zip(receipt.kept(name), contents, receipt.paths, strict=True):
+            atomic_files.write_atomically(path, data, like=like)
+    receipt.save(folder / RECEIPT, like=receipt.path)
     receipt.backup()
 
 
-def _replace(receipt: Receipt, before: bytes, after: bytes) -> None:
+def _replace(receipt: Receipt, replacement: Replacement) -> None:
     try:
-        atomic_files.write_atomically(receipt.path, after, expected=before)
+        replacement.write()
     except BaseException as error:
-        # Undo only if the new text is in place; otherwise nothing was replaced.
-        if _content(receipt.path) in {after, None}:
-            _undo(receipt, before, error)
+        # Undo only if a new text is in place; otherwise nothing was replaced.
+        if replacement.has_begun:
+            _undo(receipt, replacement, error, all_of_them=False)
+        with suppress(FileError):
+            replacement.forget()
         raise
     try:
-        _require_written(receipt.path, after)
+        replacement.finish()
     except BaseException as error:
-        _undo(receipt, before, error)
+        _undo(receipt, replacement, error, all_of_them=True)
 
 
-def _undo(receipt: Receipt, before: bytes, cause: BaseException) -> NoReturn:
-    _keep_foreign_version(receipt, _content(receipt.path))
+def _undo(
+    receipt: Receipt, replacement: Replacement, cause: BaseException, *, all_of_them: bool
+) -> NoReturn:
     try:
-        atomic_files.write_atomically(receipt.path, before)
-        _require_written(receipt.path, before)
+        replacement.put_back(all_of_them=all_of_them, keep=lambda found: _keep(receipt, found))
     except FileError as error:
-        if _content(receipt.path) != before:
+        if any(one.present != one.old for one in replacement.changed):
             raise _not_undone(receipt, cause, error) from cause
     if not isinstance(cause, Exception):
         raise cause
@@ -168,11 +158,12 @@ def _undo(receipt: Receipt, before: bytes, cause: BaseException) -> NoReturn:
 
 
 def _not_undone(receipt: Receipt, cause: BaseException, error: FileError) -> FileError:
+    copies = " and ".join(map(str, receipt.kept(BEFORE)))
     return FileError(
         f"the write-back failed ({_reason(cause)}) and could not be undone ({_reason(error)}); "
         "the config may hold the new geometry",
         subject=receipt.path,
-        action=f"Do not move the robot; copy {receipt.backup_folder / BEFORE} over the config",
+        action=f"Do not move the robot; copy {copies} over the config",
     )
 
 
@@ -180,25 +171,8 @@ def _reason(error: BaseException) -> str:
     return error.problem if isinstance(error, HexacellError) else repr(error)
 
 
-def _keep_foreign_version(receipt: Receipt, found: bytes | None) -> None:
+def _keep(receipt: Receipt, found: bytes) -> None:
     """Keep a version that no commit wrote beside the backup, if possible, so that it is not lost."""
-    if found is None or atomic_files.sha256(found) in {receipt.sha256_before, receipt.sha256_after}:
-        return
     with suppress(FileError):
-        atomic_files.write_atomically(
-            receipt.backup_folder / f"config-found-{atomic_files.sha256(found)[:12]}",
-            found,
-            like=receipt.path,
-        )
-
-
-def _require_written(path: Path, expected: bytes) -> None:
-    if atomic_files.read_bytes(path) != expected:
-        raise FileError("the file does not contain what was written", subject=path, action="Check the disk")
-
-
-def _content(path: Path) -> bytes | None:
-    try:
-        return atomic_files.read_bytes(path)
-    except FileError:
-        return None
+        name = f"config-found-{atomic_files.sha256(found)[:12]}"
+        atomic_files.write_atomically(receipt.backup_folder / name, found, like=receipt.path)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 from hexacell.application.config_rollback import ConfigRollback
 from hexacell.application.proposals import AppliedProposal
+from hexacell.controller_config.receipt import BEFORE, kept_paths
 from hexacell.controller_config.three_way import ConfigVersions, NumberVersions
-from hexacell.controller_config.write_back import BEFORE
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.teaching import teaching_line
 
@@ -16,14 +19,15 @@ def applied_text(applied: AppliedProposal) -> str:
     """What an application of a proposal did, and what is to be done next."""
     proposal = applied.proposal
     if not applied.by:
-        return f"{proposal.change.path} has this geometry already; nothing was written."
+        return f"{files_named(proposal.change.paths, 'has', 'have')} this geometry already; nothing was written."
+    kept = kept_paths(proposal.folder.path, BEFORE, len(proposal.change.paths))
     teaching = () if proposal.displacement is None else (teaching_line(proposal.displacement),)
     return "\n".join(
         (
-            f"Written into {proposal.change.path}, approved by {applied.by}.",
+            f"Written into {files_named(proposal.change.paths)}, approved by {applied.by}.",
             *teaching,
             wrapped(RELOAD),
-            f"`hexacell rollback` undoes it; the old config is {proposal.folder.path / BEFORE}.",
+            f"`hexacell rollback` undoes it; the old config is {files_named(kept)}.",
         )
     )
 
@@ -31,9 +35,18 @@ def applied_text(applied: AppliedProposal) -> str:
 def rollback_text(done: ConfigRollback) -> str:
     """What a rollback did, and what is to be done next."""
     if not done.change:
-        return f"{done.path} is as in {done.restored} already; nothing was written."
+        return (
+            f"{files_named(done.paths)} is as in {files_named(done.restored)} already; nothing was written."
+        )
     undone = "" if done.undone is None else f", which undoes the run {done.undone.name}"
-    return f"{done.change}\n{done.path} is {done.restored} again, bit for bit{undone}.\n{wrapped(RELOAD)}"
+    files = zip(done.paths, done.restored, strict=True)
+    back = ",\n".join(f"{path} is {copy} again" for path, copy in files)
+    return f"{done.change}\n{back}, bit for bit{undone}.\n{wrapped(RELOAD)}"
+
+
+def files_named(paths: Sequence[Path], verb: str = "", verb_of_several: str = "") -> str:
+    """The files of a config in a sentence, with its verb."""
+    return f"{' and '.join(map(str, paths))} {verb_of_several if paths[1:] else verb}".rstrip()
 
 
 def versions_text(versions: ConfigVersions) -> str:

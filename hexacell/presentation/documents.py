@@ -166,6 +166,7 @@ def applied_document(applied: AppliedProposal) -> dict[str, Any]:
         "applied": bool(applied.by),
         "by": applied.by or None,
         "config": str(change.path),
+        "further_configs": [str(path) for path in change.paths[1:]],
         "run": str(applied.proposal.folder.path),
         "sha256": change.sha256_after,
         "teach": None if moved is None else teaching_sentence(moved),
@@ -176,8 +177,9 @@ def rollback_document(done: ConfigRollback) -> dict[str, Any]:
     """What ``rollback --json`` prints."""
     return {
         "restored": bool(done.change),
-        "config": str(done.path),
-        "from": str(done.restored),
+        "config": str(done.paths[0]),
+        "further_configs": [str(path) for path in done.paths[1:]],
+        "from": str(done.restored[0]),
         "undone": None if done.undone is None else str(done.undone),
     }
 

@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 from hexacell.application.config_rollback import roll_back_config
+from hexacell.application.held_config import settle_config
 from hexacell.application.history import PastRun, compare_runs, parameter_trends, past_runs
 from hexacell.application.interrupted_runs import LATEST, run_to_resume
 from hexacell.application.journal_soundness import require_sound
@@ -70,7 +71,12 @@ class CellWorkplace:
 
     def __init__(self, path: Path) -> None:
         self.cell: Cell = load_cell(path)
-        self.warnings = (*password_warnings(self.cell), *exposure_warnings(self.cell))
+        settled = settle_config(*self.cell.config_paths)
+        self.warnings = (
+            *password_warnings(self.cell),
+            *exposure_warnings(self.cell),
+            *([] if settled is None else [settled]),
+        )
 
     def watch(self) -> AsyncIterator[LiveSnapshot]:
         """See :class:`Workplace`."""

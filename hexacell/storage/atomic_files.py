@@ -130,6 +130,18 @@ def write_atomically(
         raise os_error_to_file_error("was replaced, but a power cut may undo that", path, error) from error
 
 
+def require_replaceable(path: Path) -> None:
+    """Raise ``FileError`` if :func:`write_atomically` is known to refuse the file."""
+    try:
+        target = _resolved(path)
+        if _status(target) is None:
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
+        if not os.access(target.parent, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        raise os_error_to_file_error("cannot be written and is unchanged", path, error) from error
+
+
 def sync_folder(folder: Path) -> None:
     """Sync the names in ``folder`` to the disk; raises ``OSError``.
 

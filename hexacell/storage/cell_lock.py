@@ -1,7 +1,7 @@
 """One process per cell: the process that moves the robot holds the cell's lock.
 
 The lock is an advisory ``flock`` on a small file beside the controller's config. Everybody who moves this
-robot shares that file:
+robot shares that file; of several files each has a lock, as another cell may name one of them:
 
 - A second cell file for the same robot, a copy or a link, names the same config and so the same lock.
 - The technician and the scheduler are different users. With a lock in a folder of each user both could
@@ -28,7 +28,7 @@ import json
 import os
 import socket
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -44,15 +44,22 @@ _FLAGS = os.O_NOFOLLOW | os.O_NONBLOCK
 
 
 @contextmanager
-def cell_lock(config: Path) -> Iterator[None]:
-    """Hold the cell whose controller reads ``config`` until the context ends; never waits.
+def cell_lock(*config: Path) -> Iterator[None]:
+    """Hold the cell whose controller reads these files until the context ends; never waits.
 
     Raises:
         CellBusy: another process, or this one, holds it; the message names pid, user, host and since.
         FileError: the lock file cannot be opened.
     """
-    path = lock_path(config)
-    descriptor = _open(path)
+    with ExitStack() as locks:
+        for path in {lock_path(path): path for path in config}.values():
+            locks.enter_context(_lock_of_file(path))
+        yield
+
+
+@contextmanager
+def _lock_of_file(config: Path) -> Iterator[None]:
+    descriptor = _open(lock_path(config))
     try:
         _acquire(descriptor, config)
         _note(descriptor, _this_process())

@@ -10,10 +10,10 @@ from itertools import zip_longest
 from pathlib import Path
 
 from hexacell.controller_config.change import ConfigChange
-from hexacell.controller_config.write_back import RECEIPT, Receipt
+from hexacell.controller_config.contents import Contents, fingerprint_of, read_contents
+from hexacell.controller_config.receipt import RECEIPT, Receipt
 from hexacell.errors import FileError
 from hexacell.runs.run_folder import RunFolder
-from hexacell.storage import atomic_files
 from procedures.run.state import RunState
 
 PROVISIONAL_FOLDER = "lent"
@@ -23,10 +23,10 @@ UNDO = "Undo the edit and retry; if the run has ended, resume it then"
 class ConfigEdits:
     """Compares the config of one run with what it should be."""
 
-    def __init__(self, path: Path, folder: RunFolder) -> None:
-        self._path = path
+    def __init__(self, paths: tuple[Path, ...], folder: RunFolder) -> None:
+        self._paths = paths
         self._folder = folder
-        self._unedited: bytes | None = None
+        self._unedited: Contents | None = None
 
     def require_none(self, state: RunState) -> None:
         """Make sure that the config is as the run has it; while it is being changed, it may be either.
@@ -37,11 +37,18 @@ class ConfigEdits:
         expected = expected_fingerprints(self._folder, state)
         if not expected:
             return
-        found = atomic_files.read_bytes(self._path)
-        if atomic_files.sha256(found) in expected:
+        found = read_contents(self._paths)
+        if fingerprint_of(found) in expected:
             self._unedited = found
             return
-        raise edited(self._path, _first_difference(self._unedited, found))
+        raise edited(*self._first_difference(found))
+
+    def _first_difference(self, found: Contents) -> tuple[Path, int | None]:
+        """The first file that differs, and its first line that does; no line if that is not known."""
+        for path, old, new in zip(self._paths, self._unedited or (), found, strict=False):
+            if old != new:
+                return path, _first_line(old, new)
+        return self._paths[0], None
 
 
 def expected_fingerprints(folder: RunFolder, state: RunState) -> set[str]:
@@ -68,9 +75,7 @@ def edited(path: Path, line: int | None = None) -> FileError:
     )
 
 
-def _first_difference(before: bytes | None, now: bytes) -> int | None:
-    """The first line, from 1, that differs; none if it is not known what there was before."""
-    if before is None:
-        return None
+def _first_line(before: bytes, now: bytes) -> int | None:
+    """The first line, from 1, that differs."""
     lines = zip_longest(before.split(b"\n"), now.split(b"\n"))
     return next((number for number, (old, new) in enumerate(lines, start=1) if old != new), None)

@@ -23,11 +23,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.change import ConfigChange, fingerprint, propose
-from hexacell.controller_config.write_back import RECEIPT, Receipt, commit, rollback
+from hexacell.controller_config.change import ConfigChange, propose
+from hexacell.controller_config.contents import fingerprint
+from hexacell.controller_config.receipt import RECEIPT, Receipt
+from hexacell.controller_config.write_back import commit, rollback
 from hexacell.errors import AnswerNeeded, HexacellError, Interruption, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot_model import config_format
+from hexacell.robot_model import config_layout
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Calibration, geometry_of
 from procedures.devices.device_set import Devices
@@ -64,9 +66,8 @@ class ConfigTransactions:
         """The change of the config to a geometry in the controller's frames; nothing is written."""
         settings = self.cell.settings
         return propose(
-            self.cell.config_path,
-            config_format(settings),
-            settings.controller.config_format,
+            self.cell.config_paths,
+            config_layout(settings),
             geometry,
             fingerprint_at_start=state.started.config_sha256 if state.started else "",
         )
@@ -133,10 +134,10 @@ class ConfigTransactions:
 
     async def revert_provisional(self, state: RunState) -> events.ProvisionalReverted:
         """Give the controller the geometry of before the provisional one."""
-        written = holds_provisional(self.folder, self.cell.config_path)
+        written = holds_provisional(self.folder, self.cell.config_paths)
         if written:
             await in_thread(rollback, Receipt.of(self._provisional_backup))
-        elif state.started and fingerprint(self.cell.config_path) != state.started.config_sha256:
+        elif state.started and fingerprint(*self.cell.config_paths) != state.started.config_sha256:
             raise edited(self.cell.config_path)
         try:
             await self.startup.reload()
@@ -174,10 +175,10 @@ class ConfigTransactions:
         return self.folder.path / PROVISIONAL_FOLDER
 
 
-def holds_provisional(folder: RunFolder, config: Path) -> bool:
+def holds_provisional(folder: RunFolder, config: tuple[Path, ...]) -> bool:
     """Whether a config holds the provisional geometry that a run wrote; raises ``FileError``."""
     backup = folder.path / PROVISIONAL_FOLDER
-    return (backup / RECEIPT).is_file() and Receipt.of(backup).sha256_after == fingerprint(config)
+    return (backup / RECEIPT).is_file() and Receipt.of(backup).sha256_after == fingerprint(*config)
 
 
 @dataclass(frozen=True, slots=True)

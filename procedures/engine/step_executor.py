@@ -19,7 +19,7 @@ from hexacell.errors import HexacellError, consists_only_of
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of, joints_of
-from hexacell.robot_model import config_format
+from hexacell.robot_model import config_layout
 from hexacell.runs.run_folder import RunFolder
 from hexacell.stated_limits import gauge_travel_of
 from procedures.calibration.length_steps import seat_of
@@ -83,7 +83,7 @@ class StepExecutor:
     @cached_property
     def current_config(self) -> CurrentConfig:
         """The config that the controller is to run."""
-        return CurrentConfig(self.cell.config_path, config_format(self.cell.settings))
+        return CurrentConfig(self.cell.config_paths, config_layout(self.cell.settings))
 
     @cached_property
     def durations(self) -> MoveDurations:
@@ -111,7 +111,7 @@ class StepExecutor:
     @cached_property
     def edits(self) -> ConfigEdits:
         """Whether somebody edited the config."""
-        return ConfigEdits(self.cell.config_path, self.folder)
+        return ConfigEdits(self.cell.config_paths, self.folder)
 
     async def prepare(self, state: RunState) -> None:
         """Make the controller, whose config nobody edited, ready to move; raises ``HexacellError``."""

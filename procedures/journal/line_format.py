@@ -23,7 +23,7 @@ from hexacell.cell.fields import first_mistake
 from hexacell.errors import FileError
 from procedures.run.events import Event
 
-VERSION = 13
+VERSION = 14
 """What this program writes; it reads this and all before. Version 1 had neither version nor ``s``, and
 versions 1 and 2 no verification; checks of version 3 measured held-out points; up to version 5 no noise was
 measured. Versions up to 6 had no length check. Up to 8 only the controller's pose was read where the robot

@@ -31,7 +31,8 @@ from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.cell.loader import Cell, dump
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.cli.app import main
-from hexacell.controller_config.change import fingerprint, propose
+from hexacell.controller_config.change import propose
+from hexacell.controller_config.contents import fingerprint
 from hexacell.controller_config.write_back import commit, rollback
 from hexacell.decision import Verdict
 from hexacell.identification.estimator import identify
@@ -40,7 +41,7 @@ from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.reporting.check_result import check_line, check_result
 from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.verification import outcome_line, verify
-from hexacell.robot_model import config_format, robot_of
+from hexacell.robot_model import config_layout, robot_of
 from hexacell.runs import run_folder
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.virtual_robot import VirtualRobot
@@ -257,7 +258,7 @@ class VirtualNight:
             cell_text=self.cell.text_without_secrets,
             mode=self.calibration.mode.value,
             config=str(self.cell.config_path),
-            config_sha256=fingerprint(self.cell.config_path),
+            config_sha256=fingerprint(*self.cell.config_paths),
             controller=robot.controller.document(),
             branch=robot.branch,
             devices=(),
@@ -293,11 +294,10 @@ class VirtualNight:
         yield proposed
         assert all(gate.passed for gate in conditions), conditions
         change = propose(
-            self.cell.config_path,
-            config_format(settings),
-            settings.controller.config_format,
+            self.cell.config_paths,
+            config_layout(settings),
             written.geometry,
-            fingerprint_at_start=fingerprint(self.cell.config_path),
+            fingerprint_at_start=fingerprint(*self.cell.config_paths),
         )
         change.save(folder.proposal)
         receipt = commit(change, folder.path)

@@ -28,8 +28,7 @@ from hexacell.cell.measuring import GuardSettings
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
 from hexacell.controller_config.current import CurrentConfig
-from hexacell.controller_config.toml_format import NativeToml
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from procedures.devices.device_set import Devices
 from procedures.guards.guards import Guards
 from procedures.run import events
@@ -37,6 +36,7 @@ from procedures.run.state import RunState, fold
 from procedures.run.steps import Move, Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
 from tests.injection_times import injection_times
+from tests.native_config import NATIVE
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 MUST_S = 0.2
@@ -105,8 +105,8 @@ async def watched(folder: Path, protocol: str) -> AsyncIterator[Watched]:
         settings,
         settings.simulation,
         Hexaglide(),
-        NativeToml(HEXAGLIDE_PARAMETERS),
-        cell.config_path,
+        NATIVE,
+        cell.config_paths,
         other_processes=False,
     )
     with served as simulated:
@@ -114,7 +114,7 @@ async def watched(folder: Path, protocol: str) -> AsyncIterator[Watched]:
         devices = devices_of(simulated.settings, links, WireTrace(), folder)
         try:
             await devices.open()
-            config = CurrentConfig(cell.config_path, NativeToml(HEXAGLIDE_PARAMETERS))
+            config = CurrentConfig(cell.config_paths, NATIVE)
             guards = Guards(simulated.settings, devices, CellClock(), folder, config)
             await guards.prepare(lambda: devices.controller.prepare(frozenset(StartupAction)))
             yield Watched(simulated, devices, guards, await reference(devices))

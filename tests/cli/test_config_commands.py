@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.loader import load_cell
-from hexacell.robot_model import config_format
+from hexacell.robot_model import config_layout
 from tests.cli.terminal import ended
 from tests.hexacell.application.proposed_runs import MET, propose_run
 from tests.hexacell.controller_config.test_keyed_formats import write_hal, write_ini
@@ -17,8 +17,8 @@ from tests.hexacell.controller_config.test_keyed_formats import write_hal, write
 GRAVE = AcceptanceGate(
     name="within tolerance", passed=False, sentence="Beyond: S1x.", needs_person=True, needs_cell_name=True
 )
-KEYS_APPLIED = {"applied", "by", "config", "run", "sha256", "teach"}
-KEYS_RESTORED = {"restored", "config", "from", "undone"}
+KEYS_APPLIED = {"applied", "by", "config", "further_configs", "run", "sha256", "teach"}
+KEYS_RESTORED = {"restored", "config", "further_configs", "from", "undone"}
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def cell(cell_folder, request):
     if request.param == "toml":
         return native
     found = FORMATS[request.param]
-    geometry = config_format(native.settings).read(native.config_path).geometry
+    geometry = config_layout(native.settings).read(native.config_path).geometry
     numbers = dict(zip(geometry.parameters.names, geometry.vector.tolist(), strict=True))
     native.config_path.write_text("\n".join([*found.rows(lambda name: repr(numbers[name]), " "), ""]))
     text = native.path.read_text()

@@ -12,7 +12,7 @@ import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.controller_config.linuxcnc_limits import limits_of_ini
-from hexacell.robot_model import config_format
+from hexacell.robot_model import config_layout
 from tests.linuxcnc.conftest import LinuxCNC
 from tests.waiting import wait_until
 
@@ -169,7 +169,7 @@ def pins_of_hexapod(machine: LinuxCNC) -> list[float]:
 def written(machine: LinuxCNC) -> list[float]:
     """The geometry of the config."""
     cell = load_cell(machine.folder / "cell.toml")
-    vector: list[float] = config_format(cell.settings).read(cell.config_path).geometry.vector.tolist()
+    vector: list[float] = config_layout(cell.settings).read(cell.config_path).geometry.vector.tolist()
     return vector
 
 

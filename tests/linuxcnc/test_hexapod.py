@@ -14,12 +14,13 @@ import pytest
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import load_cell
-from hexacell.controller_config.change import fingerprint, propose
+from hexacell.controller_config.change import propose
+from hexacell.controller_config.contents import fingerprint
 from hexacell.controller_config.write_back import commit
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot_model import config_format
+from hexacell.robot_model import config_layout
 from tests.linuxcnc.conftest import LinuxCNC
 from tests.waiting import wait_until
 
@@ -71,7 +72,7 @@ async def test_other_zeros_are_read_by_a_restart_in_which_no_motor_moves(
     hexapod, motors, in_its_folder
 ) -> None:
     cell = load_cell(hexapod.folder / "cell.toml")
-    config, form, mechanism = cell.config_path, config_format(cell.settings), cell.settings.mechanism
+    config, form, mechanism = cell.config_path, config_layout(cell.settings), cell.settings.mechanism
     before = form.read(config).geometry
     random = np.random.default_rng(16)
     after = Geometry(before.parameters, np.round(before.vector + random.uniform(-5.0, 5.0, 42), 6))
@@ -82,7 +83,7 @@ async def test_other_zeros_are_read_by_a_restart_in_which_no_motor_moves(
         await driver.move(THERE, 1.0)
         motors.wait()
         stood = len(motors.places()) - 1
-        change = propose(config, form, "linuxcnc-ini", after, fingerprint_at_start=fingerprint(config))
+        change = propose((config,), form, after, fingerprint_at_start=fingerprint(config))
         commit(change, hexapod.folder / "backup")
         await driver.reload(ALL)
         motors.wait()

@@ -10,7 +10,7 @@ import pytest
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot_model import config_format
+from hexacell.robot_model import config_layout
 
 POSES = 1000
 AS_SHOWN = 1.1e-6
@@ -58,7 +58,7 @@ def test_random_poses_have_the_same_joints(request, name, height, fails, changes
         change(machine)
     machine.start()
     cell = load_cell(machine.folder / "cell.toml")
-    controller = config_format(cell.settings).read(cell.config_path)
+    controller = config_layout(cell.settings).read(cell.config_path)
     mechanism = cell.settings.mechanism
     random = np.random.default_rng(16)
     spans = np.array([60.0, 60.0, 60.0, 20.0, 20.0, 20.0])

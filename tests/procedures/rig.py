@@ -16,9 +16,8 @@ from drivers.simulated.robot import SimulatedMachine
 from hexacell.application.calibration_run import run_started
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
-from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import DeviceError, FileError, HexacellError
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose
 from hexacell.reporting.result import AcceptedResult
 from hexacell.robot_model import robot_of
@@ -30,6 +29,7 @@ from procedures.engine.step_executor import StepExecutor
 from procedures.journal.journal import Journal
 from procedures.run import events
 from procedures.run.questions import QuestionBroker
+from tests.native_config import NATIVE
 from tests.procedures.fakes import Approver, Bench
 from tests.small_cell import SMALL, changed, history_until
 
@@ -52,17 +52,16 @@ class Rig:
         bench = self.bench = Bench()
         self.clock, self.gauges, self.controller = bench.clock, bench.gauges, bench.controller
         home, config = Pose(*self.cell.settings.identification.points[0]), self.cell.config_path
-        config_format = NativeToml(HEXAGLIDE_PARAMETERS)
         self.physics: RobotPhysics = RobotPhysics(
             Hexaglide(),
             simulation,
             self.clock,
-            config_format.read(config),
+            NATIVE.read(config),
             home,
             self.cell.settings.length_check,
         )
         self.machine = SimulatedMachine(
-            Hexaglide(), config_format, config, self.physics, self.clock, home, simulation.soft_limits
+            Hexaglide(), NATIVE, (config,), self.physics, self.clock, home, simulation.soft_limits
         )
         for gauge in bench.gauges:
             gauge.shown = partial(self.physics.gauge_displacement, gauge.name)

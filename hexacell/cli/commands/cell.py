@@ -13,6 +13,7 @@ from hexacell.cell.passwords import with_passwords
 from hexacell.cli.cell_argument import cell_at, cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
+from hexacell.presentation.config_changes import files_named
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -34,5 +35,6 @@ def main(options: argparse.Namespace) -> ExitCode:
     with_passwords(cell.settings, cell.path.parent)
     require_stated_poses(cell, plan_of(cell))
     console.document({"valid": True, "name": cell.settings.name})
-    console.print(f"{options.cell}: valid, and so is its controller config {cell.config_path}")
+    config = files_named(cell.config_paths)
+    console.print(f"{options.cell}: valid, and so is its controller config {config}")
     return ExitCode.DONE

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from hexacell.application.config_rollback import roll_back_config
+from hexacell.application.held_config import settle_config
 from hexacell.application.proposals import apply_proposal, read_proposal
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
@@ -24,6 +25,8 @@ def apply_run(options: argparse.Namespace) -> ExitCode:
     """Write the proposal of a run; a person is asked where a gate needs one."""
     console = Console(options.json)
     proposal = read_proposal(RunFolder(options.run))
+    if (settled := settle_config(*proposal.change.paths)) is not None:
+        console.warn(settled)
     operator = TerminalOperator(console) if is_interactive() else UnattendedOperator()
     with _edits_shown(console):
         applied = asyncio.run(apply_proposal(proposal, operator))

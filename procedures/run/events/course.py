@@ -27,6 +27,8 @@ class RunStarted(Frozen):
     ``limits`` are what the controller's config and its INI file state; none in runs of older versions, too.
     ``removed`` is what a person took out of the plan: it is neither measured nor commanded.
     ``expired`` are the instruments whose certificate had expired on the day it began.
+    ``config`` is the controller's config or its first file, ``further_configs`` are the others, and
+    ``config_sha256`` is the fingerprint of all.
     """
 
     kind: Literal["started"] = "started"
@@ -47,6 +49,7 @@ class RunStarted(Frozen):
     limits: ControllerLimits | None = None
     removed: RemovedPoses = RemovedPoses()
     expired: tuple[str, ...] = ()
+    further_configs: tuple[str, ...] = ()
 
 
 class StepBegun(Frozen):

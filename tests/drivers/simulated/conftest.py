@@ -24,6 +24,7 @@ from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
+from tests.native_config import NATIVE
 
 HOME = Pose(0.0, 0.0, 550.0)
 STILL: dict[str, Any] = {
@@ -119,9 +120,7 @@ def make_twin(bundled_cell: Cell) -> MakeTwin:
         read = NativeToml(HEXAGLIDE_PARAMETERS).read(config)
         clock = StillClock()
         physics = RobotPhysics(Hexaglide(), simulation, clock, read, home)
-        machine = SimulatedMachine(
-            Hexaglide(), NativeToml(HEXAGLIDE_PARAMETERS), config, physics, clock, home
-        )
+        machine = SimulatedMachine(Hexaglide(), NATIVE, (config,), physics, clock, home)
         values = simulation.geometry.model_dump()
         truth = hexaglide_geometry(values["S"], values["B"], values["l"])
         return Twin(clock, physics, machine, config, truth, read.geometry)

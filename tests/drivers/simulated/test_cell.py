@@ -26,6 +26,7 @@ from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, ReachError
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose
+from tests.native_config import NATIVE
 from tests.waiting import until
 
 ALL = frozenset(StartupAction)
@@ -40,8 +41,8 @@ def serve(bundled_cell: Any, settings: CellSettings | None = None, *, other_proc
         settings,
         settings.simulation,
         Hexaglide(),
-        NativeToml(HEXAGLIDE_PARAMETERS),
-        bundled_cell.config_path,
+        NATIVE,
+        (bundled_cell.config_path,),
         other_processes=other_processes,
     )
 

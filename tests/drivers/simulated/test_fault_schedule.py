@@ -14,9 +14,9 @@ from drivers.simulated.cell import SimulatedCell
 from drivers.simulated.fault_schedule import FaultSchedule
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
-from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import DeviceError, UsageError
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from tests.native_config import NATIVE
 from tests.waiting import wait_until
 
 
@@ -29,8 +29,8 @@ def cell(bundled_cell):
         settings,
         settings.simulation,
         Hexaglide(),
-        NativeToml(HEXAGLIDE_PARAMETERS),
-        bundled_cell.config_path,
+        NATIVE,
+        (bundled_cell.config_path,),
         other_processes=False,
     ) as simulated:
         yield simulated
@@ -197,7 +197,7 @@ def test_a_cell_file_with_an_impossible_fault_is_refused(bundled_cell) -> None:
             settings,
             simulation,
             Hexaglide(),
-            NativeToml(HEXAGLIDE_PARAMETERS),
-            bundled_cell.config_path,
+            NATIVE,
+            (bundled_cell.config_path,),
             other_processes=False,
         )

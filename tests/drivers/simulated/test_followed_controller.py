@@ -16,7 +16,7 @@ from hexacell.errors import UsageError
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot_model import config_format
+from hexacell.robot_model import config_layout
 from tests.small_cell import changed
 from tests.waiting import wait_until
 
@@ -58,7 +58,7 @@ def printing(places: np.ndarray, each_s: float) -> tuple[str, ...]:
 def followed():
     """A cell whose joints go through the given poses of its controller."""
     cell = load_cell(bundled_config("simulated-hexaglide"))
-    form = config_format(cell.settings)
+    form = config_layout(cell.settings)
     opened: list[FollowedController] = []
 
     def follow(poses: list[Pose], **changes) -> tuple[FollowedController, np.ndarray]:
@@ -70,7 +70,7 @@ def followed():
             {"timing.clock_factor": 1.0, "simulation.joints_command": printing(joints, 0.4)} | changes,
         )
         assert settings.simulation is not None
-        arguments = (settings, settings.simulation, Hexaglide(), form, cell.config_path)
+        arguments = (settings, settings.simulation, Hexaglide(), form, cell.config_paths)
         opened.append(FollowedController(*arguments, other_processes=False))
         return opened[-1], joints
 

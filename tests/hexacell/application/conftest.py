@@ -13,14 +13,14 @@ import pytest
 from drivers.simulated.cell import SimulatedCell
 from hexacell.application.calibration_run import RunRequest, calibrate
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.toml_format import NativeToml
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.calibration.workflow import Mode
 from procedures.engine.engine import Listener
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.questions import Question, UnattendedOperator
+from tests.native_config import NATIVE
 from tests.small_cell import SMALL, few_candidates, history_until, write_small_cell
 
 SERVED: dict[str, Any] = {
@@ -142,8 +142,8 @@ def make_site(make_cell: MakeCell, tmp_path: Path) -> Iterator[Callable[..., Sit
             cell.settings,
             cell.settings.simulation,
             Hexaglide(),
-            NativeToml(HEXAGLIDE_PARAMETERS),
-            cell.config_path,
+            NATIVE,
+            cell.config_paths,
             other_processes=False,
         )
         served.append(simulated)

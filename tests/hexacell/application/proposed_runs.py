@@ -10,11 +10,12 @@ from typing import Any
 from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.controller_config.change import ConfigChange, fingerprint, propose
+from hexacell.controller_config.change import ConfigChange, propose
+from hexacell.controller_config.contents import fingerprint
 from hexacell.decision import Verdict
 from hexacell.kinematics.geometry import Geometry
 from hexacell.reporting.verification import Verification
-from hexacell.robot_model import config_format, robot_of
+from hexacell.robot_model import config_layout, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import Journal
@@ -59,12 +60,11 @@ def propose_run(
     """A run that proposes every number of the config of now, shifted."""
     folder = RunFolder(runs_folder(cell) / name)
     folder.create(cell)
-    form = config_format(cell.settings)
-    found = form.read(cell.config_path).geometry
+    layout = config_layout(cell.settings)
+    found = layout.read(*cell.config_paths).geometry
     after = Geometry(found.parameters, found.vector + shift_mm)
-    start = fingerprint(cell.config_path)
-    name_of_format = cell.settings.controller.config_format
-    change = propose(cell.config_path, form, name_of_format, after, fingerprint_at_start=start)
+    start = fingerprint(*cell.config_paths)
+    change = propose(cell.config_paths, layout, after, fingerprint_at_start=start)
     change.save(folder.proposal)
     with Journal(folder.journal) as journal:
         for event in _history(cell, change, gates, verdict, verification):
@@ -87,6 +87,7 @@ def _history(
             cell_text=cell.text_without_secrets,
             mode="optimise",
             config=str(cell.config_path),
+            further_configs=tuple(map(str, cell.config_paths[1:])),
             config_sha256=change.sha256_before,
             controller=calibration.robot.controller.document(),
             branch=calibration.robot.branch,

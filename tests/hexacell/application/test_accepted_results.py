@@ -11,8 +11,8 @@ import pytest
 from hexacell.application.accepted_results import last_accepted_result
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.controller_config.change import fingerprint
-from hexacell.controller_config.write_back import RECEIPT, Receipt
+from hexacell.controller_config.contents import fingerprint
+from hexacell.controller_config.receipt import RECEIPT, Receipt
 from hexacell.decision import Verdict
 from hexacell.reporting.model_evidence import ModelTest
 from hexacell.reporting.verification import Verification

@@ -13,8 +13,9 @@ from hexacell.application.accepted_results import last_accepted_result
 from hexacell.application.calibration_run import calibrate
 from hexacell.application.replay_run import replay
 from hexacell.cell.loader import load_cell
-from hexacell.controller_config.change import ConfigChange, fingerprint
-from hexacell.controller_config.write_back import Receipt
+from hexacell.controller_config.change import ConfigChange
+from hexacell.controller_config.contents import fingerprint
+from hexacell.controller_config.receipt import Receipt
 from hexacell.decision import Verdict
 from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
 from hexacell.measurements.csv_file import read_measurements
@@ -51,7 +52,7 @@ def test_the_controllers_config_is_changed_in_its_numbers_only(finished) -> None
 
 def test_the_receipt_and_the_backup_for_a_rollback_are_kept(finished) -> None:
     receipt = Receipt.of(finished.folder.path)
-    assert receipt.backup() == finished.config_before
+    assert receipt.backup() == (finished.config_before,)
     assert receipt.sha256_after == fingerprint(finished.cell.config_path)
 
 

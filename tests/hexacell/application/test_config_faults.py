@@ -14,7 +14,8 @@ import pytest
 from hexacell.application.config_rollback import roll_back_config
 from hexacell.application.proposals import apply_proposal, read_proposal
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.write_back import RECEIPT, commit
+from hexacell.controller_config.receipt import RECEIPT
+from hexacell.controller_config.write_back import commit
 from hexacell.storage.cell_lock import cell_lock
 from procedures.run.questions import UnattendedOperator
 from tests.hexacell.application.proposed_runs import ProposedRun, a_cell, propose_run

@@ -9,8 +9,9 @@ import pytest
 
 from hexacell.application.config_rollback import roll_back_config
 from hexacell.cell.loader import Cell
+from hexacell.controller_config.receipt import AFTER, BEFORE
 from hexacell.controller_config.three_way import ConfigEditedSince
-from hexacell.controller_config.write_back import AFTER, BEFORE, commit
+from hexacell.controller_config.write_back import commit
 from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
 from hexacell.storage.cell_lock import cell_lock
 from tests.hexacell.application.proposed_runs import ProposedRun, a_cell, propose_run
@@ -49,7 +50,10 @@ def test_one_after_the_other_is_undone(cell, runs, original) -> None:
         assert config(cell) == run.after
         done = roll_back_config(cell)
         assert config(cell) == run.before
-        assert (done.undone, done.restored) == (run.folder.path.absolute(), run.folder.path / BEFORE)
+        assert (done.undone, done.restored) == (
+            run.folder.path.absolute(),
+            (run.folder.path.absolute() / BEFORE,),
+        )
         assert done.change.startswith("--- config-before")
     assert config(cell) == original
     with pytest.raises(UsageError, match="nothing is to be undone"):
@@ -61,7 +65,7 @@ def test_one_after_the_other_is_undone(cell, runs, original) -> None:
 def test_any_run_is_restored(cell, runs, number: int) -> None:
     done = roll_back_config(cell, NAMES[number])
     assert config(cell) == runs[number].after
-    assert done.restored == runs[number].folder.path / AFTER
+    assert done.restored == (runs[number].folder.path.absolute() / AFTER,)
     assert bool(done.change) == (number != 2)
     roll_back_config(cell, str(runs[2].folder.path))
     assert config(cell) == runs[2].after

@@ -10,8 +10,8 @@ import pytest
 from hexacell.acceptance import AcceptanceGate
 from hexacell.application.proposals import COMMAND, apply_proposal, later_approval, read_proposal
 from hexacell.cell.loader import Cell
+from hexacell.controller_config.receipt import Receipt
 from hexacell.controller_config.three_way import ConfigEditedSince
-from hexacell.controller_config.write_back import Receipt
 from hexacell.decision import Verdict
 from hexacell.errors import (
     AnswerNeeded,
@@ -63,7 +63,7 @@ async def test_a_proposal_is_written_bit_for_bit_and_can_be_undone(cell) -> None
     assert cell.config_path.read_bytes() == run.before
     assert await apply(run) == COMMAND
     assert cell.config_path.read_bytes() == run.after != run.before
-    assert Receipt.of(run.folder.path).backup() == run.before
+    assert Receipt.of(run.folder.path).backup() == (run.before,)
     approval = later_approval(run.folder)
     assert approval is not None
     assert (approval.by, approval.sha256_after) == (COMMAND, run.change.sha256_after)

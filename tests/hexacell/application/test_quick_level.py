@@ -14,7 +14,7 @@ from hexacell.application.calibration_run import calibrate
 from hexacell.application.replay_run import replay
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.change import fingerprint
+from hexacell.controller_config.contents import fingerprint
 from hexacell.decision import Verdict
 from hexacell.errors import ExitCode, OutOfTime, UsageError
 from hexacell.identification.estimator import identify

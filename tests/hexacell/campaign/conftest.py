@@ -15,7 +15,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot_model import config_format, make_robot
+from hexacell.robot_model import config_layout, make_robot
 from hexacell.virtual_robot import VirtualRobot
 
 FEW = 64
@@ -33,7 +33,7 @@ def make(**changes: Any) -> Plan:
         section, _, key = name.partition("__")
         inner = getattr(settings, section).model_copy(update={key: value})
         settings = settings.model_copy(update={section: inner})
-    controller = config_format(settings).read(cell.config_path)
+    controller = config_layout(settings).read(cell.config_path)
     return Plan(settings, make_robot(settings, controller), listed, FEW)
 
 

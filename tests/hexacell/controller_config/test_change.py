@@ -8,19 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.controller_config.change import ConfigChange, diff, fingerprint, propose
-from hexacell.controller_config.toml_format import NativeToml
+from hexacell.controller_config.change import ConfigChange, diff, propose
+from hexacell.controller_config.contents import fingerprint
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.storage import atomic_files
+from tests.native_config import NATIVE
 
 
 @pytest.fixture
 def proposal(config: Path, geometry: Geometry) -> ConfigChange:
-    return propose(
-        config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(config)
-    )
+    return propose((config,), NATIVE, geometry, fingerprint_at_start=fingerprint(config))
 
 
 def test_a_proposal_describes_the_change_and_writes_nothing(
@@ -42,9 +40,7 @@ def test_a_relative_path_is_kept_whole(
 ) -> None:
     monkeypatch.chdir(config.parent)
     name = Path(config.name)
-    found = propose(
-        name, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(name)
-    )
+    found = propose((name,), NATIVE, geometry, fingerprint_at_start=fingerprint(name))
     assert found.path == config
 
 
@@ -52,7 +48,7 @@ def test_a_config_that_changed_since_the_run_began_is_refused(config: Path, geom
     start = fingerprint(config)
     config.write_text(config.read_text() + "# one more remark\n")
     with pytest.raises(FileError, match=r"changed since the run began.*run again"):
-        propose(config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=start)
+        propose((config,), NATIVE, geometry, fingerprint_at_start=start)
 
 
 def test_a_proposal_survives_its_file(tmp_path: Path, proposal: ConfigChange) -> None:
@@ -65,9 +61,7 @@ def test_windows_line_ends_and_a_byte_order_mark_survive_the_file(
     tmp_path: Path, config: Path, geometry: Geometry
 ) -> None:
     config.write_bytes(b"\xef\xbb\xbf" + config.read_bytes().replace(b"\n", b"\r\n"))
-    made = propose(
-        config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(config)
-    )
+    made = propose((config,), NATIVE, geometry, fingerprint_at_start=fingerprint(config))
     made.save(tmp_path / "proposal.json")
     assert ConfigChange.load(tmp_path / "proposal.json").text_before.encode() == config.read_bytes()
 

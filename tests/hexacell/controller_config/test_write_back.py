@@ -4,14 +4,17 @@ from typing import Any
 
 import pytest
 
-from hexacell.controller_config import write_back
-from hexacell.controller_config.change import ConfigChange, fingerprint, propose
+from hexacell.controller_config import replacement, write_back
+from hexacell.controller_config.change import ConfigChange, propose
+from hexacell.controller_config.contents import fingerprint
+from hexacell.controller_config.receipt import Receipt
 from hexacell.controller_config.toml_format import NativeToml
-from hexacell.controller_config.write_back import Receipt, commit, rollback
+from hexacell.controller_config.write_back import commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
 from hexacell.storage import atomic_files
+from tests.native_config import NATIVE
 
 
 def names(folder: Path) -> list[str]:
@@ -20,9 +23,7 @@ def names(folder: Path) -> list[str]:
 
 @pytest.fixture
 def proposal(config: Path, geometry: Geometry) -> ConfigChange:
-    return propose(
-        config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(config)
-    )
+    return propose((config,), NATIVE, geometry, fingerprint_at_start=fingerprint(config))
 
 
 @pytest.fixture
@@ -55,9 +56,7 @@ def test_rollback_is_bit_for_bit_and_may_be_repeated(config: Path, run: Path, ge
         b"\xef\xbb\xbf" + config.read_bytes().replace(b"\n", b"\r\n") + b"# no end of line \t"
     )
     original = config.read_bytes()
-    made = propose(
-        config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(config)
-    )
+    made = propose((config,), NATIVE, geometry, fingerprint_at_start=fingerprint(config))
     receipt = commit(made, run)
     assert config.read_bytes() != original
     rollback(receipt)
@@ -81,9 +80,8 @@ def test_commits_are_undone_one_after_another(
     further = hexaglide_geometry(S=further["S"] + 1.0, B=further["B"], l=further["l"])
     second = commit(
         propose(
-            config,
-            NativeToml(HEXAGLIDE_PARAMETERS),
-            "toml",
+            (config,),
+            NATIVE,
             further,
             fingerprint_at_start=fingerprint(config),
         ),
@@ -99,9 +97,7 @@ def test_commits_are_undone_one_after_another(
 def test_a_link_to_the_config_stays_a_link(config: Path, run: Path, geometry: Geometry) -> None:
     link = config.parent / "link.toml"
     link.symlink_to(config.name)
-    made = propose(
-        link, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(link)
-    )
+    made = propose((link,), NATIVE, geometry, fingerprint_at_start=fingerprint(link))
     receipt = commit(made, run)
     assert link.is_symlink()
     assert config.read_bytes() == made.text_after.encode()
@@ -144,9 +140,7 @@ def test_a_commit_interrupted_after_the_replacement_is_recognised(
 
 def test_a_proposal_without_a_change_is_committed_without_writing(config: Path, run: Path) -> None:
     same = NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry
-    made = propose(
-        config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", same, fingerprint_at_start=fingerprint(config)
-    )
+    made = propose((config,), NATIVE, same, fingerprint_at_start=fingerprint(config))
     inode = config.stat().st_ino
     receipt = commit(made, run)
     assert config.stat().st_ino == inode
@@ -229,7 +223,7 @@ def test_an_interrupt_after_the_replacement_is_undone_and_stays_an_interrupt(
         if expected == proposal.text_after.encode():
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(write_back, "_require_written", interrupt)
+    monkeypatch.setattr(replacement, "require_written", interrupt)
     with pytest.raises(KeyboardInterrupt):
         commit(proposal, run)
     assert config.read_bytes() == proposal.text_before.encode()

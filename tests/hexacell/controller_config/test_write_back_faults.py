@@ -8,12 +8,13 @@ from typing import Any
 
 import pytest
 
-from hexacell.controller_config.change import ConfigChange, fingerprint, propose
-from hexacell.controller_config.toml_format import NativeToml
-from hexacell.controller_config.write_back import Receipt, commit, rollback
+from hexacell.controller_config.change import ConfigChange, propose
+from hexacell.controller_config.contents import fingerprint
+from hexacell.controller_config.receipt import Receipt
+from hexacell.controller_config.write_back import commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
+from tests.native_config import NATIVE
 
 Job = Callable[[Path], object]
 
@@ -37,9 +38,8 @@ class Bench:
 
     def _proposal(self, geometry: Geometry) -> ConfigChange:
         return propose(
-            self.link,
-            NativeToml(HEXAGLIDE_PARAMETERS),
-            "toml",
+            (self.link,),
+            NATIVE,
             geometry,
             fingerprint_at_start=fingerprint(self.link),
         )

@@ -17,7 +17,7 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.encoder_scales import WithEncoderScales
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot_model import Robot, config_format, robot_of
+from hexacell.robot_model import Robot, config_layout, robot_of
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SCALES = 1e-6 * np.array([300.0, -200.0, 100.0, -300.0, 200.0, -100.0])
@@ -95,7 +95,7 @@ def test_they_are_written_beside_the_other_numbers(cell_with: CellWith) -> None:
     robot, text = robot_of(cell), cell.config_path.read_text()
     assert isinstance(robot.mechanism, WithEncoderScales)
     changed = robot.mechanism.with_scales(robot.mechanism.without_scales(robot.controller), SCALES)
-    written = config_format(cell.settings).rewrite(text, changed)
+    [written] = config_layout(cell.settings).rewrite([text], changed)
     assert "encoder_scale = [0.0003, -0.0002, 0.0001, -0.0003, 0.0002, -0.0001]" in written
     assert len(written.splitlines()) == len(text.splitlines())
 

@@ -15,7 +15,7 @@ import pytest
 from drivers.errors import GaugeSilent
 from hexacell.application.calibration_run import calibration_of_run
 from hexacell.cell.recovery import UnattendedRecovery
-from hexacell.controller_config.write_back import Receipt
+from hexacell.controller_config.receipt import Receipt
 from hexacell.errors import ExitCode, Interruption
 from hexacell.presentation.events import event_text
 from procedures.calibration.workflow import Mode
@@ -215,7 +215,8 @@ def test_the_run_is_reproduced(whole: Rig, few_candidates: None, tmp_path: Path)
     started = history[0]
     assert isinstance(started, events.RunStarted)
     written = whole.config
-    whole.cell.config_path.write_bytes(Receipt.of(whole.folder.path).backup())
+    [before] = Receipt.of(whole.folder.path).backup()
+    whole.cell.config_path.write_bytes(before)
     calibration = calibration_of_run(whole.cell, started)
     executor = RecordedStepExecutor.of(whole.cell, calibration, type(whole.folder)(tmp_path))
     report = ReplayReport(whole.folder.journal, "hexacell", len(history))

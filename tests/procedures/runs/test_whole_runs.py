@@ -9,8 +9,8 @@ import tomllib
 import numpy as np
 
 from hexacell.controller_config.change import ConfigChange
+from hexacell.controller_config.receipt import Receipt
 from hexacell.controller_config.toml_format import NativeToml
-from hexacell.controller_config.write_back import Receipt
 from hexacell.errors import ExitCode
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.measurements.csv_file import read_measurements
@@ -78,7 +78,7 @@ def test_the_run_folder_contains_measurements_result_proposal_and_backup(recordi
     proposal = ConfigChange.load(folder.proposal)
     assert proposal.text_before.encode() == recording.config_before
     assert proposal.text_after.encode() == recording.config_after
-    assert Receipt.of(folder.path).backup() == recording.config_before
+    assert Receipt.of(folder.path).backup() == (recording.config_before,)
 
 
 def test_a_run_reduces_the_held_out_deviations(recording) -> None:

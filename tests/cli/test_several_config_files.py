@@ -1,0 +1,141 @@
+"""A geometry in two files, as commands write and restore it; killed between the two by a real SIGKILL."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hexacell.cell.loader import Cell
+from hexacell.controller_config.contents import Contents, read_contents
+from tests.cli.commands import surroundings
+from tests.hexacell.application.proposed_runs import ProposedRun, propose_run
+from tests.several_config_files import hexapod_cell
+
+KILLED_AFTER = """
+import os, signal, sys
+from pathlib import Path
+real, left = os.replace, int(sys.argv[1])
+def replace(source, target):
+    global left
+    real(source, target)
+    if Path(target).suffix in {".hal", ".ini"}:
+        left -= 1
+        if not left:
+            os.kill(os.getpid(), signal.SIGKILL)
+os.replace = replace
+sys.argv = ["hexacell", *sys.argv[2:]]
+from hexacell.__main__ import main
+sys.exit(main())
+"""
+"""The program, killed once it has replaced so many files of the config."""
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Cell:
+    folder = tmp_path / "cell"
+    folder.mkdir()
+    return hexapod_cell(folder)
+
+
+@pytest.fixture
+def run(cell: Cell) -> ProposedRun:
+    return propose_run(cell)
+
+
+def found(cell: Cell) -> Contents:
+    return read_contents(cell.config_paths)
+
+
+def kill_after(folder: Path, files: int, *arguments: object) -> None:
+    command = [sys.executable, "-c", KILLED_AFTER, str(files), *map(str, arguments)]
+    temporary = folder / f"temporary-{files}"
+    ended = subprocess.run(
+        command, cwd=folder, env=surroundings(temporary), capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == -signal.SIGKILL, ended.stderr
+
+
+def test_both_are_applied_and_undone_and_shown_by_their_names(cell, run, typed) -> None:
+    before, after = run.change.before_contents, run.change.after_contents
+    applied = typed("apply", run.folder.path)
+    assert (applied.code, found(cell)) == (0, after)
+    hal, ini = cell.config_paths
+    assert f"Written into {hal} and {ini}, approved by the command." in applied.out
+    assert str(run.folder.path / "config-before-2") in applied.out
+    again = typed("apply", run.folder.path)
+    assert (again.code, "nothing was written" in again.out) == (0, True)
+    undone = typed("rollback", cell.path)
+    assert (undone.code, found(cell)) == (0, before)
+    for name in ("hexapod.hal", "hexapod.ini"):
+        assert f"--- {name}\n+++ {name}\n" in undone.out
+    assert f"{ini} is {run.folder.path / 'config-before-2'} again, bit for bit" in undone.out
+    restored = typed("rollback", cell.path, "--to", run.folder.path.name, "--json")
+    assert (restored.code, found(cell)) == (0, after)
+    assert restored.document["further_configs"] == [str(ini)]
+
+
+def test_the_cell_is_checked_with_all_its_files(cell, typed_here) -> None:
+    valid = typed_here("cell", "validate", cell.path)
+    assert valid.code == 0
+    assert "hexapod.hal and " in valid.out
+    assert "hexapod.ini" in valid.out
+    twice = cell.config_paths[0].read_text() + "setp genhexkins.offset.2 600\n"
+    cell.config_paths[0].write_text(twice)
+    refused = typed_here("cell", "validate", cell.path)
+    assert refused.code == 2
+    assert "offset3 is in hexapod.hal and in hexapod.ini" in refused.err
+
+
+@pytest.mark.parametrize("command", ["status", "history", "rollback", "cell show"])
+def test_a_kill_between_the_two_is_undone_by_the_next_command(
+    cell, run, typed, tmp_path, command: str
+) -> None:
+    before = run.change.before_contents
+    kill_after(tmp_path, 1, "apply", run.folder.path)
+    assert found(cell) == (run.change.after_contents[0], before[1])
+    told = typed(*command.split(), cell.path)
+    assert "a write of hexapod.hal and hexapod.ini was interrupted between them" in told.err
+    assert "hexapod.hal got the old content back" in told.err
+    assert found(cell) == before
+    assert "interrupted" not in typed("status", cell.path).err
+
+
+def test_a_kill_behind_the_second_one_is_finished(cell, run, typed, tmp_path) -> None:
+    kill_after(tmp_path, 2, "apply", run.folder.path)
+    assert found(cell) == run.change.after_contents
+    told = typed("apply", run.folder.path)
+    assert told.code == 0
+    assert "was interrupted when all of them were new: it is complete" in told.err
+    assert "nothing was written" in told.out
+    undone = typed("rollback", cell.path)
+    assert (undone.code, found(cell)) == (0, run.change.before_contents)
+
+
+def test_a_killed_apply_is_repeated_by_one_command(cell, run, typed, tmp_path) -> None:
+    kill_after(tmp_path, 1, "apply", run.folder.path)
+    again = typed("apply", run.folder.path)
+    assert "got the old content back" in again.err
+    assert (again.code, found(cell)) == (0, run.change.after_contents)
+
+
+def test_a_rollback_is_killed_too(cell, run, typed, tmp_path) -> None:
+    assert typed("apply", run.folder.path).code == 0
+    kill_after(tmp_path, 1, "rollback", cell.path)
+    assert found(cell) == (run.change.before_contents[0], run.change.after_contents[1])
+    again = typed("rollback", cell.path)
+    assert "hexapod.hal got the old content back" in again.err
+    assert (again.code, found(cell)) == (0, run.change.before_contents)
+
+
+def test_an_edit_of_the_second_file_is_shown_with_its_name(cell, run, typed_here) -> None:
+    ini = cell.config_paths[1]
+    ini.write_bytes(ini.read_bytes() + b"# mine\r\n")
+    refused = typed_here("apply", run.folder.path)
+    assert refused.code == 2
+    assert "--- hexapod.ini\n" in refused.err
+    assert "+# mine" in refused.err
+    assert "--- hexapod.hal" not in refused.err

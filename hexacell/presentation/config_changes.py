@@ -19,7 +19,8 @@ def applied_text(applied: AppliedProposal) -> str:
     """What an application of a proposal did, and what is to be done next."""
     proposal = applied.proposal
     if not applied.by:
-        return f"{files_named(proposal.change.paths, 'has', 'have')} this geometry already; nothing was written."
+        files = files_named(proposal.change.paths, "has", "have")
+        return f"{files} this geometry already; nothing was written."
     kept = kept_paths(proposal.folder.path, BEFORE, len(proposal.change.paths))
     teaching = () if proposal.displacement is None else (teaching_line(proposal.displacement),)
     return "\n".join(
@@ -35,9 +36,8 @@ def applied_text(applied: AppliedProposal) -> str:
 def rollback_text(done: ConfigRollback) -> str:
     """What a rollback did, and what is to be done next."""
     if not done.change:
-        return (
-            f"{files_named(done.paths)} is as in {files_named(done.restored)} already; nothing was written."
-        )
+        files = files_named(done.paths, "is", "are")
+        return f"{files} as in {files_named(done.restored)} already; nothing was written."
     undone = "" if done.undone is None else f", which undoes the run {done.undone.name}"
     files = zip(done.paths, done.restored, strict=True)
     back = ",\n".join(f"{path} is {copy} again" for path, copy in files)

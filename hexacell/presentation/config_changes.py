@@ -39,8 +39,8 @@ def rollback_text(done: ConfigRollback) -> str:
         files = files_named(done.paths, "is", "are")
         return f"{files} as in {files_named(done.restored)} already; nothing was written."
     undone = "" if done.undone is None else f", which undoes the run {done.undone.name}"
-    files = zip(done.paths, done.restored, strict=True)
-    back = ",\n".join(f"{path} is {copy} again" for path, copy in files)
+    copies = zip(done.paths, done.restored, strict=True)
+    back = ",\n".join(f"{path} is {copy} again" for path, copy in copies)
     return f"{done.change}\n{back}, bit for bit{undone}.\n{wrapped(RELOAD)}"
 
 

@@ -12,7 +12,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,6 +26,12 @@ CONFIGURATIONS = Path(__file__).parents[2] / "configs"
 LOCK = Path("/tmp/linuxcnc.lock")
 ENDED_S, ANSWER_S = 20.0, 30.0
 NOBODY = "65534"
+TWO_FILES = "base and platform in the HAL file"
+FURTHER_FILE = """\
+[[controller.further_files]]
+config = "hexapod.ini"
+config_format = "linuxcnc-ini"
+"""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -168,9 +174,13 @@ def linuxcnc(installed: None, folder_of_nobody: Path) -> Iterator[LinuxCNC]:
 
 
 @pytest.fixture
-def hexapod(installed: None, folder_of_nobody: Path) -> Iterator[LinuxCNC]:
-    """A copy of the stock hexapod's configuration; it is running."""
-    yield from _running("hexapod", folder_of_nobody)
+def hexapod(installed: None, folder_of_nobody: Path, request: pytest.FixtureRequest) -> Iterator[LinuxCNC]:
+    """A copy of the stock hexapod's configuration; it is running.
+
+    With the parameter ``TWO_FILES`` base and platform are numbers in its HAL file.
+    """
+    is_in_two = getattr(request, "param", None) == TWO_FILES
+    yield from _running("hexapod", folder_of_nobody, _split_geometry if is_in_two else None)
 
 
 @pytest.fixture
@@ -181,9 +191,26 @@ def folder_of_nobody() -> Iterator[Path]:
         yield Path(folder)
 
 
-def _running(machine: str, place: Path) -> Iterator[LinuxCNC]:
+def _split_geometry(folder: Path) -> None:
+    """As the stock configurations have it: the numbers in the HAL file, the zeros in the INI file."""
+    hal, ini, cell = (folder / name for name in ("hexapod.hal", "hexapod.ini", "cell.toml"))
+    head, _, rest = ini.read_text().partition("[HEXAPOD]\n")
+    numbers, include, rest = rest.partition("#INCLUDE")
+    values = dict(re.findall(r"(?m)^(\w+) = (\S+)$", numbers))
+    hal.write_text(re.sub(r"\[HEXAPOD\](\w+)", lambda variable: values[variable[1]], hal.read_text()))
+    ini.write_text(head + include + rest)
+    text = cell.read_text().replace('config = "hexapod.ini" ', 'config = "hexapod.hal" ')
+    text = text.replace('config_format = "linuxcnc-ini"', 'config_format = "linuxcnc-hal"')
+    head, _, rest = text.partition("[controller.config_options]\n")
+    names = rest.partition("names = ")[2].partition("\n")
+    cell.write_text(f"{head}{FURTHER_FILE}config_options = {{ names = {names[0]} }}\n{names[2]}")
+
+
+def _running(machine: str, place: Path, edit: Callable[[Path], None] | None = None) -> Iterator[LinuxCNC]:
     folder = place / f"linuxcnc-{machine}"
     shutil.copytree(CONFIGURATIONS / folder.name, folder)
+    if edit is not None:
+        edit(folder)
     port = _free_port()
     for name, pattern in ((f"{machine}.ini", r"--port \d+"), ("cell.toml", r"port = \d+")):
         text = (folder / name).read_text()

@@ -21,7 +21,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot_model import config_layout
-from tests.linuxcnc.conftest import LinuxCNC
+from tests.linuxcnc.conftest import TWO_FILES, LinuxCNC
 from tests.waiting import wait_until
 
 ALL = frozenset(StartupAction)
@@ -68,12 +68,13 @@ def in_its_folder(hexapod: LinuxCNC, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv(name, value)
 
 
+@pytest.mark.parametrize("hexapod", ["one file", TWO_FILES], indirect=True)
 async def test_other_zeros_are_read_by_a_restart_in_which_no_motor_moves(
     hexapod, motors, in_its_folder
 ) -> None:
     cell = load_cell(hexapod.folder / "cell.toml")
-    config, form, mechanism = cell.config_path, config_layout(cell.settings), cell.settings.mechanism
-    before = form.read(config).geometry
+    paths, layout, mechanism = cell.config_paths, config_layout(cell.settings), cell.settings.mechanism
+    before = layout.read(*paths).geometry
     random = np.random.default_rng(16)
     after = Geometry(before.parameters, np.round(before.vector + random.uniform(-5.0, 5.0, 42), 6))
     driver = LinuxcncrshController(cell.settings.controller)
@@ -83,7 +84,7 @@ async def test_other_zeros_are_read_by_a_restart_in_which_no_motor_moves(
         await driver.move(THERE, 1.0)
         motors.wait()
         stood = len(motors.places()) - 1
-        change = propose((config,), form, after, fingerprint_at_start=fingerprint(config))
+        change = propose(paths, layout, after, fingerprint_at_start=fingerprint(*paths))
         commit(change, hexapod.folder / "backup")
         await driver.reload(ALL)
         motors.wait()

@@ -35,19 +35,25 @@ class EncoderBus:
     """A CANopen network whose frames one thread receives and passes to the subscribers.
 
     Subscribers run on that thread with ``condition`` held, and notify it about a change that a waiting
-    thread must see. ``health_check`` is called at every wake-up and raises if the wait cannot
-    succeed. ``trace`` gets every frame in the format of candump: ``181#00C40900``. Every failure of the
-    bus is a ``BusError``; a wait also raises what ``health_check`` does.
+    thread must see. ``accepts`` says which frames they get, by default those of CANopen. ``health_check``
+    is called at every wake-up and raises if the wait cannot succeed. ``trace`` gets every frame in the
+    format of candump: ``181#00C40900``. Every failure of the bus is a ``BusError``; a wait also raises what
+    ``health_check`` does.
     """
 
     def __init__(
-        self, settings: Mapping[str, Any], interrupted: threading.Event, trace: TraceRecorder | None = None
+        self,
+        settings: Mapping[str, Any],
+        interrupted: threading.Event,
+        trace: TraceRecorder | None = None,
+        accepts: Callable[[can.Message], bool] | None = None,
     ) -> None:
         self.name = _name_of(settings)
         self.condition = threading.Condition()
         self.health_check: Callable[[], None] = lambda: None
         self._interrupted = interrupted
         self._trace = trace
+        self._accepts = accepts or _is_canopen
         self._failure: Exception | None = None
         self._error_frames: deque[float] = deque(maxlen=ERROR_FRAMES)
         self._closing = threading.Event()
@@ -106,7 +112,7 @@ class EncoderBus:
                     continue
                 if message.is_error_frame:
                     self._count_error_frame()
-                elif _is_canopen(message):
+                elif self._accepts(message):
                     self._deliver(message)
         except Exception as error:  # any error must reach the waiting thread
             with self.condition:

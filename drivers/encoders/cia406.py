@@ -21,15 +21,14 @@ from drivers.encoders.object_dictionary import DeviceType
 from drivers.encoders.pdo_configuration import configure_position_tpdo
 from drivers.encoders.plausibility import SampleHistory
 from drivers.encoders.sync_sampling import SyncSampler
+from drivers.encoders.threaded_bank import ThreadedBank
 from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from drivers.wire_trace import TraceRecorder
-from drivers.worker_thread import WorkerThread
 from hexacell.cell.devices import EncoderSettings
-from hexacell.errors import DeviceError
 
 
-class Cia406Bank:
+class Cia406Bank(ThreadedBank["EncoderSession"]):
     """The encoder bank of a cell; implements :class:`drivers.interfaces.EncoderBank`.
 
     ``settings.bus`` is passed unchanged to ``can.Bus``, so every interface of python-can works.
@@ -38,49 +37,12 @@ class Cia406Bank:
     """
 
     def __init__(self, settings: EncoderSettings, trace: TraceRecorder | None = None) -> None:
+        super().__init__()
         self._settings = settings
         self._trace = trace
-        self._worker: WorkerThread | None = None
-        self._session: EncoderSession | None = None
 
-    async def open(self) -> tuple[DeviceIdentity, ...]:
-        """The identities, legs 1 to 6, of the connected, configured and started nodes.
-
-        An open bank is closed first; after a failure nothing is left open.
-        """
-        await self.close()
-        self._worker = WorkerThread("encoders")
-        try:
-            return await self._worker.run(partial(self._open, self._worker.closing))
-        except BaseException:
-            await self.close()
-            raise
-
-    async def read(self) -> EncoderSample:
-        """One complete sample: all six positions at the same instant."""
-        if self._worker is None:
-            raise _not_open()
-        return await self._worker.run(self._read)
-
-    async def close(self) -> None:
-        """Close the bus and end its threads; a read in progress fails. Closing twice is harmless."""
-        worker, self._worker = self._worker, None
-        if worker is not None:
-            await worker.finish(self._close)
-
-    def _open(self, closing: threading.Event) -> tuple[DeviceIdentity, ...]:
-        self._session = EncoderSession(self._settings, closing, self._trace)
-        return self._session.identities
-
-    def _read(self) -> EncoderSample:
-        if self._session is None:
-            raise _not_open()
-        return self._session.read()
-
-    def _close(self) -> None:
-        session, self._session = self._session, None
-        if session is not None:
-            session.bus.close()
+    def _begin(self, closing: threading.Event) -> EncoderSession:
+        return EncoderSession(self._settings, closing, self._trace)
 
 
 class EncoderSession:
@@ -95,7 +57,7 @@ class EncoderSession:
     def __init__(
         self, settings: EncoderSettings, closing: threading.Event, trace: TraceRecorder | None = None
     ) -> None:
-        self.bus = EncoderBus(_bus_settings(settings), closing, trace)
+        self.bus = EncoderBus(bus_settings(settings), closing, trace)
         self._settings = settings
         self._history = SampleHistory(settings)
         try:
@@ -115,6 +77,10 @@ class EncoderSession:
         positions = joint_variables(counts, self._settings)
         self._history.check_speed(positions)
         return EncoderSample(counts, positions, self._settings.unit)
+
+    def close(self) -> None:
+        """Close the bus."""
+        self.bus.close()
 
     def _start(self) -> None:
         settings = self._settings
@@ -162,7 +128,8 @@ def _check_all(
     sampler.check()
 
 
-def _bus_settings(settings: EncoderSettings) -> dict[str, object]:
+def bus_settings(settings: EncoderSettings) -> dict[str, object]:
+    """Those of the cell file for ``can.Bus``; raises ``BusError`` if it has none."""
     if settings.bus is None:
         raise BusError(
             "is not configured in the cell file",
@@ -171,7 +138,3 @@ def _bus_settings(settings: EncoderSettings) -> dict[str, object]:
             '{ interface = "slcan", channel = "/dev/ttyACM0", bitrate = 500000 }',
         )
     return settings.bus
-
-
-def _not_open() -> DeviceError:
-    return DeviceError("are not open", subject="encoders", action="Open them first")

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
+from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.robot import SimulatedMachine
@@ -24,7 +25,7 @@ class CellFaults:
     def __init__(
         self,
         gauges: SimulatedGaugeBank,
-        encoders: SimulatedEncoderBank,
+        encoders: SimulatedEncoderBank | SimulatedDbcBank,
         controller: SimulatedController,
         machine: SimulatedMachine,
         stop_file: Path,

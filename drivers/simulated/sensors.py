@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
+from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.serial_line import PtyLine
@@ -35,7 +36,8 @@ class SimulatedSensors(Closeable):
     ) -> None:
         with ExitStack() as served:
             self.gauges = served.enter_context(_gauge_bank(settings, simulation, physics, clock))
-            self.encoders = served.enter_context(_encoder_bank(settings, simulation, physics, clock))
+            self.encoders = _encoder_bank(settings, simulation, physics, clock)
+            served.enter_context(self.encoders)
             self._bus: dict[str, Any] = self.encoders.bus_settings
             if other_processes:
                 adapter = served.enter_context(SlcanServer(self.encoders.channel, PtyLine("slcan")))
@@ -63,7 +65,11 @@ def _gauge_bank(
 
 def _encoder_bank(
     settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
-) -> SimulatedEncoderBank:
+) -> SimulatedEncoderBank | SimulatedDbcBank:
+    if settings.encoders.dbc is not None:
+        return SimulatedDbcBank(
+            settings.encoders, settings.encoders.dbc, lambda: physics.encoder_positions().tolist()
+        )
     latency = simulation.encoders.latency_s
     return SimulatedEncoderBank(
         settings.encoders, lambda: physics.encoder_positions().tolist(), clock, latency_s=latency

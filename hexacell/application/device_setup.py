@@ -35,7 +35,7 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
         HexacellError: a protocol has no driver, a password cannot be read, or the simulation cannot start.
     """
     require_drivers(cell)
-    settings = with_passwords(cell.settings, cell.path.parent)
+    settings = _with_dbc_file(with_passwords(cell.settings, cell.path.parent), cell.path.parent)
     if settings.simulation is None:
         yield settings
         return
@@ -53,6 +53,15 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
         other_processes=other_processes,
     ) as simulated:
         yield simulated.settings
+
+
+def _with_dbc_file(settings: CellSettings, folder: Path) -> CellSettings:
+    """The settings with the path of the DBC file, which is relative to the cell file."""
+    described = settings.encoders.dbc
+    if described is None:
+        return settings
+    dbc = described.model_copy(update={"file": str(folder / described.file)})
+    return settings.model_copy(update={"encoders": settings.encoders.model_copy(update={"dbc": dbc})})
 
 
 def require_drivers(cell: Cell) -> None:

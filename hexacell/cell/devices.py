@@ -235,10 +235,34 @@ class GaugeSettings(Section):
         return None if self.middle_mm is None else self.mounting.coordinate(self.middle_mm)
 
 
+MessageSignal = Annotated[str, Field(max_length=200, pattern=r"^\w+\.\w+$")]
+
+
+class DbcSettings(Section):
+    """Encoders that send what a DBC file describes."""
+
+    file: Text = Field(min_length=1, description="the DBC file, relative to the cell file")
+    signals: tuple[
+        MessageSignal, MessageSignal, MessageSignal, MessageSignal, MessageSignal, MessageSignal
+    ] = Field(description="position of legs 1 to 6: Message.Signal each; its unit is that of the DBC file")
+    request: str | None = Field(
+        None,
+        pattern=r"^[0-9A-Fa-f]{3}#([0-9A-Fa-f]{2}){0,8}$",
+        description="frame that asks all of them, as candump has it: 080#; without it they send unasked",
+    )
+    delay_s: NotNegative = Field(0.005, description="how old a position may be when its frame comes")
+    window_s: Positive = Field(0.02, description="the six positions of a sample come within this time")
+    must_be: dict[Text, int] = Field(
+        default_factory=dict,
+        max_length=20,
+        description="signals of these messages and their values where a position is valid: { Error = 0 }",
+    )
+
+
 class EncoderSettings(Section, ABC):
     """The bank of six joint encoders, but for what a count is."""
 
-    protocol: Text = Field("cia406", description="cia406, controller, or one that a plug-in adds")
+    protocol: Text = Field("cia406", description="cia406, controller, dbc, or one that a plug-in adds")
     bus: dict[str, Any] | None = Field(None, description="passed to python-can's Bus")
     nodes: tuple[NodeId, NodeId, NodeId, NodeId, NodeId, NodeId] = Field(
         (1, 2, 3, 4, 5, 6), description="CANopen node ids of legs 1 to 6, each from 1 to 127"
@@ -260,6 +284,7 @@ class EncoderSettings(Section, ABC):
         alias="largest_speed_mm_s",
         description="a joint that goes faster between two samples jumped; by default from [speed]",
     )
+    dbc: DbcSettings | None = Field(None, description="of protocol dbc: what they send")
     certificate: CertificateSettings | None = Field(None, description="of the calibration of all six")
 
     @field_validator("nodes")

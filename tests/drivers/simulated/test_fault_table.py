@@ -18,13 +18,16 @@ import pytest
 
 from drivers.encoders import alarm_poll
 from drivers.encoders.cia406 import Cia406Bank
+from drivers.encoders.dbc import DbcBank
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
+from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
-from hexacell.cell.devices import LinearEncoderSettings
+from hexacell.cell.devices import DbcSettings, LinearEncoderSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from procedures.devices.settling import trimmed_mean
+from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 from tests.drivers.simulated.gauges.served.cell import MORE_DRIVERS, PROTOCOLS, Cell
 
 TABLE = Path(__file__).parents[3] / "docs" / "device-faults.md"
@@ -33,6 +36,7 @@ BEFORE_MM, AFTER_MM = 1.0, 1.5
 READINGS = 5
 ENCODER_READINGS = 50
 AT_ONCE = 4
+DBC_FAULTS: tuple[FaultKind, ...] = ("silent", "alarm", "frozen", "jumped")
 RIGHT_MM = 0.0051
 """Five readings whose neighbours agree within 0.005 mm cannot err by more, where damage is seldom."""
 
@@ -124,12 +128,35 @@ async def encoder_row(fault: FaultKind) -> Row:
         simulated.close()
 
 
-async def rows() -> list[Row]:
+async def dbc_row(fault: FaultKind, folder: Path) -> Row:
+    file = folder / "encoders.dbc"
+    file.write_text(dbc_text())
+    described = DbcSettings(file=str(file), signals=SIGNALS, delay_s=0.0, must_be={"Error": 0})
+    settings = LinearEncoderSettings(
+        protocol="dbc", timeout_s=1.0, measuring_step_nm=500, largest_speed_mm_s=1000.0, dbc=described
+    )
+    at = [0.0]
+    simulated = SimulatedDbcBank(settings, described, lambda: at * 6)
+    bank = DbcBank(settings.model_copy(update={"bus": simulated.bus_settings}))
+    try:
+        await bank.open()
+        await bank.read()
+        simulated.faults(3)[fault](on=True)
+        at[0] = 0.5
+        error = await told(bank.read)
+        return row("encoders, dbc", fault, error, is_right=False)
+    finally:
+        await bank.close()
+        simulated.close()
+
+
+async def rows(folder: Path) -> list[Row]:
     gauges = _kinds(lambda: Cell(["sylvac"] * 3).rack, "x")
     encoders = list(SimulatedEncoderBank.faults(_a_bank(), 1))
     devices = (*PROTOCOLS, *MORE_DRIVERS)
     found = await _a_few_at_once([gauge_row(protocol, fault) for fault in gauges for protocol in devices])
-    return found + [await encoder_row(fault) for fault in encoders]
+    found += [await encoder_row(fault) for fault in encoders]
+    return found + [await dbc_row(fault, folder) for fault in DBC_FAULTS]
 
 
 async def _a_few_at_once(rows: list[Coroutine[Any, Any, Row]]) -> list[Row]:
@@ -162,12 +189,12 @@ def table(found: list[Row]) -> str:
 
 @pytest.mark.timeout(300)
 async def test_every_fault_is_seen_or_harmless_as_the_table_says(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(alarm_poll, "ALARM_POLL_S", 0.0)
     monkeypatch.setattr(alarm_poll, "BUS_SHARE", math.inf)
     monkeypatch.setattr(alarm_poll, "WARNINGS_EVERY", 1)
-    made = table(await rows())
+    made = table(await rows(tmp_path))
     with capsys.disabled():
         print(f"\n{made}")
     head, _, stated = TABLE.read_text().partition(BEGIN)

@@ -1,0 +1,191 @@
+"""Encoders that a DBC file describes, on a virtual bus."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+
+from drivers.encoders.dbc import DbcBank
+from drivers.errors import BusError, InvalidSampleError, SilentNodeError
+from drivers.interfaces import DeviceIdentity
+from hexacell.cell.devices import LinearEncoderSettings
+from hexacell.errors import DeviceError, FileError, HexacellError, UsageError
+from tests.drivers.encoders.dbc.conftest import SIGNALS, Wire, dbc_text
+from tests.waiting import until
+
+POSITIONS = (1.5, -2.0, 3.0, 4.0, 5.0, 6.0)
+
+
+async def while_sending(wire: Wire, call: Callable, **sent):
+    """The result of a call while the encoders send."""
+    task = asyncio.create_task(call())
+
+    def is_done() -> bool:
+        wire.send_all(POSITIONS, **sent)
+        return task.done()
+
+    await until(is_done)
+    return task.result()
+
+
+async def test_six_positions_are_read_with_the_factor_of_the_file(simulated):
+    cell = simulated()
+    identities = await cell.driver.open()
+    assert identities[2] == DeviceIdentity(
+        "encoder of leg 3", "dbc", "ENC3.Position", settings="steps of 0.0005 mm, offset 0"
+    )
+    sample = await cell.driver.read()
+    assert sample.positions == pytest.approx((10.0, 20.0, 30.0, 40.0, 50.0, 60.0))
+    assert sample.counts == (20000, 40000, 60000, 80000, 100000, 120000)
+
+
+async def test_a_sample_is_newer_than_its_request(simulated):
+    cell = simulated()
+    await cell.driver.open()
+    for step in range(20):
+        cell.positions[:] = [10.0 + 0.01 * step] * 6
+        assert (await cell.driver.read()).positions == pytest.approx((10.0 + 0.01 * step,) * 6)
+
+
+async def test_encoders_that_wait_for_a_request_get_it(simulated):
+    cell = simulated(request="080#")
+    await cell.driver.open()
+    cell.positions[0] = 10.25
+    assert (await cell.driver.read()).positions[0] == pytest.approx(10.25)
+
+
+async def test_the_request_is_on_the_wire(settings, wire):
+    bank = DbcBank(settings(wire.settings, request="123#A0B1"))
+    opening = asyncio.create_task(bank.open())
+    message = await asyncio.to_thread(wire.received, 5.0)
+    assert (message.arbitration_id, bytes(message.data)) == (0x123, b"\xa0\xb1")
+    with pytest.raises(SilentNodeError):
+        await opening
+    await bank.close()
+
+
+async def test_direction_and_offset_are_those_of_the_cell_file(simulated, settings, wire):
+    changes = {"direction": (1, -1, 1, 1, 1, 1), "offset": (100.0, 0.0, 0.0, 0.0, 0.0, 0.0)}
+    bank = DbcBank(settings(wire.settings).model_copy(update=changes))
+    await while_sending(wire, bank.open)
+    sample = await while_sending(wire, bank.read)
+    assert sample.positions == pytest.approx((101.5, 2.0, 3.0, 4.0, 5.0, 6.0))
+    await bank.close()
+
+
+async def test_other_frames_on_the_bus_are_ignored(settings, wire):
+    bank = DbcBank(settings(wire.settings))
+    await while_sending(wire, bank.open)
+    wire.send(0x201, b"\xff" * 6, extended=True)
+    wire.send(0x700, b"\xff" * 8)
+    assert (await while_sending(wire, bank.read)).positions[0] == pytest.approx(1.5)
+    await bank.close()
+
+
+@pytest.mark.parametrize(
+    ("fault", "error", "message"),
+    [
+        ("silent", SilentNodeError, r"encoder of leg 3 \(ENC3.Position\): sends nothing for 0\.4 s"),
+        ("alarm", InvalidSampleError, r"leg 3 \(ENC3.Position\): sends Error 1, not 0; its position"),
+        ("jumped", InvalidSampleError, "jumped from 30.000 to 430.000 mm"),
+    ],
+)
+async def test_a_fault_names_the_leg(simulated, fault, error, message):
+    cell = simulated(must_be={"Error": 0})
+    await cell.driver.open()
+    await cell.driver.read()
+    cell.bank.faults(3)[fault](on=True)
+    with pytest.raises(error, match=message):
+        await _read_often(cell.driver)
+    cell.bank.faults(3)[fault](on=False)
+    await cell.driver.open()
+    await cell.driver.read()
+
+
+async def _read_often(bank: DbcBank) -> None:
+    for _ in range(5):
+        await bank.read()
+
+
+async def test_one_that_is_silent_from_the_start_is_named(settings, wire):
+    bank = DbcBank(settings(wire.settings))
+    with pytest.raises(SilentNodeError, match="leg 5"):
+        await while_sending(wire, bank.open, without=5)
+
+
+async def test_frames_of_another_length_are_no_positions(settings, wire):
+    bank = DbcBank(settings(wire.settings))
+    with pytest.raises(InvalidSampleError, match="sends 5 bytes, where the DBC file has 6"):
+        await while_sending(wire, bank.open, length=5)
+
+
+async def test_a_position_outside_the_range_of_the_file_is_refused(settings, wire):
+    bank = DbcBank(settings(wire.settings))
+    await while_sending(wire, bank.open)
+    reading = asyncio.create_task(bank.read())
+
+    def is_done() -> bool:
+        wire.send(0x203, (4_100_000).to_bytes(4, "little") + b"\0\0")
+        return reading.done()
+
+    await until(is_done)
+    with pytest.raises(InvalidSampleError, match=r"leg 3.*sends 2050, outside the range in the DBC file"):
+        await reading
+    await bank.close()
+
+
+async def test_positions_that_come_far_apart_are_no_sample(settings, wire):
+    bank = DbcBank(settings(wire.settings, window_s=1e-9))
+    with pytest.raises(DeviceError, match=r"encoders: send \d+ ms apart"):
+        await while_sending(wire, bank.open)
+
+
+@pytest.mark.parametrize(
+    ("text", "signals", "message"),
+    [
+        ("hello {", SIGNALS, "cannot be read"),
+        (dbc_text(), ("ENC9.Position", *SIGNALS[1:]), r"has no message 'ENC9'. Did you mean 'ENC\d'"),
+        (dbc_text(), ("ENC1.Positon", *SIGNALS[1:]), r"has no signal 'Positon'. Did you mean 'Position'"),
+        (dbc_text("inch"), SIGNALS, "signal ENC1.Position is in inch, where joints are in mm"),
+        (dbc_text("um"), SIGNALS, "signal ENC1.Position has finer steps"),
+    ],
+)
+async def test_a_file_that_does_not_fit_is_told(settings, dbc_file, wire, text, signals, message):
+    dbc_file.write_text(text)
+    with pytest.raises(FileError, match=message):
+        await DbcBank(settings(wire.settings, signals=signals)).open()
+
+
+async def test_a_file_that_is_not_there_is_told(settings, wire):
+    with pytest.raises(FileError, match=r"/nowhere\.dbc: cannot be read"):
+        await DbcBank(settings(wire.settings, file="/nowhere.dbc")).open()
+
+
+async def test_metres_become_millimetres(settings, dbc_file, wire):
+    dbc_file.write_text(dbc_text("m"))
+    bank = DbcBank(settings(wire.settings))
+    await while_sending(wire, bank.open)
+    assert (await while_sending(wire, bank.read)).positions[0] == pytest.approx(1500.0)
+    await bank.close()
+
+
+async def test_without_bus_or_description_the_cell_file_is_told(settings):
+    with pytest.raises(BusError, match="not configured"):
+        await DbcBank(settings()).open()
+    with pytest.raises(UsageError, match="messages are not stated"):
+        DbcBank(LinearEncoderSettings(protocol="dbc"))
+
+
+async def test_without_the_extra_the_command_that_installs_it_is_told(settings, wire, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cantools", None)
+    with pytest.raises(HexacellError, match=r"Type: pip install 'hexacell\[dbc\]'"):
+        await DbcBank(settings(wire.settings)).open()
+
+
+def test_the_library_is_not_imported_with_the_driver():
+    code = "import sys, drivers.encoders.dbc; sys.exit('cantools' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)

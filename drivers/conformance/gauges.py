@@ -6,16 +6,14 @@ import asyncio
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AbstractContextManager, asynccontextmanager
-from typing import Any, Protocol
+from typing import Protocol
 
+from drivers.conformance.failures import LONGEST_S, failure, require_named
 from drivers.interfaces import Gauge
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.errors import DeviceError
-
-LONGEST_S = 60.0
-"""No call may take longer, whatever the instrument does."""
 
 WORST_LATENCY_S = 0.2
 VALUES_MM = (0.0, 1.5, -2.25, 4.0)
@@ -91,7 +89,7 @@ class GaugeConformance(ABC):
             await gauge.close()
             await gauge.close()
             for call in (gauge.read, gauge.read_once, gauge.check):
-                self._names_itself(gauge, await _failure(call))
+                require_named(await failure(call), gauge.name)
 
         self._run(check)
 
@@ -132,8 +130,8 @@ class GaugeConformance(ABC):
         async def check(gauge: Gauge, twin: GaugeTwin) -> None:
             await gauge.open()
             twin.inject(fault, on=True)
-            self._names_itself(gauge, await _failure(gauge.read))
-            self._names_itself(gauge, await _failure(gauge.check))
+            require_named(await failure(gauge.read), gauge.name)
+            require_named(await failure(gauge.check), gauge.name)
             twin.inject(fault, on=False)
             twin.show(2.0)
             await gauge.close()
@@ -141,10 +139,6 @@ class GaugeConformance(ABC):
             assert abs((await gauge.read()).value_mm - 2.0) <= self.tolerance_mm
 
         self._run(check)
-
-    def _names_itself(self, gauge: Gauge, error: BaseException | None) -> None:
-        assert isinstance(error, DeviceError), f"{error!r} is no DeviceError"
-        assert gauge.name in (error.subject or ""), f"{error} does not name gauge {gauge.name}"
 
     def _agreement_mm(self, twin: GaugeTwin) -> float:
         return (twin.settings.agreement_mm or 0.05) + self.tolerance_mm
@@ -166,11 +160,3 @@ class GaugeConformance(ABC):
         finally:
             await gauge.close()
             await ports.close()
-
-
-async def _failure(call: Callable[[], Awaitable[Any]]) -> Exception | None:
-    try:
-        await call()
-    except Exception as error:
-        return error
-    return None

@@ -1,13 +1,14 @@
-"""A simulated gauge on a pseudo-terminal, as the twin of a conformance test."""
+"""Simulated gauges on a pseudo-terminal and encoders on a virtual bus, as twins of conformance tests."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 
+from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.gauges.bank import InstrumentFactory, SimulatedGaugeBank
 from drivers.simulated.served_device import Switch
-from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.devices import EncoderSettings, GaugeSettings
 from hexacell.cell.simulation import FaultKind, SimulatedGauges
 from hexacell.clock import CellClock
 
@@ -58,3 +59,34 @@ def served_twin(
         yield twin
     finally:
         twin.close()
+
+
+FAULTY_LEG = 3
+
+
+class ServedEncoderTwin:
+    """The six CiA 406 encoders of the simulation; they stand where they are told to."""
+
+    def __init__(self, settings: EncoderSettings) -> None:
+        self._joints: Sequence[float] = (0.0,) * 6
+        self._bank = SimulatedEncoderBank(settings, lambda: self._joints, CellClock(QUICKER))
+        self.settings = settings.model_copy(update={"bus": self._bank.bus_settings})
+
+    def stand_at(self, joints: Sequence[float]) -> None:
+        """Move all joints at once, in the unit of the joint variables."""
+        self._joints = tuple(joints)
+
+    def inject(self, fault: FaultKind, *, on: bool) -> None:
+        """Switch a fault of leg 3 on or off."""
+        self._bank.faults(FAULTY_LEG)[fault](on=on)
+
+    def close(self) -> None:
+        """Stop serving."""
+        self._bank.close()
+
+
+@contextmanager
+def served_encoder_twin(settings: EncoderSettings) -> Iterator[ServedEncoderTwin]:
+    """Serve six simulated encoders on a virtual bus of this process."""
+    with closing(ServedEncoderTwin(settings)) as twin:
+        yield twin

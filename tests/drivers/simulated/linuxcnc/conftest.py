@@ -35,7 +35,7 @@ class FakeMachine:
         self.events: list[str] = []
         self.durations_s: list[float | None] = []
         self._geometry = 0.0
-        self._joints = (0.0,) * 6
+        self._joints: tuple[float, ...] = (0.0,) * 6
         self._stop = threading.Event()
         self._lock = threading.Lock()
 

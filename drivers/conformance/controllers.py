@@ -1,0 +1,220 @@
+"""The tests that every controller's driver passes, against a twin of its controller and of a machine."""
+
+from __future__ import annotations
+
+import asyncio
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AbstractContextManager, asynccontextmanager
+from typing import Protocol
+
+from drivers.conformance.failures import LONGEST_S, failure, require_named
+from drivers.controllers.errors import MotionInterrupted, MoveRefused, StartupNotPermitted
+from drivers.controllers.linuxcnc.protocol import pose_difference
+from drivers.interfaces import Controller, StartupAction
+from hexacell.cell.devices import ControllerSettings
+from hexacell.cell.simulation import FaultKind
+from hexacell.kinematics.pose import Pose
+
+ALL = frozenset(StartupAction)
+QUICK_S, SLOW_S = 0.1, 30.0
+"""Durations of a move that is awaited, and of one that is stopped on its way."""
+
+
+class ControllerTwin(Protocol):
+    """A simulated controller that starts in emergency stop, and the machine behind it."""
+
+    @property
+    def settings(self) -> ControllerSettings:
+        """Those of the controller, with the address at which the twin answers."""
+        ...
+
+    @property
+    def target(self) -> Pose:
+        """A pose in reach, other than that in which it starts."""
+        ...
+
+    @property
+    def out_of_reach(self) -> Pose:
+        """A pose that it refuses."""
+        ...
+
+    def inject(self, fault: FaultKind, *, on: bool) -> None:
+        """Switch ``unplugged`` or ``silent`` on or off; ``emergency stop`` on."""
+        ...
+
+
+class ControllerConformance(ABC):
+    """Subclass it in a test file, name it ``Test...``, and say what is tested."""
+
+    @abstractmethod
+    def driver(self, settings: ControllerSettings) -> Controller:
+        """The driver under test."""
+
+    @abstractmethod
+    def twin(self) -> AbstractContextManager[ControllerTwin]:
+        """The controller, as long as the context lasts."""
+
+    def test_it_is_the_same_whenever_it_is_opened(self) -> None:
+        async def check(controller: Controller, _: ControllerTwin) -> None:
+            first = await controller.open()
+            await controller.close()
+            assert await controller.open() == first
+
+        self._run(check)
+
+    def test_it_is_made_ready_by_what_is_permitted_only(self) -> None:
+        async def check(controller: Controller, _: ControllerTwin) -> None:
+            await controller.open()
+            assert isinstance(await failure(lambda: controller.prepare(frozenset())), StartupNotPermitted)
+            assert not (await controller.status()).may_move
+            await controller.prepare(ALL)
+            assert (await controller.status()).may_move
+            assert await controller.position() is not None
+
+        self._run(check)
+
+    def test_a_move_ends_at_its_pose(self) -> None:
+        async def check(controller: Controller, twin: ControllerTwin) -> None:
+            start = await self._ready(controller)
+            for pose in (twin.target, start):
+                await controller.move(pose, QUICK_S)
+                assert await self._is_at(controller, twin, pose)
+
+        self._run(check)
+
+    def test_a_pose_out_of_reach_is_refused_and_nothing_moves(self) -> None:
+        async def check(controller: Controller, twin: ControllerTwin) -> None:
+            start = await self._ready(controller)
+            refused = await failure(lambda: controller.move(twin.out_of_reach, QUICK_S))
+            assert isinstance(refused, MoveRefused), refused
+            assert await self._is_at(controller, twin, start)
+            await controller.move(twin.target, QUICK_S)
+
+        self._run(check)
+
+    def test_a_stop_ends_a_move_in_place(self) -> None:
+        async def check(controller: Controller, twin: ControllerTwin) -> None:
+            await self._ready(controller)
+            moving = await self._begun(controller, twin)
+            await controller.stop()
+            [error] = await asyncio.gather(moving, return_exceptions=True)
+            assert isinstance(error, MotionInterrupted), error
+            await self._require_at_rest(controller, twin)
+            await controller.move(twin.target, QUICK_S)
+
+        self._run(check)
+
+    def test_a_move_that_is_given_up_is_stopped(self) -> None:
+        async def check(controller: Controller, twin: ControllerTwin) -> None:
+            await self._ready(controller)
+            moving = await self._begun(controller, twin)
+            moving.cancel()
+            await asyncio.gather(moving, return_exceptions=True)
+            await self._require_at_rest(controller, twin)
+
+        self._run(check)
+
+    def test_an_emergency_stop_is_told_and_ends_moves(self) -> None:
+        async def check(controller: Controller, twin: ControllerTwin) -> None:
+            name = (await controller.open()).name
+            await controller.prepare(ALL)
+            moving = await self._begun(controller, twin)
+            twin.inject("emergency stop", on=True)
+            [error] = await asyncio.gather(moving, return_exceptions=True)
+            require_named(error, name)
+            assert (await controller.status()).estop
+            require_named(await failure(lambda: controller.move(twin.target, QUICK_S)), name)
+
+        self._run(check)
+
+    def test_a_reload_moves_no_joint_and_leaves_it_ready(self) -> None:
+        async def check(controller: Controller, twin: ControllerTwin) -> None:
+            await self._ready(controller)
+            await controller.move(twin.target, QUICK_S)
+            await controller.reload(frozenset())
+            assert (await controller.status()).may_move
+            assert await self._is_at(controller, twin, twin.target)
+
+        self._run(check)
+
+    def test_one_that_is_unplugged_fails_and_can_be_opened_again(self) -> None:
+        self._fails_and_comes_back("unplugged")
+
+    def test_one_that_is_silent_fails_and_can_be_opened_again(self) -> None:
+        self._fails_and_comes_back("silent")
+
+    def test_closing_twice_is_harmless(self) -> None:
+        async def check(controller: Controller, twin: ControllerTwin) -> None:
+            await controller.close()
+            await self._ready(controller)
+            await controller.close()
+            await controller.close()
+            await self._ready(controller)
+            await controller.move(twin.target, QUICK_S)
+
+        self._run(check)
+
+    def _fails_and_comes_back(self, fault: FaultKind) -> None:
+        async def check(controller: Controller, twin: ControllerTwin) -> None:
+            name = (await controller.open()).name
+            await controller.prepare(ALL)
+            twin.inject(fault, on=True)
+            for call in (controller.status, controller.position):
+                require_named(await failure(call), name)
+            require_named(await failure(lambda: controller.move(twin.target, QUICK_S)), name)
+            twin.inject(fault, on=False)
+            await controller.close()
+            await self._ready(controller)
+            await controller.move(twin.target, QUICK_S)
+            assert await self._is_at(controller, twin, twin.target)
+
+        self._run(check)
+
+    async def _ready(self, controller: Controller) -> Pose:
+        """Open and prepare it; where it stands."""
+        await controller.open()
+        await controller.prepare(ALL)
+        return await self._pose(controller)
+
+    async def _pose(self, controller: Controller) -> Pose:
+        reported = await controller.position()
+        assert reported is not None, "it is homed, and knows where the robot is"
+        assert reported.joints is None or len(reported.joints) == 6
+        return reported.pose
+
+    async def _is_at(self, controller: Controller, twin: ControllerTwin, pose: Pose) -> bool:
+        millimetres, degrees = pose_difference(await self._pose(controller), pose)
+        settings = twin.settings
+        return millimetres <= settings.position_tolerance_mm and degrees <= settings.angle_tolerance_deg
+
+    async def _begun(self, controller: Controller, twin: ControllerTwin) -> asyncio.Task[None]:
+        """A slow move; it is on its way if the controller has a heartbeat that shows it."""
+        before = (await controller.status()).heartbeat
+        moving = asyncio.create_task(controller.move(twin.target, SLOW_S))
+        await asyncio.sleep(0)
+        while before and not moving.done():
+            if (await controller.status()).heartbeat != before:
+                break
+        return moving
+
+    async def _require_at_rest(self, controller: Controller, twin: ControllerTwin) -> None:
+        once = await self._pose(controller)
+        assert await self._is_at(controller, twin, once)
+        assert not await self._is_at(controller, twin, twin.target)
+
+    def _run(self, check: Callable[[Controller, ControllerTwin], Awaitable[None]]) -> None:
+        async def run() -> None:
+            with self.twin() as twin:
+                async with self._closed_after(twin) as controller, asyncio.timeout(LONGEST_S):
+                    await check(controller, twin)
+
+        asyncio.run(run())
+
+    @asynccontextmanager
+    async def _closed_after(self, twin: ControllerTwin) -> AsyncIterator[Controller]:
+        controller = self.driver(twin.settings)
+        try:
+            yield controller
+        finally:
+            await controller.close()

@@ -1,0 +1,181 @@
+"""The tests that every driver of encoders passes, against a twin of six encoders."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, asynccontextmanager, contextmanager
+from typing import Protocol
+
+from drivers.conformance.failures import LONGEST_S, failure, require_named
+from drivers.encoders.cia406 import joint_variables
+from drivers.interfaces import EncoderBank
+from hexacell.cell.devices import EncoderSettings
+from hexacell.cell.simulation import FaultKind
+
+POSITIONS = ((0.0,) * 6, (1.5, -2.25, 4.0, -0.5, 0.25, 3.0), (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0))
+STEPS, STEP = 40, 0.05
+
+
+class EncoderTwin(Protocol):
+    """Six simulated encoders: their address, where they stand, and their faults."""
+
+    @property
+    def settings(self) -> EncoderSettings:
+        """Those of the encoders, with the address at which the twin answers."""
+        ...
+
+    def stand_at(self, joints: Sequence[float]) -> None:
+        """Move all joints at once, in the unit of the joint variables; from any thread."""
+        ...
+
+    def inject(self, fault: FaultKind, *, on: bool) -> None:
+        """Switch ``unplugged`` or ``silent`` of the encoder of leg 3, or of all, on or off."""
+        ...
+
+
+class EncoderConformance(ABC):
+    """Subclass it in a test file, name it ``Test...``, and say what is tested.
+
+    Attributes:
+        tolerance: by how much a position may differ from where the twin stands: half a count.
+        name: what the subject of every error names.
+    """
+
+    tolerance: float = 0.00051
+    name: str = "encoder"
+
+    @abstractmethod
+    def driver(self, twin: EncoderTwin) -> EncoderBank:
+        """The driver under test."""
+
+    @abstractmethod
+    def twin(self) -> AbstractContextManager[EncoderTwin]:
+        """The encoders, as long as the context lasts."""
+
+    def test_they_are_the_same_whenever_they_are_opened(self) -> None:
+        async def check(bank: EncoderBank, _: EncoderTwin) -> None:
+            first = await bank.open()
+            await bank.close()
+            assert await bank.open() == first
+            assert len({identity.name for identity in first}) == len(first) == 6
+
+        self._run(check)
+
+    def test_they_read_where_the_joints_are(self) -> None:
+        async def check(bank: EncoderBank, twin: EncoderTwin) -> None:
+            await bank.open()
+            for joints in POSITIONS:
+                twin.stand_at(joints)
+                await self._require_at(bank, twin, joints)
+
+        self._run(check)
+
+    def test_counts_are_raw_and_give_the_positions_again(self) -> None:
+        async def check(bank: EncoderBank, twin: EncoderTwin) -> None:
+            twin.stand_at(POSITIONS[1])
+            await bank.open()
+            sample = await bank.read()
+            assert all(isinstance(count, int) for count in sample.counts)
+            assert sample.positions == joint_variables(sample.counts, twin.settings)
+
+        self._run(check)
+
+    def test_a_sample_is_of_one_instant(self) -> None:
+        """All joints move together: a sample that is put together of two instants differs in itself."""
+
+        async def check(bank: EncoderBank, twin: EncoderTwin) -> None:
+            twin.stand_at((0.0,) * 6)
+            await bank.open()
+            with _moving(twin):
+                for _ in range(STEPS):
+                    found = (await bank.read()).positions
+                    assert max(found) - min(found) <= 2 * self.tolerance, found
+
+        self._run(check)
+
+    def test_closing_twice_is_harmless_and_closed_ones_are_named(self) -> None:
+        async def check(bank: EncoderBank, _: EncoderTwin) -> None:
+            await bank.close()
+            await bank.open()
+            await bank.close()
+            await bank.close()
+            require_named(await failure(bank.read), self.name)
+
+        self._run(check)
+
+    def test_one_that_is_unplugged_fails_all_and_can_be_opened_again(self) -> None:
+        self._fails_and_comes_back("unplugged")
+
+    def test_one_that_is_silent_fails_all_and_can_be_opened_again(self) -> None:
+        self._fails_and_comes_back("silent")
+
+    def test_a_sample_that_is_given_up_leaves_them_in_step(self) -> None:
+        async def check(bank: EncoderBank, twin: EncoderTwin) -> None:
+            await bank.open()
+            for joints in POSITIONS:
+                given_up = asyncio.create_task(bank.read())
+                await asyncio.sleep(0)
+                given_up.cancel()
+                await asyncio.gather(given_up, return_exceptions=True)
+                twin.stand_at(joints)
+                await self._require_at(bank, twin, joints)
+
+        self._run(check)
+
+    def _fails_and_comes_back(self, fault: FaultKind) -> None:
+        async def check(bank: EncoderBank, twin: EncoderTwin) -> None:
+            await bank.open()
+            twin.inject(fault, on=True)
+            require_named(await failure(bank.read), self.name)
+            twin.inject(fault, on=False)
+            twin.stand_at(POSITIONS[1])
+            await bank.close()
+            await bank.open()
+            await self._require_at(bank, twin, POSITIONS[1])
+
+        self._run(check)
+
+    async def _require_at(self, bank: EncoderBank, twin: EncoderTwin, joints: Sequence[float]) -> None:
+        sample = await bank.read()
+        assert sample.unit == twin.settings.unit
+        for found, joint in zip(sample.positions, joints, strict=True):
+            assert abs(found - joint) <= self.tolerance, sample
+
+    def _run(self, check: Callable[[EncoderBank, EncoderTwin], Awaitable[None]]) -> None:
+        async def run() -> None:
+            with self.twin() as twin:
+                async with self._closed_after(twin) as bank, asyncio.timeout(LONGEST_S):
+                    await check(bank, twin)
+
+        asyncio.run(run())
+
+    @asynccontextmanager
+    async def _closed_after(self, twin: EncoderTwin) -> AsyncIterator[EncoderBank]:
+        bank = self.driver(twin)
+        try:
+            yield bank
+        finally:
+            await bank.close()
+
+
+@contextmanager
+def _moving(twin: EncoderTwin) -> Iterator[None]:
+    """All joints go to and fro together, in small steps, as long as the context lasts."""
+    ended = threading.Event()
+
+    def move() -> None:
+        step = 0
+        while not ended.is_set():
+            step = (step + 1) % STEPS
+            twin.stand_at((STEP * min(step, STEPS - step),) * 6)
+
+    mover = threading.Thread(target=move)
+    mover.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        mover.join()

@@ -1,0 +1,59 @@
+"""Our own controller passes what every driver of a controller must."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from drivers.conformance import ControllerConformance, ControllerTwin
+from drivers.controllers.linuxcnc.controller import LinuxcncrshController
+from drivers.interfaces import Controller
+from drivers.simulated.linuxcnc.server import SimulatedController
+from hexacell.cell.devices import ControllerSettings
+from hexacell.cell.simulation import FaultKind
+from hexacell.kinematics.pose import Pose
+from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
+
+LEAST_S = 0.01
+
+
+class MachineInTime(FakeMachine):
+    """Its moves last as long as they are told to."""
+
+    def move(self, pose: Pose, duration_s: float | None) -> None:
+        self.duration_s = duration_s or LEAST_S
+        super().move(pose, duration_s)
+
+    def home(self) -> None:
+        self.duration_s = LEAST_S
+        super().home()
+
+
+class LinuxcncTwin:
+    """The simulated LinuxCNC."""
+
+    target = Pose(100.0, -200.0, 550.0, 12.5, -3.0, 8.0)
+    out_of_reach = Pose(0.0, 0.0, 2000.0)
+
+    def __init__(self, server: SimulatedController) -> None:
+        self.settings = ControllerSettings(config="machine.ini", port=server.port)
+        self._server = server
+
+    def inject(self, fault: FaultKind, *, on: bool) -> None:
+        match fault:
+            case "unplugged":
+                self._server.set_unplugged(on=on)
+            case "silent":
+                self._server.set_silent(on=on)
+            case _:
+                self._server.state.set_estop(on=on)
+
+
+class TestLinuxcncrsh(ControllerConformance):
+    def driver(self, settings: ControllerSettings) -> Controller:
+        return LinuxcncrshController(settings, timeouts=QUICK)
+
+    @contextmanager
+    def twin(self) -> Iterator[ControllerTwin]:
+        with SimulatedController(MachineInTime(), ControllerSettings(config="machine.ini")) as server:
+            yield LinuxcncTwin(server)

@@ -1,0 +1,126 @@
+"""Our own encoders pass what every driver of encoders must."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+
+import pytest
+
+from drivers.conformance import EncoderConformance, EncoderTwin, served_encoder_twin
+from drivers.controllers.linuxcnc.controller import LinuxcncrshController
+from drivers.encoders.cia406 import Cia406Bank
+from drivers.encoders.of_controller import ControllerScales
+from drivers.interfaces import DeviceIdentity, EncoderBank, EncoderSample, StartupAction
+from drivers.simulated.linuxcnc.server import SimulatedController
+from hexacell.cell.devices import (
+    ControllerSettings,
+    EncoderSettings,
+    LinearEncoderSettings,
+    RotaryEncoderSettings,
+)
+from hexacell.cell.simulation import FaultKind
+from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
+
+TIMEOUT_S = 1.0
+
+
+class Cia406(EncoderConformance):
+    settings: EncoderSettings
+
+    def driver(self, twin: EncoderTwin) -> EncoderBank:
+        return Cia406Bank(twin.settings)
+
+    def twin(self) -> AbstractContextManager[EncoderTwin]:
+        return served_encoder_twin(self.settings)
+
+
+class TestLinear(Cia406):
+    settings = LinearEncoderSettings(timeout_s=TIMEOUT_S, heartbeat_ms=5000)
+
+
+class TestReversedAndOffset(Cia406):
+    settings = LinearEncoderSettings(
+        timeout_s=TIMEOUT_S,
+        heartbeat_ms=5000,
+        direction=(1, -1, 1, -1, 1, -1),
+        offset_mm=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0),
+    )
+
+
+class TestRotary(Cia406):
+    settings = RotaryEncoderSettings(timeout_s=TIMEOUT_S, heartbeat_ms=5000)
+
+
+class MachineThatStands(FakeMachine):
+    """Its joints are where they are put."""
+
+    def stand_at(self, joints: Sequence[float]) -> None:
+        with self._lock:
+            self._joints = tuple(joints)
+
+
+class ControllerTwin:
+    """The scales of a simulated LinuxCNC."""
+
+    def __init__(self, machine: MachineThatStands, server: SimulatedController) -> None:
+        self.stand_at = machine.stand_at
+        self.port = server.port
+        self.settings = LinearEncoderSettings(protocol="controller", measuring_step_nm=1000)
+        self._server = server
+
+    def inject(self, fault: FaultKind, *, on: bool) -> None:
+        {"unplugged": self._server.set_unplugged, "silent": self._server.set_silent}[fault](on=on)
+
+
+class WithItsController:
+    """Encoders that are opened and closed with the controller that has their scales."""
+
+    def __init__(self, twin: ControllerTwin) -> None:
+        settings = ControllerSettings(config="machine.ini", port=twin.port)
+        self._controller = LinuxcncrshController(settings, timeouts=QUICK)
+        self._scales = ControllerScales(twin.settings, self._controller)
+
+    async def open(self) -> tuple[DeviceIdentity, ...]:
+        await self._controller.open()
+        await self._controller.prepare(frozenset(StartupAction))
+        return await self._scales.open()
+
+    async def read(self) -> EncoderSample:
+        return await self._scales.read()
+
+    async def close(self) -> None:
+        await self._scales.close()
+        await self._controller.close()
+
+
+class TestScalesOfAController(EncoderConformance):
+    name = "controller"
+
+    def driver(self, twin: EncoderTwin) -> EncoderBank:
+        assert isinstance(twin, ControllerTwin)
+        return WithItsController(twin)
+
+    @contextmanager
+    def twin(self) -> Iterator[EncoderTwin]:
+        machine = MachineThatStands()
+        with SimulatedController(machine, ControllerSettings(config="machine.ini")) as server:
+            yield ControllerTwin(machine, server)
+
+
+def test_samples_of_two_instants_are_found() -> None:
+    """A driver that reads one encoder after the other fails, although each of its positions is right."""
+
+    class OneAfterTheOther(Cia406Bank):
+        async def read(self) -> EncoderSample:
+            first, then = await super().read(), await super().read()
+            return EncoderSample(
+                (*first.counts[:3], *then.counts[3:]), (*first.positions[:3], *then.positions[3:])
+            )
+
+    class Conformance(TestLinear):
+        def driver(self, twin: EncoderTwin) -> EncoderBank:
+            return OneAfterTheOther(twin.settings)
+
+    with pytest.raises(AssertionError):
+        Conformance().test_a_sample_is_of_one_instant()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -62,11 +62,15 @@ class Devices:
         found = await gather_errors("devices do not answer as they must", calls)
         return tuple(identity for identities in found for identity in identities)
 
-    async def read_gauges(self) -> list[GaugeReading]:
-        """One reading of each gauge, in the order of ``gauges``."""
-        gauges = [mounted.gauge for mounted in self.gauges]
-        calls = [self.live.gauge(gauge.name).of(gauge.read) for gauge in gauges]
-        return await gather_errors("gauges cannot be read", calls)
+    async def read_gauges(self, on_answer: Callable[[], object] = lambda: None) -> list[GaugeReading]:
+        """One reading of each gauge, in the order of ``gauges``; ``on_answer`` is called at each."""
+
+        async def read(gauge: Gauge) -> GaugeReading:
+            reading = await self.live.gauge(gauge.name).of(gauge.read)
+            on_answer()
+            return reading
+
+        return await gather_errors("gauges cannot be read", [read(one.gauge) for one in self.gauges])
 
     async def read_gauge_once(self, gauge: Gauge) -> GaugeReading:
         """See :meth:`Gauge.read_once`."""

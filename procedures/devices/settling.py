@@ -13,7 +13,7 @@ from hexacell.cell.measuring import TimingSettings
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, HexacellError, consists_only_of, flatten_errors
 from hexacell.kinematics.rotations import Array
-from procedures.devices.device_set import Devices
+from procedures.devices.device_set import Devices, gather_errors
 
 LEAST_WINDOWS = 3
 """So many windows' worth of readings are taken before giving up, however long they take."""
@@ -30,11 +30,17 @@ TRIMMED = 8
 
 @dataclass(frozen=True, slots=True)
 class DeviceSnapshot:
-    """All devices read once, one after the other's question: gauges and encoders at ``at_s``."""
+    """All devices read once, at the same time.
+
+    Attributes:
+        at_s: when the last of them had answered, by the cell's clock.
+        skew_s: by how much the first one had answered earlier.
+    """
 
     at_s: float
     gauges: tuple[GaugeReading, ...]
     encoders: EncoderSample
+    skew_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +73,24 @@ def trimmed_mean(readings: Array) -> Array:
 
 
 async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:
-    """Read everything once."""
-    readings = await devices.read_gauges()
-    return DeviceSnapshot(clock.now(), tuple(readings), await devices.read_encoders())
+    """Read everything once: the gauges and a round of the encoders at the same time."""
+    answered_s: list[float] = []
+    gauges: list[GaugeReading] = []
+    encoders: list[EncoderSample] = []
+
+    def note_answer() -> None:
+        answered_s.append(clock.now())
+
+    async def read_gauges() -> None:
+        gauges.extend(await devices.read_gauges(note_answer))
+
+    async def read_encoders() -> None:
+        encoders.append(await devices.read_encoders())
+        note_answer()
+
+    await gather_errors("devices cannot be read", [read_gauges(), read_encoders()])
+    last_s = max(answered_s)
+    return DeviceSnapshot(last_s, tuple(gauges), encoders[0], last_s - min(answered_s))
 
 
 async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> Settled:

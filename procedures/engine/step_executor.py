@@ -56,6 +56,7 @@ from procedures.run.steps import (
 )
 from procedures.run.trips import GuardTripped
 
+SKEW_DECIMALS = 6
 MOST_REFUSALS = 40
 """Of poses of one set by the controller; then its limits are to be looked at, by a person."""
 
@@ -354,4 +355,5 @@ def _raw(snapshots: Sequence[DeviceSnapshot]) -> dict[str, Any]:
     return {
         "answers": tuple(tuple(reading.raw for reading in one.gauges) for one in snapshots),
         "counts": tuple(one.encoders.counts for one in snapshots),
+        "skews_s": tuple(round(one.skew_s, SKEW_DECIMALS) for one in snapshots),
     }

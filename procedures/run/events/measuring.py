@@ -76,7 +76,8 @@ class Reading(Frozen):
     """A settled window of readings.
 
     ``gauges_mm`` and ``spread_mm`` are mean and range along base x, y, z; ``joints`` the mean
-    joint variables. ``answers`` and ``counts`` are the raw readings behind them, in the order taken.
+    joint variables. ``answers`` and ``counts`` are the raw readings behind them, in the order taken;
+    ``skews_s`` is the time from the first to the last answer of each of these, empty up to version 13.
     ``temperatures`` are those of the cell's thermometers just afterwards.
     """
 
@@ -85,6 +86,7 @@ class Reading(Frozen):
     joints: Joints
     answers: tuple[tuple[str, ...], ...]
     counts: tuple[tuple[int, ...], ...]
+    skews_s: tuple[float, ...] = ()
     temperatures: tuple[Temperature, ...] = ()
 
 
@@ -142,6 +144,7 @@ class StandstillRead(Frozen):
     joints: tuple[SixNumbers, ...] = Field(validation_alias=AliasChoices("joints", "joints_mm"))
     answers: tuple[tuple[str, ...], ...]
     counts: tuple[tuple[int, ...], ...]
+    skews_s: tuple[float, ...] = ()
 
 
 class ReferenceRepeated(Frozen):

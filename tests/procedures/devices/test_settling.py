@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
+from typing import cast
 
 import numpy as np
 import pytest
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady
+from drivers.interfaces import EncoderSample, GaugeReading
 from hexacell.cell.measuring import TimingSettings
+from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, ExitCode, SeveralErrors
 from procedures.devices.settling import LEAST_WINDOWS, read_all, settle, trimmed_mean
 
@@ -213,6 +217,43 @@ async def test_a_snapshot_contains_raw_answers_counts_and_positions(bench) -> No
     assert [reading.raw for reading in look.gauges] == ["+0.000", "-1.250", "+0.000"]
     assert look.encoders.counts == (1, 0, 0, 0, 0, -2500)
     assert look.encoders.positions == (0.001, 0.0, 0.0, 0.0, 0.0, -2.5)
+
+
+async def test_encoders_are_read_while_gauges_are_and_the_skew_is_from_the_first_to_the_last(
+    bench, monkeypatch
+) -> None:
+    has_sampled = asyncio.Event()
+
+    class Moments:
+        """A clock that goes on by 10 ms whenever it is read: at each answer."""
+
+        read = 0
+
+        def now(self) -> float:
+            self.read += 1
+            return 5.0 + 0.01 * self.read
+
+    async def read_encoders() -> EncoderSample:
+        has_sampled.set()
+        return EncoderSample((0,) * 6, (0.0,) * 6)
+
+    async def read_gauge() -> GaugeReading:
+        await has_sampled.wait()
+        return GaugeReading(0.5, "+0.500")
+
+    monkeypatch.setattr(bench.encoders, "read", read_encoders)
+    for gauge in bench.gauges:
+        monkeypatch.setattr(gauge, "read", read_gauge)
+    look = await read_all(bench.devices, cast("CellClock", Moments()))
+    assert look.at_s == pytest.approx(5.04)
+    assert look.skew_s == pytest.approx(0.03)
+
+
+async def test_gauges_and_encoders_that_fail_together_are_all_named(bench) -> None:
+    bench.gauges[2].failures = [GaugeSilent("does not answer", subject="gauge z")]
+    bench.encoders.failure = DeviceError("are not open", subject="encoders")
+    with pytest.raises(SeveralErrors, match=r"(?s)gauge z.*encoders"):
+        await read_all(bench.devices, bench.clock)
 
 
 @pytest.mark.parametrize("count", [3, 4, 5, 7, 12])

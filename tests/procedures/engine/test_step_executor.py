@@ -82,7 +82,8 @@ async def test_the_raw_answers_are_kept_in_the_order_taken(station: Station) -> 
     reading = (await station.do(SAMPLE)).reading
     assert set(reading.answers) == {("-1.000", "+2.000", "+3.000")}
     assert set(reading.counts) == {(1000, 2000, 3000, 4000, 5000, 6000)}
-    assert len(reading.answers) == len(reading.counts) >= 5
+    assert len(reading.answers) == len(reading.counts) == len(reading.skews_s) >= 5
+    assert all(skew_s >= 0.0 for skew_s in reading.skews_s)
 
 
 MOUNTINGS = [

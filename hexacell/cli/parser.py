@@ -10,6 +10,7 @@ from hexacell.cli.arguments.operation import add_operation_commands
 from hexacell.cli.arguments.records import add_record_commands
 from hexacell.cli.arguments.results import add_result_commands
 from hexacell.cli.arguments.runs import add_run_commands
+from hexacell.cli.arguments.studies import add_study_commands
 
 EXIT_CODES = """exit codes:
   0 done, within limits            4 an answer or approval is needed
@@ -41,4 +42,5 @@ def make_parser() -> Parser:
     add_record_commands(commands)
     add_result_commands(commands)
     add_operation_commands(commands)
+    add_study_commands(commands)
     return parser

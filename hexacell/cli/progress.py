@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from rich.console import Console as RichConsole
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -57,6 +59,14 @@ class RunProgress:
     def hide(self) -> None:
         """Remove the bar until the next event, so that a question can be shown."""
         self.bar.stop()
+
+
+@contextmanager
+def task_bar(name: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar that is told how many tasks of how many are done."""
+    with _bar() as bar:
+        task = bar.add_task(name, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def is_plain_terminal() -> bool:

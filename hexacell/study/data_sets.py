@@ -6,7 +6,7 @@ deviations are differences of positions.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,9 @@ from hexacell.robot_model import Robot
 
 BATCH = 64
 BATCHES = 60
+
+TurnsOf = Callable[[Array], Array]
+"""Rotations (n, 3, 3) of three angles each (n, 3), rad."""
 
 TRAVEL_SHARE = 0.7
 """Of the gauges' travel, for deviations aimed at."""
@@ -68,8 +71,11 @@ def unlimited_travel(
     random: np.random.Generator,
     *,
     margin: float | None = None,
+    turns_of: TurnsOf = rotations.from_angles,
 ) -> DataSet:
     """Random angles within ``amplitude``, rad, at points (m, 3), mm, as in the paper's simulation.
+
+    ``turns_of`` says what three angles mean.
 
     Every pose is commanded at the point itself and may end far from it, so that gauges of any travel are
     assumed. Poses keep the singularity ``margin``, by default the robot's limit; with 0 they only have
@@ -81,7 +87,9 @@ def unlimited_travel(
     margin = robot.limits.singularity_margin if margin is None else margin
     sets = []
     for point in points:
-        drawn = (_commands(robot, point, turns) for turns in _random_orientations(random, amplitude))
+        drawn = (
+            _commands(robot, point, turns) for turns in _random_orientations(random, amplitude, turns_of)
+        )
         sets.append(_first_reached(robot, truth, point, drawn, orientations, margin))
     return _data_set(robot, sets, orientations)
 
@@ -118,9 +126,11 @@ def _commands(robot: Robot, point: Array, turns: Array) -> PoseBatch:
     return robot.frames.poses(PoseBatch.at(point, turns))
 
 
-def _random_orientations(random: np.random.Generator, amplitude: float) -> Iterator[Array]:
+def _random_orientations(
+    random: np.random.Generator, amplitude: float, turns_of: TurnsOf = rotations.from_angles
+) -> Iterator[Array]:
     for _ in range(BATCHES):
-        yield rotations.from_angles(random.uniform(-amplitude, amplitude, (BATCH, 3)))
+        yield turns_of(random.uniform(-amplitude, amplitude, (BATCH, 3)))
 
 
 def _aimed(

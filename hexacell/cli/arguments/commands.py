@@ -82,3 +82,11 @@ def not_negative(text: str) -> int:
     if number < 0:
         raise ValueError
     return number
+
+
+def positive(text: str) -> int:
+    """A number above zero; raises ``ValueError`` likewise."""
+    number = int(text)
+    if number < 1:
+        raise ValueError
+    return number

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import re
 from typing import Any
 
 import numpy as np
@@ -11,30 +9,15 @@ import numpy as np
 from hexacell.application.reported_run import ReportedRun
 from hexacell.kinematics.rotations import Array
 from hexacell.presentation.calibration_report.blocks import Chapter, Picture
+from hexacell.presentation.svg_drawing import AFTER, BEFORE, INK, SMALLEST_MM, as_svg, new_figure
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 from procedures.run.steps import Phase
-
-SMALLEST_MM = 1e-4
-"""A distance that is drawn on a logarithmic axis is no smaller."""
-
-BEFORE, AFTER, INK = "#b35806", "#2166ac", "#222222"
-"""Apart for colour-blind readers too; the markers differ besides."""
 
 PLACE = (0.12, 0.17, 0.87, 0.72)
 """Of the axes in a figure; to find the best one would draw each figure twice."""
 
 LABELS_PT = 300.0
 """For all labels of parameters side by side; with more of them they are smaller."""
-
-STYLE: dict[Any, Any] = {
-    "svg.hashsalt": "hexacell",
-    "svg.fonttype": "path",
-    "font.family": "sans-serif",
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": INK,
-}
 
 
 def figure_chapter(run: ReportedRun) -> Chapter | None:
@@ -57,7 +40,7 @@ def _deviations(run: ReportedRun) -> Picture | None:
     axes.set_ylabel("deviation of the ball, mm")
     axes.grid(visible=True, axis="y", color="#dddddd", linewidth=0.6)
     axes.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
-    return Picture(_svg(figure), "Distance of the ball from its reference at each held-out pose.")
+    return Picture(as_svg(figure), "Distance of the ball from its reference at each held-out pose.")
 
 
 def _distances(run: ReportedRun, phase: Phase) -> Array:
@@ -91,23 +74,10 @@ def _changes(run: ReportedRun) -> Picture | None:
     names = [parameters.parameters[row].name for row in rows]
     axes.set_xticks(np.arange(len(rows)), names, rotation=90, fontsize=min(9.0, LABELS_PT / len(rows)))
     axes.set_ylabel(f"change, {' or '.join(dict.fromkeys(kind.unit.shown for kind in parameters.kinds))}")
-    return Picture(_svg(figure), "Change of each parameter, with its expanded uncertainty (k = 2).")
+    return Picture(as_svg(figure), "Change of each parameter, with its expanded uncertainty (k = 2).")
 
 
 def _axes() -> tuple[Any, Any]:
-    """A figure without pyplot, which keeps state, and its axes."""
-    from matplotlib import rc_context  # noqa: PLC0415 - half a second that only figures need
-    from matplotlib.figure import Figure  # noqa: PLC0415 - likewise
-
-    with rc_context(STYLE):
-        figure = Figure(figsize=(7.0, 2.8))
-        return figure, figure.add_axes(PLACE)
-
-
-def _svg(figure: Any) -> str:  # noqa: ANN401 - matplotlib is imported where it is used
-    from matplotlib import rc_context  # noqa: PLC0415 - half a second that only figures need
-
-    stream = io.StringIO()
-    with rc_context(STYLE):
-        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
-    return re.sub(r"\A.*?(?=<svg )", "", stream.getvalue(), flags=re.DOTALL)
+    """A figure and its axes."""
+    figure, [axes] = new_figure((7.0, 2.8), PLACE)
+    return figure, axes

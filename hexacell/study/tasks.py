@@ -1,0 +1,67 @@
+"""Independent tasks of a study, by any executor: each has its own seed, so it does not matter who does it.
+
+Where a worker dies, what it and the others had begun is done again; only a task that has ended its worker
+several times is given up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
+from typing import TypeVar
+
+from hexacell.errors import HexacellError
+
+TaskType = TypeVar("TaskType")
+ResultType = TypeVar("ResultType")
+
+MOST_LOSSES = 5
+"""Executors that may break in a row without a single result."""
+
+
+class WorkersLost(HexacellError):
+    """The workers of a study die, whatever they are given."""
+
+
+def results_of(
+    tasks: Mapping[str, TaskType],
+    carry_out: Callable[[TaskType], ResultType],
+    new_executor: Callable[[], Executor],
+    *,
+    done: Collection[str] = (),
+) -> Iterator[tuple[str, ResultType]]:
+    """Each task's key and result as they come, without those that are done already.
+
+    Raises:
+        WorkersLost: executors break one after the other.
+        Exception: whatever a task raises.
+    """
+    left = {key: task for key, task in tasks.items() if key not in done}
+    losses = 0
+    while left:
+        count = len(left)
+        for key, result in _until_broken(left, carry_out, new_executor):
+            del left[key]
+            yield key, result
+        losses = losses + 1 if len(left) == count else 0
+        if losses == MOST_LOSSES:
+            raise WorkersLost(
+                f"{losses} sets of workers ended without a result", action="Give the computer more memory"
+            )
+
+
+def _until_broken(
+    left: Mapping[str, TaskType],
+    carry_out: Callable[[TaskType], ResultType],
+    new_executor: Callable[[], Executor],
+) -> Iterator[tuple[str, ResultType]]:
+    executor = new_executor()
+    keys: dict[Future[ResultType], str] = {}
+    try:
+        keys = {executor.submit(carry_out, task): key for key, task in left.items()}
+        for future in as_completed(keys):
+            yield keys[future], future.result()
+    except BrokenExecutor:
+        return
+    finally:
+        executor.shutdown(wait=True, cancel_futures=True)

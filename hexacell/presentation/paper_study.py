@@ -31,10 +31,11 @@ OPEN = (
     "amplitude, about fixed axes; until a step is below 1e-6 mm."
 )
 NO_GAUGE = (
-    "No dial gauge shows such deviations. `hexacell demo` stays within 12.5 mm of travel, by steps that what is "
-    "known so far allows."
+    "No dial gauge shows such deviations. `hexacell demo` stays within 12.5 mm of travel: it turns the "
+    "platform as far as what is known so far allows."
 )
-HEAD = "  points   without noise: P, ours     with noise: P, ours there, ours   deviation"
+HEAD = f"  {'points':<8} {'without noise: P, ours':<26} {'with noise: P, ours there, ours':<32} deviation"
+SWEEP_HEAD = f"  {'angles':<16} deg {'after steps':<20} {'P, ours there, ours':<24} deviation"
 
 
 def study_lines(study: PaperStudy) -> Iterator[str]:
@@ -75,11 +76,11 @@ def _sweep(study: PaperStudy) -> Iterator[str]:
         "Other orientations: 5 points, 11 orientations, with noise; largest error of a parameter, mm. "
         f"After {steps} steps of the paper's estimator, at its end, and ours as above."
     )
-    yield "  angles            up to    after steps            P, ours there, ours    deviation"
+    yield SWEEP_HEAD
     for one in study.sweep:
         after = " ".join(f"{_number(error):<6}" for error in one.noisy.after_steps_mm)
-        angles = f"{one.angles:<17} {one.amplitude_deg:<2g} deg"
-        yield f"  {angles}   {after}  {_in_full(one.noisy):<22} {_deviation(one)}"
+        angles = f"{one.angles:<16} {one.amplitude_deg:<3g}"
+        yield f"  {angles} {after} {_in_full(one.noisy):<24} {_deviation(one)}"
 
 
 def study_document(study: PaperStudy) -> dict[str, Any]:

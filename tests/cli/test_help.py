@@ -35,11 +35,13 @@ COMMANDS = (
     "notify",
     "serve",
     "cell",
+    "study",
 )
 PAGES = [
     [],
     *([command] for command in COMMANDS),
     *(["cell", action] for action in ("validate", "schema", "show")),
+    ["study", "paper"],
 ]
 
 

@@ -1,0 +1,81 @@
+"""Tasks of a study: by any executor, each once, also where workers die."""
+
+from __future__ import annotations
+
+import os
+import signal
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
+from multiprocessing import get_context, resource_tracker
+from pathlib import Path
+
+import pytest
+
+from hexacell.study.tasks import MOST_LOSSES, WorkersLost, results_of
+
+SQUARES = {str(number): number for number in range(100)}
+
+
+def square(number: int) -> int:
+    return number * number
+
+
+def square_unless_killed(number: int, folder: Path) -> int:
+    """The first to come to 50 ends its process, as one does that has no memory left."""
+    if number == 50 and not (folder / "killed").exists():
+        (folder / "killed").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return square(number)
+
+
+def fail(number: int) -> int:
+    raise ValueError(number)
+
+
+class Broken(Executor):
+    """One whose workers die before they have done anything."""
+
+    def submit(self, function, /, *arguments, **named):
+        future: Future = Future()
+        future.set_exception(BrokenExecutor())
+        return future
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _tracker() -> None:
+    """A process that Python keeps beside all that it spawns."""
+    resource_tracker.ensure_running()
+
+
+@pytest.mark.parametrize(
+    "new_executor", [partial(ThreadPoolExecutor, 3), partial(ProcessPoolExecutor, 2, get_context("spawn"))]
+)
+def test_every_task_is_done_once_by_any_executor(new_executor) -> None:
+    found = list(results_of(SQUARES, square, new_executor))
+    assert len(found) == 100
+    assert dict(found) == {key: number**2 for key, number in SQUARES.items()}
+
+
+def test_what_is_done_already_is_not_done_again() -> None:
+    done = [str(number) for number in range(90)]
+    found = dict(results_of(SQUARES, square, partial(ThreadPoolExecutor, 3), done=done))
+    assert sorted(found) == [str(number) for number in range(90, 100)]
+
+
+def test_tasks_that_a_killed_worker_loses_are_done_again(tmp_path: Path) -> None:
+    carry_out = partial(square_unless_killed, folder=tmp_path)
+    new_executor = partial(ProcessPoolExecutor, 2, get_context("spawn"))
+    found = list(results_of(SQUARES, carry_out, new_executor))
+    assert (tmp_path / "killed").exists()
+    assert len(found) == 100
+    assert dict(found) == {key: number**2 for key, number in SQUARES.items()}
+
+
+def test_workers_that_always_die_end_the_study() -> None:
+    with pytest.raises(WorkersLost, match=f"{MOST_LOSSES} sets of workers ended without a result"):
+        list(results_of(SQUARES, square, Broken))
+
+
+def test_what_a_task_raises_ends_the_study() -> None:
+    with pytest.raises(ValueError, match="0"):
+        list(results_of({"0": 0}, fail, partial(ThreadPoolExecutor, 1)))

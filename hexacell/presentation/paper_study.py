@@ -15,7 +15,7 @@ from hexacell.study.paper_summary import (
     PAPER_NOISY_MM,
     PAPER_TABLE_2_MM,
     STEPS_TOLD,
-    Accuracy,
+    MedianErrors,
     PaperStudy,
     PlannedSet,
 )
@@ -105,7 +105,7 @@ def _set(one: PlannedSet) -> dict[str, Any]:
     return asdict(one) | {"exact": _document(one.exact), "noisy": _document(one.noisy)}
 
 
-def _document(one: Accuracy) -> dict[str, Any]:
+def _document(one: MedianErrors) -> dict[str, Any]:
     after = {
         str(steps): _finite(error) for steps, error in zip(STEPS_TOLD, one.after_steps_mm, strict=True)
     }
@@ -117,14 +117,14 @@ def _finite(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def _accuracy(one: Accuracy) -> str:
+def _accuracy(one: MedianErrors) -> str:
     """Of both estimators: ``1.51 (12), 0.48``."""
     ours = "refused" if one.refused == one.trials else _number(one.ours_mm)
     paper = f"{_number(one.paper_mm)} ({one.settled})" if one.settled else "none"
     return f"{paper}, {ours}"
 
 
-def _in_full(one: Accuracy) -> str:
+def _in_full(one: MedianErrors) -> str:
     """Likewise with ours of the same draws between: ``1.51 (12), 0.48, 0.52``."""
     paper, _, ours = _accuracy(one).rpartition(", ")
     return f"{paper}, {_number(one.ours_there_mm)}, {ours}" if one.settled else f"{paper}, {ours}"

@@ -24,7 +24,7 @@ PAPER_TABLE_2_MM = {"S": 0.172, "B": 0.572, "l": 0.475}
 
 
 @dataclass(frozen=True, slots=True)
-class Accuracy:
+class MedianErrors:
     """Of several draws: medians of the largest error of a parameter, mm.
 
     Attributes:
@@ -46,7 +46,7 @@ class Accuracy:
     after_steps_mm: tuple[float, ...]
 
     @classmethod
-    def of(cls, errors: Sequence[Errors]) -> Accuracy:
+    def of(cls, errors: Sequence[Errors]) -> MedianErrors:
         """Of the draws' errors."""
         settled = [one for one in errors if one.is_settled]
         return cls(
@@ -68,8 +68,8 @@ class PlannedSet:
     orientations: int
     amplitude_deg: float
     angles: Angles
-    exact: Accuracy
-    noisy: Accuracy
+    exact: MedianErrors
+    noisy: MedianErrors
     deviation_mm: float
 
 
@@ -135,8 +135,8 @@ def _sweep_kinds() -> list[Kind]:
 def _set(kind: Kind, outcomes: Sequence[Outcome]) -> PlannedSet:
     return PlannedSet(
         *kind,
-        Accuracy.of([one.exact for one in outcomes]),
-        Accuracy.of([one.noisy for one in outcomes]),
+        MedianErrors.of([one.exact for one in outcomes]),
+        MedianErrors.of([one.noisy for one in outcomes]),
         _median(one.deviation_mm for one in outcomes),
     )
 

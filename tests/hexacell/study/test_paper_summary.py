@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf, isnan
 
 from hexacell.study.paper_simulation import Angles, Errors, Outcome
-from hexacell.study.paper_summary import Accuracy, summary, trials_of
+from hexacell.study.paper_summary import MedianErrors, summary, trials_of
 
 
 def errors(paper: float | None, ours: float | None, *steps: float) -> Errors:
@@ -18,7 +18,7 @@ def errors(paper: float | None, ours: float | None, *steps: float) -> Errors:
 
 
 def test_medians_are_of_the_draws_that_each_estimator_ends() -> None:
-    found = Accuracy.of(
+    found = MedianErrors.of(
         [errors(1.0, 0.5, 3.0, 2.0, 1.0), errors(3.0, 0.7), errors(None, 0.3), errors(2.0, None)]
     )
     assert (found.trials, found.settled, found.refused) == (4, 3, 1)
@@ -27,13 +27,13 @@ def test_medians_are_of_the_draws_that_each_estimator_ends() -> None:
 
 def test_after_some_steps_a_draw_that_came_to_its_end_before_counts_with_that() -> None:
     steps = [9.0, 5.0, 1.0, 0.5]
-    found = Accuracy.of([errors(0.5, 0.1, *steps), errors(0.5, 0.1, *steps), errors(None, 0.1, 7.0)])
+    found = MedianErrors.of([errors(0.5, 0.1, *steps), errors(0.5, 0.1, *steps), errors(None, 0.1, 7.0)])
     assert found.after_steps_mm == (1.0, 0.5, 0.5)
-    assert Accuracy.of([errors(None, 0.1, 7.0)]).after_steps_mm == (inf, inf, inf)
+    assert MedianErrors.of([errors(None, 0.1, 7.0)]).after_steps_mm == (inf, inf, inf)
 
 
 def test_nothing_has_no_median() -> None:
-    assert isnan(Accuracy.of([errors(None, None)]).paper_mm)
+    assert isnan(MedianErrors.of([errors(None, None)]).paper_mm)
 
 
 def test_all_of_it_is_of_its_own_trials() -> None:

@@ -207,22 +207,29 @@ def _split_geometry(folder: Path) -> None:
 
 
 def _running(machine: str, place: Path, edit: Callable[[Path], None] | None = None) -> Iterator[LinuxCNC]:
+    running = configuration(machine, place, f"{machine}.ini", edit)
+    running.start()
+    yield running
+    running.shut_down()
+
+
+def configuration(
+    machine: str, place: Path, ini: str, edit: Callable[[Path], None] | None = None
+) -> LinuxCNC:
+    """A copy of a bundled configuration, with a port of its own; it does not run yet."""
     folder = place / f"linuxcnc-{machine}"
     shutil.copytree(CONFIGURATIONS / folder.name, folder)
     if edit is not None:
         edit(folder)
     port = _free_port()
-    for name, pattern in ((f"{machine}.ini", r"--port \d+"), ("cell.toml", r"port = \d+")):
+    for name, pattern in ((ini, r"--port \d+"), ("cell.toml", r"port = \d+")):
         text = (folder / name).read_text()
         words = re.search(pattern, text)
         assert words is not None
         (folder / name).write_text(text.replace(words[0], f"{words[0].rsplit(maxsplit=1)[0]} {port}"))
     for path in (folder, *folder.iterdir()):
         path.chmod(path.stat().st_mode | 0o777)
-    running = LinuxCNC(folder, f"{machine}.ini", port)
-    running.start()
-    yield running
-    running.shut_down()
+    return LinuxCNC(folder, ini, port)
 
 
 def _free_port() -> int:

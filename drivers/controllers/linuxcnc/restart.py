@@ -6,18 +6,26 @@ is the ``reload_command`` of a cell whose geometry LinuxCNC reads at its start o
 It asks linuxcncrsh, whose port and passwords are in ``[DISPLAY] DISPLAY`` of the INI file, to shut LinuxCNC
 down; starts it in the folder of the INI file, where ``linuxcnc.log`` gets what it prints; and returns when
 linuxcncrsh answers. A LinuxCNC that a service starts is restarted by that service's own command.
+
+LinuxCNC runs as long as its display. Where that is a screen, and linuxcncrsh one of the ``[APPLICATIONS]``
+beside it, the screen is therefore ended: AXIS as LinuxCNC itself does it, any other by SIGTERM, after which
+LinuxCNC may show a window with its messages. It needs a ``DISPLAY`` to come back on.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
+import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import dataclass
+from itertools import count, takewhile
 from pathlib import Path
 
 from hexacell.errors import HexacellError, UsageError
@@ -26,6 +34,16 @@ LOCK = Path("/tmp/linuxcnc.lock")  # noqa: S108 - LinuxCNC's own, there from its
 LOG = "linuxcnc.log"
 ENDED_S, STARTED_S, ANSWER_S, POLL_S = 30.0, 60.0, 2.0, 0.1
 SHOWN_CHARACTERS = 400
+SERVER, AXIS = "linuxcncrsh", "axis"
+
+
+@dataclass(frozen=True)
+class _Configured:
+    """What an INI file starts: linuxcncrsh with its port and passwords, and a screen if there is one."""
+
+    ini: Path
+    server: argparse.Namespace
+    screen: str | None
 
 
 def main() -> int:
@@ -44,11 +62,13 @@ def restart(ini: Path) -> subprocess.Popen[bytes]:
     """End LinuxCNC, if it runs, and start it with an INI file; the process that it is then.
 
     Raises:
-        UsageError: its display is not linuxcncrsh, it does not end, or it does not start.
+        UsageError: it does not start linuxcncrsh, or a screen that cannot come back; it does not end, or it
+            does not start.
         OSError: LinuxCNC is not installed here, or its folder cannot be written.
     """
-    server = _server_of(ini)
-    _wait(lambda: _is_shut_down(server), ENDED_S, "LinuxCNC does not end")
+    configured = _configured_in(ini)
+    server = configured.server
+    _wait(lambda: _is_shut_down(configured), ENDED_S, "LinuxCNC does not end")
     log = ini.with_name(LOG)
     with log.open("wb") as output:
         started = subprocess.Popen(  # noqa: S603 - LinuxCNC's own program
@@ -66,20 +86,43 @@ def restart(ini: Path) -> subprocess.Popen[bytes]:
     return started
 
 
-def _server_of(ini: Path) -> argparse.Namespace:
-    """Port and passwords of linuxcncrsh, with its own defaults."""
+def _configured_in(ini: Path) -> _Configured:
+    program, *options = shlex.split(_variable(ini, "DISPLAY", "DISPLAY")) or [""]
+    display = Path(program).name
+    if display == SERVER:
+        return _Configured(ini, _server_with(options), screen=None)
+    applications = (shlex.split(_variable(ini, "APPLICATIONS", "APP", number)) for number in count(1))
+    for program, *options in takewhile(bool, applications):
+        if Path(program).name == SERVER:
+            _require_screen(display)
+            return _Configured(ini, _server_with(options), screen=display)
+    raise UsageError(
+        f"neither [DISPLAY] DISPLAY nor an [APPLICATIONS] APP of {ini} is {SERVER}",
+        action="Name the INI file that LinuxCNC runs, or restart it by a command of your own",
+    )
+
+
+def _require_screen(display: str) -> None:
+    if not os.environ.get("DISPLAY"):
+        raise UsageError(
+            f"{display} needs a screen, and there is no DISPLAY here",
+            action="Start hexacell on that screen, or restart LinuxCNC by a command of your own",
+        )
+
+
+def _variable(ini: Path, section: str, name: str, number: int = 1) -> str:
+    """The value of a variable, as LinuxCNC finds it; of one that is there often that with this number."""
     done = subprocess.run(  # noqa: S603 - LinuxCNC's own program
-        ["inivar", "-ini", str(ini), "-sec", "DISPLAY", "-var", "DISPLAY"],  # noqa: S607
+        ["inivar", "-ini", str(ini), "-sec", section, "-var", name, "-num", str(number)],  # noqa: S607
         capture_output=True,
         text=True,
         check=False,
     )
-    program, *options = shlex.split(done.stdout) or [""]
-    if Path(program).name != "linuxcncrsh":
-        raise UsageError(
-            f"[DISPLAY] DISPLAY of {ini} is not linuxcncrsh",
-            action="Name the INI file that LinuxCNC runs, or restart it by a command of your own",
-        )
+    return done.stdout
+
+
+def _server_with(options: list[str]) -> argparse.Namespace:
+    """Port and passwords of linuxcncrsh, with its own defaults."""
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("-p", "--port", type=int, default=5007)
     parser.add_argument("-w", "--connectpw", default="EMC")
@@ -102,8 +145,12 @@ def _connected(server: argparse.Namespace) -> socket.socket:
     return connection
 
 
-def _is_shut_down(server: argparse.Namespace) -> bool:
+def _is_shut_down(configured: _Configured) -> bool:
     """Whether it has ended; if not, it is asked to, perhaps again: another client may garble that."""
+    server = configured.server
+    if screens := _screens(configured):
+        _end(configured.screen, screens)
+        return False
     if not _greeting(server):
         return not LOCK.exists()
     with suppress(OSError), _connected(server) as connection:
@@ -111,6 +158,35 @@ def _is_shut_down(server: argparse.Namespace) -> bool:
         while connection.recv(64):
             pass  # until it closes the connection
     return False
+
+
+def _end(screen: str | None, processes: list[int]) -> None:
+    if screen == AXIS:
+        with suppress(subprocess.TimeoutExpired):
+            subprocess.run(["axis-remote", "--quit"], timeout=ANSWER_S, check=False)  # noqa: S607
+        return
+    for process in processes:
+        with suppress(ProcessLookupError):
+            os.kill(process, signal.SIGTERM)
+
+
+def _screens(configured: _Configured) -> list[int]:
+    """The processes of the screen, which LinuxCNC gives the name of its INI file, or of a copy of it."""
+    if configured.screen is None:
+        return []
+    inis = {str(configured.ini), f"{configured.ini}.expanded"}
+    return [
+        process
+        for process, words in _commands()
+        if configured.screen in {Path(word).name for word in words[:2]} and inis & {*words}
+    ]
+
+
+def _commands() -> Iterator[tuple[int, list[str]]]:
+    """Every process of this machine with its command."""
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):  # it has ended meanwhile
+            yield int(path.parent.name), path.read_bytes().decode(errors="replace").split("\0")
 
 
 def _wait(condition: Callable[[], bool], limit_s: float, problem: str) -> None:

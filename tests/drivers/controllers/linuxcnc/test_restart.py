@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -41,7 +42,26 @@ with socket.create_server(("127.0.0.1", {port})) as server:
 note("end")
 lock.unlink()
 """
-INIVAR = "#!/bin/sh\nsed -n 's/^DISPLAY = //p' \"$2\"\n"
+INIVAR = '#!/bin/sh\nsed -n "s/^$6 = //p" "$2" | sed -n "$8p"\n'
+SCREEN = """#!{python}
+import subprocess, sys
+from pathlib import Path
+
+screen = subprocess.Popen(["./{screen}", "-ini", str(Path(sys.argv[-1]).absolute()) + ".expanded"])
+server = subprocess.Popen([str(Path(sys.argv[0]).with_name("server")), *sys.argv[1:]])
+screen.wait()
+Path("notes").write_text(Path("notes").read_text() + "closed\\n")
+server.kill()
+server.wait()
+Path("lock").unlink()
+"""
+WINDOW = """#!{python}
+import os, signal
+from pathlib import Path
+
+Path("window").write_text(str(os.getpid()))
+signal.pause()
+"""
 
 
 class Machine:
@@ -81,7 +101,7 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Machine
     for process in made.started[:-1]:
         process.wait()
     for process in made.started[-1:]:
-        process.kill()
+        os.killpg(process.pid, signal.SIGKILL)
         process.wait()
 
 
@@ -114,8 +134,45 @@ def test_one_that_does_not_end_is_not_started_a_second_time(machine: Machine, mo
 
 def test_another_display_is_refused(machine: Machine) -> None:
     machine.display(program="axis")
-    with pytest.raises(UsageError, match=r"machine\.ini is not linuxcncrsh"):
+    with pytest.raises(
+        UsageError, match=r"neither .* nor an \[APPLICATIONS\] APP of .*\.ini is linuxcncrsh"
+    ):
         restart(machine.ini)
+
+
+@pytest.fixture(params=["axis", "another"])
+def with_screen(machine: Machine, monkeypatch: pytest.MonkeyPatch, request) -> Machine:
+    """LinuxCNC with a screen, which ends with it, and linuxcncrsh as an application beside it."""
+    monkeypatch.setenv("DISPLAY", ":0")
+    (machine.folder / "linuxcnc").rename(machine.folder / "server")
+    for name, text in (
+        ("linuxcnc", SCREEN.format(python=sys.executable, screen=request.param)),
+        (request.param, WINDOW.format(python=sys.executable)),
+        ("axis-remote", f"#!/bin/sh\ncd {machine.folder}\necho $1 >>notes\nkill $(cat window)\n"),
+    ):
+        (machine.folder / name).write_text(text)
+        (machine.folder / name).chmod(0o755)
+    server = f"linuxcncrsh -p {machine.port} -w open -e sesame"
+    machine.ini.write_text(f"DISPLAY = ./{request.param} -x\nAPP = halshow\nAPP = {server}\n")
+    return machine
+
+
+def test_a_screen_beside_linuxcncrsh_is_ended_and_comes_back(with_screen: Machine) -> None:
+    with_screen.restart()
+    assert with_screen.notes == ["begin"]
+    with_screen.restart()
+    is_axis = (with_screen.folder / "axis").exists()
+    quits = {"--quit"} if is_axis else set()
+    assert {*with_screen.notes} - {"begin", "closed"} == quits
+    assert [word for word in with_screen.notes if word not in quits] == ["begin", "closed", "begin"]
+
+
+def test_a_screen_that_could_not_come_back_is_not_ended(with_screen: Machine, monkeypatch) -> None:
+    with_screen.restart()
+    monkeypatch.delenv("DISPLAY")
+    with pytest.raises(UsageError, match="needs a screen, and there is no DISPLAY here"):
+        restart(with_screen.ini)
+    assert with_screen.notes == ["begin"]
 
 
 @pytest.mark.parametrize(

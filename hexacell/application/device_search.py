@@ -13,7 +13,7 @@ from drivers.discovery.gauges import PortFindings, search_port
 from drivers.serial.adapters import SerialPortFound, serial_ports
 from hexacell.plugins import Group, load, names
 
-UNTRIED = frozenset({"request", "stream", "visa", "keyence-dl-rs1a"})
+UNTRIED = frozenset({"request", "stream", "visa", "modbus", "keyence-dl-rs1a"})
 """Protocols that are not tried: the cell file describes them, or the question stops machines (``M0``)."""
 
 

@@ -163,6 +163,24 @@ class VisaSettings(Section):
         return self.ask.replace(CHANNEL_PLACE, str(channel))
 
 
+class ModbusSettings(Section):
+    """Where the position of a gauge of protocol ``modbus`` is, and what it is."""
+
+    device: int = Field(1, ge=1, le=247, description="address of the device on the line")
+    register_: int = Field(
+        alias="register", ge=0, le=65535, description="its first register, counted from 0"
+    )
+    kind: Literal["input", "holding"] = Field("input", description="function 4 or 3")
+    type: Literal["int16", "uint16", "int32", "uint32", "float32"] = Field(
+        "int32", description="of the number, in one or two registers"
+    )
+    word_order: Literal["big", "little"] = Field("big", description="which of two registers comes first")
+    mm_per_unit: Positive = Field(0.001, description="what a count is, mm")
+    at_end: tuple[int, ...] = Field(
+        (), max_length=8, description="numbers that mean an end of the travel, or no value"
+    )
+
+
 WITH_CHANNELS = frozenset({"mux10", "uwave", "mitutoyo-id-h", "keyence-dl-rs1a"})
 """Protocols in which several gauges share a port."""
 
@@ -210,6 +228,7 @@ class GaugeSettings(Section):
     request: RequestSettings | None = Field(None, description="of protocol request: what is asked")
     stream: StreamSettings | None = Field(None, description="of protocol stream: what it sends")
     visa: VisaSettings | None = Field(None, description="of protocol visa: what it is asked")
+    modbus: ModbusSettings | None = Field(None, description="of protocol modbus: where it is")
     certificate: CertificateSettings | None = Field(None, description="of its calibration")
 
     @model_validator(mode="after")
@@ -221,8 +240,15 @@ class GaugeSettings(Section):
     @property
     def shares_line(self) -> bool:
         """Whether others may be on its port, told apart by their channels."""
+        if self.modbus is not None:
+            return True
         described = self.stream or self.visa
         return self.protocol in WITH_CHANNELS or (described is not None and described.has_channel)
+
+    @property
+    def place_on_line(self) -> int:
+        """What tells it from others on its port: its channel, or the register of its device."""
+        return self.channel if self.modbus is None else self.modbus.device << 16 | self.modbus.register_
 
     @property
     def mounting(self) -> GaugeAxis:

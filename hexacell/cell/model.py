@@ -136,7 +136,7 @@ class CellSettings(Section):
             raise broken_rule("the three gauges must measure x, y and z, one each", "Correct their axis")
         if len({gauge.name for gauge in gauges}) != 3:
             raise broken_rule("two gauges have the same name", "Give each another name")
-        inputs = [(gauge.port, gauge.channel) for gauge in gauges if gauge.port is not None]
+        inputs = [(gauge.port, gauge.place_on_line) for gauge in gauges if gauge.port is not None]
         if len(set(inputs)) != len(inputs):
             raise broken_rule("two gauges have the same port and channel", "Correct one of them")
         return gauges

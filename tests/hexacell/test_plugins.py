@@ -20,6 +20,7 @@ GAUGES = (
     "heidenhain-nd",
     "keyence-dl-rs1a",
     "mitutoyo-id-h",
+    "modbus",
     "mux10",
     "request",
     "stream",

@@ -12,6 +12,7 @@ from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
 from drivers.simulated.gauges.instruments import INSTRUMENTS as ASKED
 from drivers.simulated.gauges.instruments import Instrument
 from drivers.simulated.gauges.line_faults import LATE_TIMEOUTS, LineFault, LineFaults
+from drivers.simulated.gauges.modbus import Modbus
 from drivers.simulated.gauges.scpi import Scpi, visa_resource
 from drivers.simulated.gauges.server import GaugeLineServer
 from drivers.simulated.gauges.uwave import Uwave
@@ -20,6 +21,7 @@ from drivers.simulated.served_device import Closeable, Switch
 from hexacell.cell.devices import (
     DescribedFrame,
     GaugeSettings,
+    ModbusSettings,
     RequestSettings,
     StreamSettings,
     VisaSettings,
@@ -39,7 +41,7 @@ INSTRUMENTS: Mapping[str, type[Instrument]] = {
 }
 """By the protocol in the cell file."""
 
-DESCRIBED = ("request", "stream", "visa")
+DESCRIBED = ("request", "stream", "visa", "modbus")
 """Protocols whose instruments the cell file describes."""
 
 InstrumentFactory = Callable[[Mapping[int, Indicator]], Instrument]
@@ -49,7 +51,7 @@ InstrumentFactory = Callable[[Mapping[int, Indicator]], Instrument]
 def simulated_instrument(
     protocol: str,
     indicators: Mapping[int, Indicator],
-    described: DescribedFrame | VisaSettings | None = None,
+    described: DescribedFrame | VisaSettings | ModbusSettings | None = None,
 ) -> Instrument:
     """An instrument with ``protocol``, with ``indicators`` by channel; of this program or of a plug-in.
 
@@ -63,6 +65,8 @@ def simulated_instrument(
         return Streaming(indicators, described)
     if protocol == "visa" and isinstance(described, VisaSettings):
         return Scpi(indicators, described)
+    if protocol == "modbus" and isinstance(described, ModbusSettings):
+        return Modbus(indicators, described)
     if protocol in INSTRUMENTS:
         return INSTRUMENTS[protocol](indicators)
     others = names(Group.SIMULATED_GAUGES)
@@ -151,7 +155,7 @@ class SimulatedGaugeBank(Closeable):
             own(indicators)
             if own
             else simulated_instrument(
-                first.protocol, indicators, first.request or first.stream or first.visa
+                first.protocol, indicators, first.request or first.stream or first.visa or first.modbus
             )
         )
         name = "-".join(gauge.name for gauge in group)
@@ -175,7 +179,7 @@ def _switch_on(line: GaugeLineServer, channel: int, *, on: bool) -> None:
 
 
 def _channel(gauge: GaugeSettings) -> int:
-    return gauge.channel if gauge.shares_line else 1
+    return gauge.place_on_line if gauge.shares_line else 1
 
 
 def _by_line(gauges: Sequence[GaugeSettings]) -> list[list[GaugeSettings]]:

@@ -30,6 +30,11 @@ class Instrument(ABC):
     def __init__(self, indicators: Mapping[int, Indicator]) -> None:
         self.indicators = dict(indicators)
 
+    def split(self, received: bytes) -> tuple[list[bytes], bytes]:
+        """Whole commands among received bytes, without their ends, and the rest."""
+        *commands, rest = received.split(self.command_end)
+        return [command.strip(b"\n") for command in commands], rest
+
     @abstractmethod
     def answer(self, command: bytes) -> bytes:
         """The answer to ``command``, without its end."""

@@ -122,10 +122,10 @@ class GaugeLineServer(Closeable):
                 done.set_result(None)
 
     def _receive(self, data: bytes) -> None:
-        *commands, self._received = (self._received + data).split(self.instrument.command_end)
+        commands, self._received = self.instrument.split(self._received + data)
         self._received = self._received[-COMMAND_LIMIT:]
         for command in commands:
-            self._answer(command.strip(b"\n"))
+            self._answer(command)
 
     def _answer(self, command: bytes) -> None:
         answer = self.instrument.answer(command)

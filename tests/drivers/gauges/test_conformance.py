@@ -11,6 +11,7 @@ from drivers.gauges.digimatic_usb import DigimaticUsbGauge
 from drivers.gauges.heidenhain_nd import HeidenhainGauge
 from drivers.gauges.keyence_dl_rs1a import KeyenceGauge
 from drivers.gauges.mitutoyo_id_h import IdHGauge
+from drivers.gauges.modbus import ModbusGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.request import RequestGauge
 from drivers.gauges.stream import StreamGauge
@@ -89,3 +90,9 @@ class TestVisa(OfProtocol):
     tolerance_mm = 1e-6
     protocol, factory = "visa", VisaGauge
     more = {"visa": {"ask": "MEAS:DIST?", "mm_per_unit": 1000.0}}  # noqa: RUF012
+
+
+class TestModbus(OfProtocol):
+    protocol, factory = "modbus", ModbusGauge
+    # a pseudo-terminal refuses the parity of a port that is opened again
+    more = {"modbus": {"device": 3, "register": 100}, "serial": {"parity": "N"}}  # noqa: RUF012

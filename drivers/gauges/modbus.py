@@ -1,0 +1,66 @@
+"""Gauges and linear encoders with Modbus RTU in place of a dial indicator: a number in registers.
+
+The section ``modbus`` of the gauge says where it is and what a count of it is. Frames have a CRC-16; a late
+answer cannot be told from that to the next request, so the line is silent for a while after a time-out.
+"""
+
+from __future__ import annotations
+
+import struct
+
+from drivers.gauges.modbus_port import HOLDING, INPUT, REQUEST, ModbusPort
+from drivers.gauges.plausibility import decimals_of
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
+from drivers.gauges.value_only import ValueOnlyGauge
+from drivers.serial.request_port import PortFactory
+from drivers.serial.shared_port import SharedSerialPorts
+from hexacell.cell.devices import GaugeSettings
+from hexacell.errors import FileError
+
+FORMATS = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
+FUNCTIONS = {"holding": HOLDING, "input": INPUT}
+WORD = 2
+
+
+class ModbusGauge(ValueOnlyGauge):
+    """A length in the registers of a Modbus device; several may share a line."""
+
+    terminator = b""
+    port_factory: PortFactory = ModbusPort
+    spec = ProtocolSpec("modbus", "Modbus register", LineSettings(19200, parity="E"), "00 01 86 a0")
+
+    def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
+        super().__init__(settings, ports)
+        if settings.modbus is None:
+            raise FileError(
+                "does not say in which register it is",
+                subject=self.subject,
+                action="Add modbus = { register = ... } to the gauge",
+            )
+        self._modbus = settings.modbus
+        self._format = struct.Struct(FORMATS[self._modbus.type])
+        self.channel = settings.place_on_line
+        self.value_request = REQUEST.pack(
+            self._modbus.device,
+            FUNCTIONS[self._modbus.kind],
+            self._modbus.register_,
+            self._format.size // WORD,
+        )
+        resolution = settings.resolution_mm or 0.001
+        self._decimals = decimals_of(
+            resolution if self._modbus.type == "float32" else self._modbus.mm_per_unit
+        )
+
+    def _parse_value(self, frame: bytes) -> DisplayedValue:
+        if len(frame) != self._format.size:
+            raise FrameRejected(frame)
+        words = [frame[start : start + WORD] for start in range(0, len(frame), WORD)]
+        if self._modbus.word_order == "little":
+            words.reverse()
+        [number] = self._format.unpack(b"".join(words))
+        if number in self._modbus.at_end:
+            raise self._at_end(f"shows {number}, as at an end of its travel")
+        if number != number:  # noqa: PLR0124 - what is no number differs from itself
+            raise FrameRejected(frame)
+        text = f"{frame.hex(' ', WORD)} = {number:g}"
+        return DisplayedValue(number * self._modbus.mm_per_unit, self._decimals, Unit.MM, text)

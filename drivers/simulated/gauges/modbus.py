@@ -1,0 +1,81 @@
+"""Simulated Modbus RTU devices on one line, each register with an indicator."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from typing import ClassVar
+
+from drivers.simulated.gauges.indicator import MM_PER_INCH, Indicator
+from drivers.simulated.gauges.instruments import Instrument
+from hexacell.cell.devices import ModbusSettings
+
+REQUEST_BYTES = 8
+ILLEGAL_ADDRESS = 2
+POLYNOMIAL = 0xA001
+PACKED = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
+
+
+def crc(data: bytes) -> bytes:
+    """CRC-16 of the Modbus over Serial Line specification, 2.5.1.2: low byte first."""
+    register = 0xFFFF
+    for byte in data:
+        register ^= byte
+        for _ in range(8):
+            register = register >> 1 ^ POLYNOMIAL if register & 1 else register >> 1
+    return struct.pack("<H", register)
+
+
+class Modbus(Instrument):
+    """Answers requests of one number, not damaged ones; ``settings`` are those of any of its gauges."""
+
+    baudrate: ClassVar[int] = 19200
+    bits_a_byte: ClassVar[int] = 11
+    at_end: ClassVar[bytes] = b""
+
+    def __init__(self, indicators: Mapping[int, Indicator], settings: ModbusSettings) -> None:
+        super().__init__(indicators)
+        self._settings = settings
+
+    def split(self, received: bytes) -> tuple[list[bytes], bytes]:
+        """Whole requests with a right checksum; bytes that begin none are dropped."""
+        requests = []
+        while len(received) >= REQUEST_BYTES:
+            head = received[:REQUEST_BYTES]
+            if crc(head[:-2]) == head[-2:]:
+                requests.append(head)
+                received = received[REQUEST_BYTES:]
+            else:
+                received = received[1:]
+        return requests, received
+
+    def answer(self, command: bytes) -> bytes:
+        """The registers, or an exception; nothing if no device has that address."""
+        device, function, register, _count = struct.unpack(">BBHH", command[:-2])
+        place = device << 16 | register
+        if device not in {known >> 16 for known in self.indicators}:
+            return b""
+        if place not in self.indicators:
+            body = bytes((device, function | 0x80, ILLEGAL_ADDRESS))
+            return body + crc(body)
+        if not self.indicators[place].powered:
+            return b""
+        data = self._value(place)
+        body = bytes((device, function, len(data))) + data
+        return body + crc(body)
+
+    def _value(self, channel: int) -> bytes:
+        shown, settings = self.indicators[channel].shown(), self._settings
+        if shown is None:
+            number: float = settings.at_end[0] if settings.at_end else 0
+        else:
+            number = shown * (MM_PER_INCH if self.indicators[channel].inch else 1.0) / settings.mm_per_unit
+        is_float = settings.type == "float32"
+        data = struct.pack(PACKED[settings.type], number if is_float else round(number))
+        return data[2:] + data[:2] if settings.word_order == "little" else data
+
+    @staticmethod
+    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
+        """A micrometre a count."""
+        del inch
+        return struct.pack(">i", round(1000 * value))

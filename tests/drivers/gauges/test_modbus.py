@@ -1,0 +1,212 @@
+"""Gauges with Modbus RTU on pseudo-terminals: registers, words, exceptions, faults of the line."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from drivers.errors import GaugeAtEnd, GaugeSilent, PortLost
+from drivers.gauges.modbus import ModbusGauge
+from drivers.serial.shared_port import SharedSerialPorts
+from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_instrument
+from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.modbus import crc
+from drivers.wire_trace import WireTrace
+from hexacell.cell.devices import GaugeSettings, ModbusSettings
+from hexacell.cell.simulation import SimulatedGauges
+from hexacell.clock import CellClock
+from hexacell.errors import DeviceError, FileError, UsageError
+
+WORST_LATENCY_S = 0.2
+FAST = 100.0
+
+
+class Bench:
+    """Three gauges on one line, at 1, 2 and 3 mm: two registers of device 7, one of device 8."""
+
+    def __init__(self, transport: str = "pty", **modbus: Any) -> None:
+        self.balls = {"x": 1.0, "y": 2.0, "z": 3.0}
+        places = {"x": (7, 100), "y": (7, 102), "z": (8, 100)}
+        gauges = [
+            GaugeSettings(
+                name=name,
+                axis=name,
+                protocol="modbus",
+                timeout_s=0.5,
+                modbus=ModbusSettings.model_validate({"device": device, "register": register, **modbus}),
+            )
+            for name, (device, register) in places.items()
+        ]
+        plungers = {name: lambda name=name: self.balls[name] for name in self.balls}
+        simulated = SimulatedGauges.model_validate({"transport": transport})
+        self.bank = SimulatedGaugeBank(gauges, plungers, simulated, CellClock(FAST))
+        self.trace = WireTrace()
+        self.ports = SharedSerialPorts(trace=self.trace, worst_latency_s=WORST_LATENCY_S)
+        self.gauges = [ModbusGauge(gauge, self.ports) for gauge in self.bank.gauges]
+
+    def driver(self, **modbus: Any) -> ModbusGauge:
+        """One for another place than there is."""
+        gauge = self.bank.gauges[0]
+        found = ModbusSettings.model_validate({"device": 7, "register": 100, **modbus})
+        return ModbusGauge(gauge.model_copy(update={"modbus": found}), self.ports)
+
+
+@contextmanager
+def bench(**modbus: Any) -> Iterator[Bench]:
+    made = Bench(**modbus)
+    try:
+        yield made
+    finally:
+        made.bank.close()
+
+
+def test_the_checksum_of_the_simulation_is_that_of_the_specification():
+    assert crc(bytes.fromhex("02 07")) == bytes.fromhex("41 12")
+    assert crc(bytes.fromhex("01 04 00 00 00 02")) == bytes.fromhex("71 cb")
+
+
+@pytest.mark.parametrize("transport", ["pty", "socket"])
+async def test_three_gauges_on_one_line_are_read_at_once(transport):
+    with bench(transport=transport) as cell:
+        for gauge in cell.gauges:
+            await gauge.open()
+        cell.balls["y"] = -2.125
+        readings = await asyncio.gather(*(gauge.read() for gauge in cell.gauges))
+        assert [reading.value_mm for reading in readings] == pytest.approx([1.0, -2.125, 3.0])
+        assert readings[0].raw == "0000 03e8 = 1000"
+        for gauge in cell.gauges:
+            await gauge.check()
+            await gauge.close()
+
+
+async def test_the_frames_are_those_of_the_specification_and_in_the_trace():
+    with bench() as cell:
+        await cell.gauges[0].open()
+        await cell.gauges[0].close()
+        frames = [entry.data for entry in cell.trace.entries()]
+        request = bytes.fromhex("07 04 00 64 00 02")
+        answer = bytes.fromhex("07 04 04 00 00 03 e8")
+        assert frames[0] == request + crc(request)
+        assert b"".join(frames[1:]).startswith(answer + crc(answer))
+
+
+@pytest.mark.parametrize(
+    "modbus",
+    [
+        {"word_order": "little"},
+        {"kind": "holding"},
+        {"type": "int16", "mm_per_unit": 0.01},
+        {"type": "float32", "mm_per_unit": 1.0},
+        {"type": "float32", "mm_per_unit": 1000.0, "word_order": "little"},
+    ],
+)
+async def test_numbers_are_what_the_cell_file_says(modbus):
+    with bench(**modbus) as cell:
+        cell.balls["x"] = -1.5
+        await cell.gauges[0].open()
+        assert (await cell.gauges[0].read()).value_mm == pytest.approx(-1.5)
+        await cell.gauges[0].close()
+
+
+async def test_a_register_that_is_not_there_is_told():
+    message = r"device 7 answers exception 2 \(illegal data address\)"
+    with bench() as cell, pytest.raises(DeviceError, match=message):
+        await cell.driver(register=999).open()
+
+
+async def test_a_device_that_is_not_there_is_silent():
+    with bench() as cell, pytest.raises(GaugeSilent, match="gauge x: does not answer within"):
+        await cell.driver(device=99).open()
+
+
+async def test_a_number_that_means_an_end_is_told():
+    with bench(at_end=(0x7FFFFFFF,)) as cell:
+        await cell.gauges[0].open()
+        cell.bank.faults("x")["at its end"](on=True)
+        with pytest.raises(GaugeAtEnd, match="gauge x: shows 2147483647, as at an end"):
+            await cell.gauges[0].read()
+        await cell.gauges[0].close()
+
+
+@pytest.mark.parametrize("fault", ["damaged", "cut short", "repeated"])
+async def test_faults_of_the_line_change_no_value(fault):
+    with bench() as cell:
+        await cell.gauges[0].open()
+        cell.bank.faults("x")[fault](on=True)
+        for step in range(6):
+            cell.balls["x"] = 0.25 * step
+            assert (await cell.gauges[0].read()).value_mm == pytest.approx(0.25 * step)
+        await cell.gauges[0].close()
+
+
+async def test_a_late_answer_is_not_that_of_the_next_request():
+    with bench() as cell:
+        [x, *_] = cell.gauges
+        await x.open()
+        cell.bank.faults("x")["late"](on=True)
+        with pytest.raises(GaugeSilent):
+            await _read_often(x)
+        cell.bank.faults("x")["late"](on=False)
+        cell.balls["x"] = 1.75
+        assert (await x.read()).value_mm == pytest.approx(1.75)
+        await x.close()
+
+
+async def _read_often(gauge: ModbusGauge) -> None:
+    for _ in range(6):
+        await gauge.read()
+
+
+@given(st.integers(-(2**31), 2**31 - 1), st.sampled_from(["big", "little"]))
+def test_what_the_simulated_device_holds_is_understood(count, order):
+    found = ModbusSettings.model_validate({"register": 0, "word_order": order, "mm_per_unit": 1.0})
+    gauge = ModbusGauge(
+        GaugeSettings(name="x", axis="x", protocol="modbus", modbus=found), SharedSerialPorts()
+    )
+    indicator = Indicator(lambda: float(count), travel_mm=1e10)
+    twin = simulated_instrument("modbus", {1 << 16: indicator}, found)
+    request = bytes.fromhex("01 04 00 00 00 02")
+    assert gauge._parse_value(twin.answer(request + crc(request))[3:-2]).value == count
+
+
+async def test_a_line_that_is_not_there_is_told():
+    settings = GaugeSettings(
+        name="x",
+        axis="x",
+        protocol="modbus",
+        port="/dev/nowhere",
+        modbus=ModbusSettings.model_validate({"register": 0}),
+    )
+    with pytest.raises(PortLost, match="gauge x: port /dev/nowhere cannot be opened"):
+        await ModbusGauge(settings, SharedSerialPorts()).open()
+
+
+async def test_without_the_extra_the_command_that_installs_it_is_told(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pymodbus", None)
+    with bench() as cell, pytest.raises(UsageError, match=r"Type: pip install 'hexacell\[modbus\]'"):
+        await cell.gauges[0].open()
+
+
+def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file():
+    with pytest.raises(FileError, match="gauge x: does not say in which register"):
+        ModbusGauge(GaugeSettings(name="x", axis="x", protocol="modbus"), SharedSerialPorts())
+
+
+@pytest.mark.parametrize("change", [{"device": 0}, {"device": 248}, {"register": 65536}, {"type": "int8"}])
+def test_places_that_cannot_be_are_refused(change):
+    with pytest.raises(ValidationError):
+        ModbusSettings.model_validate({"register": 0, **change})
+
+
+def test_the_library_is_not_imported_with_the_driver():
+    code = "import sys, drivers.gauges.modbus; sys.exit('pymodbus' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -26,6 +26,9 @@ from hexacell.errors import HexacellError
 from hexacell.kinematics.parameters import JointUnit
 
 TIMEOUT_S = 0.5
+FIRST_RESPONSE_S = 2.0
+"""Longest wait for the first node: on a busy computer an adapter takes its time."""
+
 SLCAN_LINE = {"baudrate": 115200}
 SLCAN_VERSION = re.compile(rb"V[0-9A-Fa-f]{4}\r")
 NETWORK_DEVICES = Path("/sys/class/net")
@@ -76,9 +79,7 @@ def search_bus(bus: Mapping[str, Any]) -> BusFindings:
     """The nodes that answer on a bus, by node id."""
     try:
         with _opened(bus) as opened:
-            opened.network.scanner.search()
-            opened.listen(TIMEOUT_S)
-            ids = sorted(set(opened.network.scanner.nodes))
+            ids = _responding(opened)
             return BusFindings(bus, tuple(_described(opened, node) for node in ids))
     except HexacellError as error:
         return BusFindings(bus, problem=str(error))
@@ -88,6 +89,16 @@ def search_bus(bus: Mapping[str, Any]) -> BusFindings:
 def _opened(bus: Mapping[str, Any]) -> Iterator[EncoderBus]:
     with closing(EncoderBus(bus, threading.Event())) as opened:
         yield opened
+
+
+def _responding(bus: EncoderBus) -> list[int]:
+    """The nodes that respond to a question to each: until no further one does for a while."""
+    scanner = bus.network.scanner
+    scanner.search()
+    bus.wait_for(lambda: bool(scanner.nodes), FIRST_RESPONSE_S)
+    while bus.wait_for(lambda known=set(scanner.nodes): set(scanner.nodes) != known, TIMEOUT_S):  # type: ignore[misc]
+        pass
+    return sorted(set(scanner.nodes))
 
 
 def _described(bus: EncoderBus, number: int) -> FoundNode:

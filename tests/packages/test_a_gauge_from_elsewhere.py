@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from tests.cli.cell_folder import QUICK, copy_cell
 from tests.packages.conftest import Install
+from tests.packages.own_suite import run_own_suite
 from tests.packages.test_a_mechanism_from_elsewhere import hexacell
 
 PACKAGE = Path(__file__).parent / "counter_gauge"
@@ -24,19 +21,7 @@ def installed(install: Install) -> Path:
 
 
 def test_it_passes_what_every_gauge_must(installed: Path, tmp_path: Path) -> None:
-    tests = shutil.copytree(PACKAGE, tmp_path / "package", ignore=shutil.ignore_patterns("hexacell_*"))
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-c", "/dev/null"]
-    environment = {**os.environ, "PYTHONPATH": str(installed)}
-    ended = subprocess.run(
-        [*command, str(tests / "test_hexacell_counter.py")],
-        env=environment,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert ended.returncode == 0, ended.stdout + ended.stderr
-    assert " passed" in ended.stdout
+    run_own_suite(PACKAGE, installed, tmp_path)
 
 
 def test_devices_finds_what_is_served_by_its_twin(installed: Path, tmp_path: Path) -> None:

@@ -22,7 +22,8 @@ from drivers.encoders.threaded_bank import ThreadedBank
 from drivers.errors import InvalidSampleError, SilentNodeError
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from drivers.wire_trace import TraceRecorder
-from hexacell.cell.devices import DbcSettings, EncoderSettings
+from hexacell.cell.described_devices import DbcSettings
+from hexacell.cell.devices import EncoderSettings
 from hexacell.errors import DeviceError, UsageError
 
 PROTOCOL = "dbc"
@@ -144,9 +145,7 @@ class DbcSession:
 
     def _fresh_positions(self) -> tuple[float, ...]:
         """The positions of legs 1 to 6 that came after now, within the window."""
-        if self._described.request is not None:
-            self._request(self._described.request)
-        since_s = time.monotonic() + self._described.delay_s
+        since_s = self._ask()
         complete = self._bus.wait_for(lambda: self._is_complete(since_s), self._settings.timeout_s)
         with self._bus.condition:
             latest = dict(self._latest)
@@ -161,9 +160,14 @@ class DbcSession:
             raise self._scattered(latest)
         return tuple(latest[signal.leg].position for signal in self._database.signals)
 
-    def _request(self, frame: str) -> None:
-        number, _, data = frame.partition("#")
+    def _ask(self) -> float:
+        """Send the request, if there is one; the time from which on frames have positions of after now."""
+        now = time.monotonic()
+        if self._described.request is None:
+            return now + self._described.delay_s
+        number, _, data = self._described.request.partition("#")
         self._bus.network.send_message(int(number, 16), bytes.fromhex(data))
+        return now
 
     def _is_complete(self, since_s: float) -> bool:
         """Whether all six came, within the window; or one that is a fault."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from drivers.extras import optional
-from hexacell.cell.devices import DbcSettings
+from hexacell.cell.described_devices import DbcSettings
 from hexacell.errors import FileError, did_you_mean
 from hexacell.kinematics.parameters import JointUnit
 

@@ -6,7 +6,7 @@ import re
 
 from drivers.gauges.plausibility import decimals_of
 from drivers.gauges.protocol import DisplayedValue, Unit
-from hexacell.cell.devices import NUMBER, DescribedFrame
+from hexacell.cell.described_devices import NUMBER, DescribedFrame
 
 
 def described_value(text: str, described: DescribedFrame) -> DisplayedValue | None:

@@ -24,7 +24,8 @@ from drivers.simulated.gauges.bank import simulated_instrument
 from drivers.simulated.gauges.indicator import Indicator
 from drivers.wire_trace import WireTrace
 from hexacell.application.device_setup import gauge_with_agreement
-from hexacell.cell.devices import GaugeSettings, RequestSettings
+from hexacell.cell.described_devices import RequestSettings
+from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.measuring import NoiseSettings, TimingSettings
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, HexacellError, flatten_errors

@@ -11,7 +11,8 @@ import pytest
 from serial.tools import list_ports
 
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
-from hexacell.cell.devices import GaugeSettings, StreamSettings, VisaSettings
+from hexacell.cell.described_devices import StreamSettings, VisaSettings
+from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock

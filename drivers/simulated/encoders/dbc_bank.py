@@ -10,7 +10,8 @@ from typing import Any
 from drivers.encoders.dbc_signals import PositionSignal, read_database
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
 from drivers.simulated.served_device import Closeable, Switch
-from hexacell.cell.devices import DbcSettings, EncoderSettings
+from hexacell.cell.described_devices import DbcSettings
+from hexacell.cell.devices import EncoderSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.errors import FileError
 

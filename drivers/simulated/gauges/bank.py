@@ -18,14 +18,14 @@ from drivers.simulated.gauges.server import GaugeLineServer
 from drivers.simulated.gauges.uwave import Uwave
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.served_device import Closeable, Switch
-from hexacell.cell.devices import (
+from hexacell.cell.described_devices import (
     DescribedFrame,
-    GaugeSettings,
     ModbusSettings,
     RequestSettings,
     StreamSettings,
     VisaSettings,
 )
+from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import FaultKind, SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import FileError

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from drivers.simulated.gauges.indicator import Indicator
 from drivers.simulated.gauges.instruments import Instrument, SingleIndicator
-from hexacell.cell.devices import DescribedFrame, RequestSettings, StreamSettings
+from hexacell.cell.described_devices import DescribedFrame, RequestSettings, StreamSettings
 
 
 class ByRequest(SingleIndicator):

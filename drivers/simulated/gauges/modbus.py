@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from drivers.simulated.gauges.indicator import MM_PER_INCH, Indicator
 from drivers.simulated.gauges.instruments import Instrument
-from hexacell.cell.devices import ModbusSettings
+from hexacell.cell.described_devices import ModbusSettings
 
 REQUEST_BYTES = 8
 ILLEGAL_ADDRESS = 2

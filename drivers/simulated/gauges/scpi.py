@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from drivers.simulated.gauges.indicator import MM_PER_INCH, Indicator
 from drivers.simulated.gauges.instruments import Instrument
-from hexacell.cell.devices import VisaSettings
+from hexacell.cell.described_devices import VisaSettings
 
 SOCKET = re.compile(r"socket://([\w.]+):(\d+)")
 

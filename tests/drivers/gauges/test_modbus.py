@@ -21,7 +21,8 @@ from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_instrume
 from drivers.simulated.gauges.indicator import Indicator
 from drivers.simulated.gauges.modbus import crc
 from drivers.wire_trace import WireTrace
-from hexacell.cell.devices import GaugeSettings, ModbusSettings
+from hexacell.cell.described_devices import ModbusSettings
+from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, FileError, UsageError

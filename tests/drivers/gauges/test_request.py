@@ -13,7 +13,8 @@ from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import simulated_instrument
 from drivers.simulated.gauges.indicator import Indicator
-from hexacell.cell.devices import GaugeSettings, RequestSettings
+from hexacell.cell.described_devices import RequestSettings
+from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError
 
 ID_H = {

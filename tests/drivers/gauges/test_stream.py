@@ -13,7 +13,8 @@ from drivers.gauges.streaming import Origin
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import simulated_instrument
 from drivers.simulated.gauges.indicator import Indicator
-from hexacell.cell.devices import GaugeSettings, StreamSettings
+from hexacell.cell.described_devices import StreamSettings
+from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError
 from tests.drivers.gauges.streaming_line import StreamingLine
 

@@ -15,7 +15,8 @@ from drivers.errors import GaugeAtEnd, GaugeSilent, PortLost, WrongAnswer, Wrong
 from drivers.gauges.visa import VisaGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
-from hexacell.cell.devices import GaugeSettings, VisaSettings
+from hexacell.cell.described_devices import VisaSettings
+from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, FileError, UsageError

@@ -22,7 +22,8 @@ from drivers.encoders.dbc import DbcBank
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
-from hexacell.cell.devices import DbcSettings, LinearEncoderSettings
+from hexacell.cell.described_devices import DbcSettings
+from hexacell.cell.devices import LinearEncoderSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError

@@ -52,7 +52,7 @@ async def test_a_sample_is_newer_than_its_request(simulated):
 
 
 async def test_encoders_that_wait_for_a_request_get_it(simulated):
-    cell = simulated(request="080#")
+    cell = simulated(request="080#", delay_s=100.0)  # of those alone that send unasked
     await cell.driver.open()
     cell.positions[0] = 10.25
     assert (await cell.driver.read()).positions[0] == pytest.approx(10.25)

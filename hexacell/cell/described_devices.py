@@ -1,0 +1,156 @@
+"""Sections of the cell file that describe what a device sends, where no driver knows it."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from hexacell.cell.fields import NotNegative, Positive, Section, Text, broken_rule
+
+NUMBER = re.compile(  # a number as instruments send it
+    r"[+-]?\d+(\.\d*)?"
+)
+
+
+Wire = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[\x00-\xff]*$")]
+"""Text on a line, one byte a character, which may be control characters."""
+
+
+class DescribedFrame(Section):
+    """What a gauge sends: its pattern, and what its number is."""
+
+    answer: Text = Field(
+        min_length=1,
+        description="regular expression of what it sends without line ends; group number, or the first: "
+        "the number",
+    )
+    example: Wire = Field(description="a typical one, which must match")
+    mm_per_unit: Positive = Field(1.0, description="what a unit of the number is, mm: 25.4 for inches")
+    at_end: Wire | None = Field(
+        None, description="regular expression of the answer with the plunger at an end of its travel"
+    )
+
+    @model_validator(mode="after")
+    def _the_example_matches(self) -> Self:
+        patterns = [self.answer] + ([] if self.at_end is None else [self.at_end])
+        for pattern in patterns:
+            try:
+                re.compile(pattern)
+            except re.error as error:
+                raise broken_rule(f"{pattern!r} is no regular expression: {error}", "Correct it") from error
+        match = re.fullmatch(self.answer, self.example.strip("\r\n"))
+        number = match[self.number_group] if match is not None and match.groups() else None
+        if not NUMBER.fullmatch((number or "").replace(" ", "")):
+            raise broken_rule(
+                "the example is no answer with a number in group 1", "Correct answer or example"
+            )
+        return self
+
+    @property
+    def number_group(self) -> str | int:
+        """The group with the number."""
+        return "number" if "number" in re.compile(self.answer).groupindex else 1
+
+
+class RequestSettings(DescribedFrame):
+    """What a gauge of protocol ``request`` is asked, and what it answers."""
+
+    ask: Wire = Field(description="what is sent for a value")
+    ends_with: Wire = Field("\r", description="the first line end of an answer")
+
+
+class StreamSettings(DescribedFrame):
+    """What a gauge of protocol ``stream`` sends by itself, in lines.
+
+    Of several gauges on one port the pattern has a group ``channel``, which is that of the gauge.
+    """
+
+    @model_validator(mode="after")
+    def _its_groups_are_told_apart(self) -> Self:
+        match = re.fullmatch(self.answer, self.example.strip("\r\n"))
+        if match is None or not self.has_channel:
+            return self
+        if self.number_group != "number" or not (match["channel"] or "").isdecimal():
+            raise broken_rule(
+                "a pattern with a group channel, of digits, needs a group number",
+                "Write (?P<channel>...) and (?P<number>...)",
+            )
+        return self
+
+    @property
+    def has_channel(self) -> bool:
+        """Whether its lines tell the gauge by its channel."""
+        return "channel" in re.compile(self.answer).groupindex
+
+
+CHANNEL_PLACE = "{channel}"
+
+
+class VisaSettings(Section):
+    """What an instrument of protocol ``visa`` is asked, and how it must be set."""
+
+    ask: Text = Field(
+        min_length=1,
+        description="SCPI query of the value: MEAS:DIST?, or READ? (@{channel}) where gauges share it",
+    )
+    mm_per_unit: Positive = Field(1.0, description="what a unit of the number is, mm: 1000 for metres")
+    expect: dict[Text, Text] = Field(
+        default_factory=dict,
+        max_length=20,
+        description='what it must answer to queries of its settings: { "UNIT:LENG?" = "M" }',
+    )
+    identify: bool = Field(True, description="it is asked *IDN?")
+    backend: Text = Field("@py", description="of PyVISA: @py is pure Python, @ivi the library of a maker")
+
+    @property
+    def has_channel(self) -> bool:
+        """Whether several gauges share the instrument."""
+        return CHANNEL_PLACE in self.ask
+
+    def question(self, channel: int) -> str:
+        """What is asked for the value of a channel."""
+        return self.ask.replace(CHANNEL_PLACE, str(channel))
+
+
+class ModbusSettings(Section):
+    """Where the position of a gauge of protocol ``modbus`` is, and what it is."""
+
+    device: int = Field(1, ge=1, le=247, description="address of the device on the line")
+    register_: int = Field(
+        alias="register", ge=0, le=65535, description="its first register, counted from 0"
+    )
+    kind: Literal["input", "holding"] = Field("input", description="function 4 or 3")
+    type: Literal["int16", "uint16", "int32", "uint32", "float32"] = Field(
+        "int32", description="of the number, in one or two registers"
+    )
+    word_order: Literal["big", "little"] = Field("big", description="which of two registers comes first")
+    mm_per_unit: Positive = Field(0.001, description="what a count is, mm")
+    at_end: tuple[int, ...] = Field(
+        (), max_length=8, description="numbers that mean an end of the travel, or no value"
+    )
+
+
+MessageSignal = Annotated[str, Field(max_length=200, pattern=r"^\w+\.\w+$")]
+
+
+class DbcSettings(Section):
+    """Encoders that send what a DBC file describes."""
+
+    file: Text = Field(min_length=1, description="the DBC file, relative to the cell file")
+    signals: tuple[
+        MessageSignal, MessageSignal, MessageSignal, MessageSignal, MessageSignal, MessageSignal
+    ] = Field(description="position of legs 1 to 6: Message.Signal each; its unit is that of the DBC file")
+    request: str | None = Field(
+        None,
+        pattern=r"^[0-9A-Fa-f]{3}#([0-9A-Fa-f]{2}){0,8}$",
+        description="frame that asks all of them, as candump has it: 080#; without it they send unasked",
+    )
+    delay_s: NotNegative = Field(0.005, description="how old a position may be that comes unasked")
+    window_s: Positive = Field(0.02, description="the six positions of a sample come within this time")
+    must_be: dict[Text, int] = Field(
+        default_factory=dict,
+        max_length=20,
+        description="signals of these messages and their values where a position is valid: { Error = 0 }",
+    )

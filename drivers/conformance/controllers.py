@@ -12,7 +12,7 @@ from drivers.conformance.failures import LONGEST_S, failure, require_named
 from drivers.controllers.errors import MotionInterrupted, MoveRefused, StartupNotPermitted
 from drivers.controllers.linuxcnc.protocol import pose_difference
 from drivers.interfaces import Controller, StartupAction
-from hexacell.cell.devices import ControllerSettings
+from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.kinematics.pose import Pose
 

@@ -181,7 +181,7 @@ def _require_own_geometry(cell: Cell) -> None:
             raise UsageError(
                 f"the run {path} was interrupted and left its provisional geometry here",
                 subject=cell.config_path,
-                action="Resume that run, which takes it back; or copy its lent/config-before over this",
+                action="Resume that run, which takes it back",
             )
 
 

@@ -12,7 +12,7 @@ from typing import get_args
 from hexacell.application.calibration_run import RunRequest
 from hexacell.application.device_setup import device_addresses
 from hexacell.cell.bundled import CONTROLLER, bundled_config
-from hexacell.cell.devices import FurtherFileSettings
+from hexacell.cell.controller import FurtherFileSettings
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.passwords import password_path
 from hexacell.cell.simulation import FaultKind, SimulatedFault

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from hexacell.application.calibration_run import calibration_of_run
 from hexacell.application.journal_soundness import require_sound
-from hexacell.cell.devices import ControllerSettings
+from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.measuring import IdentificationSettings
 from hexacell.cell.model import CellSettings, geometry_settings

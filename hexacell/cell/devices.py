@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, SecretStr, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from hexacell.cell.certificates import CertificateSettings
 from hexacell.cell.described_devices import (
@@ -20,7 +20,6 @@ from hexacell.cell.fields import (
     InRange,
     Name,
     NotNegative,
-    Password,
     Positive,
     Section,
     SixInRange,
@@ -32,12 +31,9 @@ from hexacell.kinematics.parameters import JointUnit
 NodeId = Annotated[int, Field(ge=1, le=127)]
 Unsigned = Annotated[int, Field(ge=0, le=2**32 - 1)]
 Direction = Literal[1, -1]
-StartupWord = Literal["reset-estop", "switch-on", "home"]
 LegNumber = Annotated[int, Field(ge=1, le=6)]
 NM = 1e-6
 """A nanometre in mm."""
-
-STARTUP_WORDS: tuple[StartupWord, ...] = ("reset-estop", "switch-on", "home")
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,109 +221,6 @@ class RotaryEncoderSettings(EncoderSettings):
     def step(self) -> float:
         """One count, deg."""
         return 360.0 / self.counts_per_turn
-
-
-class FurtherFileSettings(Section):
-    """A file beside ``config`` that has the rest of the geometry; the keys mean what they mean there."""
-
-    config: Text = Field(description="the file, relative to the cell file")
-    config_format: Text = Field(
-        description="linuxcnc-ini, linuxcnc-hal, template, toml, or one that a plug-in adds"
-    )
-    config_options: dict[str, Any] = Field(
-        default_factory=dict, description="where that format finds the numbers, see docs/linuxcnc.md"
-    )
-    taught: Text | None = Field(
-        None, description="copy of this file, from the same day as that of the first one"
-    )
-
-
-class ControllerSettings(Section):
-    """The robot's controller and the file, or the files, with its geometry."""
-
-    protocol: Text = Field("linuxcncrsh", description="linuxcncrsh, or one that a plug-in adds")
-    host: Text = Field("127.0.0.1", description="its network name or address")
-    port: int | None = Field(None, ge=1, le=65535, description="TCP port")
-    connect_password: Password = Field(
-        SecretStr("EMC"), description="linuxcncrsh: sent on connecting; better in password_file"
-    )
-    enable_password: Password = Field(
-        SecretStr("EMCTOO"), description="linuxcncrsh: sent to enable commands; better in password_file"
-    )
-    password_file: Text | None = Field(
-        None,
-        min_length=1,
-        description="TOML file with connect_password and enable_password, relative to the cell file, which "
-        "others must not be able to read. HEXACELL_CONNECT_PASSWORD and HEXACELL_ENABLE_PASSWORD in the "
-        "environment take precedence",
-    )
-    config: Text = Field(description="the file with its geometry, relative to the cell file")
-    config_format: Text = Field(
-        "toml", description="toml, linuxcnc-ini, linuxcnc-hal, template, or one that a plug-in adds"
-    )
-    config_options: dict[str, Any] = Field(
-        default_factory=dict, description="where that format finds the numbers, see docs/linuxcnc.md"
-    )
-    taught: Text | None = Field(
-        None,
-        description="copy of config from when points and frames were taught last, relative to the cell "
-        "file; without it, the config that runs when a run begins",
-    )
-    further_files: tuple[FurtherFileSettings, ...] = Field(
-        (),
-        max_length=8,
-        description="files that have a part of the geometry each, if it is not all in config: every number "
-        "must be in one of them, and in no other",
-    )
-    reload_command: tuple[Text, ...] = Field(
-        (), description="run with the machine off, so that the controller reads its config again"
-    )
-    startup: tuple[StartupWord, ...] = Field(
-        (),
-        max_length=len(STARTUP_WORDS),
-        description="what the program may do by itself to make it ready, a person is asked about the rest: "
-        "reset-estop (the emergency stop that it starts in, before a run begins), switch-on, home",
-    )
-    homing_timeout_s: Positive = Field(60.0, description="longest wait until all joints are homed")
-    unit_mm: Positive = Field(
-        1.0, description="one unit of the positions that it tells; of an inch machine 25.4"
-    )
-    joints_include_zeros: bool = Field(
-        False,
-        description="the joints that it tells, and their limits in its config, include the zeros of its "
-        "geometry: whole leg lengths, as LinuxCNC's genhexkins has them",
-    )
-    position_tolerance_mm: Positive = Field(0.01, description="arrival: largest position difference")
-    angle_tolerance_deg: Positive = Field(0.01, description="arrival: largest angle difference")
-    move_timeout_s: Positive | None = Field(
-        None, exclude=True, description="no longer used: how long a move may last follows from its duration"
-    )
-
-    @model_validator(mode="after")
-    def _files_are_together(self) -> ControllerSettings:
-        files = (self.config, *(one.config for one in self.further_files))
-        if twice := next((name for name in files if files.count(name) > 1), None):
-            raise broken_rule(f"the file {twice} is named twice", "Name each file once")
-        taught = [self.taught, *(one.taught for one in self.further_files)]
-        if any(taught) and not all(taught):
-            raise broken_rule(
-                "taught is stated for some of the files only", "State it for all of them, or for none"
-            )
-        return self
-
-    @property
-    def joint_unit_mm(self) -> float:
-        """One unit of the joint variables that it tells, in mm."""
-        return self.unit_mm
-
-
-class RotaryControllerSettings(ControllerSettings):
-    """The controller of a robot whose joints turn."""
-
-    @property
-    def joint_unit_mm(self) -> float:
-        """One degree: an inch machine tells angles in degrees too."""
-        return 1.0
 
 
 class ThermometerSettings(Section):

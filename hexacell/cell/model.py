@@ -11,12 +11,11 @@ from pydantic_core import InitErrorDetails
 
 from hexacell.cell.archive import ArchiveSettings
 from hexacell.cell.certificates import CertificateSettings, ReportSettings
+from hexacell.cell.controller import ControllerSettings, RotaryControllerSettings
 from hexacell.cell.devices import (
-    ControllerSettings,
     EncoderSettings,
     GaugeSettings,
     LinearEncoderSettings,
-    RotaryControllerSettings,
     RotaryEncoderSettings,
     ThermometerSettings,
 )

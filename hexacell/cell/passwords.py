@@ -13,7 +13,7 @@ from pathlib import Path
 
 from pydantic import SecretStr
 
-from hexacell.cell.devices import ControllerSettings
+from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.fields import LONGEST_TEXT, Password, Section
 from hexacell.cell.loader import Cell, SectionType, validated
 from hexacell.cell.model import CellSettings

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from hexacell.cell.devices import STARTUP_WORDS, StartupWord
+from hexacell.cell.controller import STARTUP_WORDS, StartupWord
 from hexacell.cell.fields import (
     GeometrySettings,
     InRange,

@@ -81,13 +81,19 @@ def note_path(paths: Sequence[Path]) -> Path:
 
 
 def note_write(paths: Sequence[Path], before: Contents, after: Contents) -> None:
-    """Note that the files, which hold ``before``, are about to get ``after``; raises ``FileError``."""
+    """Note that the files, which hold ``before``, are about to get ``after``.
+
+    Raises:
+        FileError: the note cannot be written, or somebody has put a link in its place.
+    """
+    if (place := note_path(paths)).is_symlink():
+        raise FileError("is a link, which would lead a note elsewhere", subject=place, action="Remove it")
     files = tuple(
         _NotedFile(path=path.absolute(), before=old.decode(_AS_TEXT), sha256_after=atomic_files.sha256(new))
         for path, old, new in zip(paths, before, after, strict=True)
     )
     most_private = min(paths, key=_readers)
-    atomic_files.write_atomically(note_path(paths), _Note(files=files).to_json(), like=most_private)
+    atomic_files.write_atomically(place, _Note(files=files).to_json(), like=most_private)
 
 
 def forget_write(paths: Sequence[Path]) -> None:

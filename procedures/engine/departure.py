@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from drivers.interfaces import Controller
-from hexacell.cell.devices import ControllerSettings
+from hexacell.cell.controller import ControllerSettings
 from hexacell.kinematics.pose import Pose
 from procedures.guards.guards import Guards
 from procedures.run.state import RunState

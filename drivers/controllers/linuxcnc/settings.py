@@ -6,7 +6,7 @@ import asyncio
 from dataclasses import dataclass, field
 from typing import Self
 
-from hexacell.cell.devices import ControllerSettings
+from hexacell.cell.controller import ControllerSettings
 from hexacell.errors import UsageError
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from drivers.simulated.linuxcnc.state import ControllerState, TaskMode, WaitMode
-from hexacell.cell.devices import ControllerSettings
+from hexacell.cell.controller import ControllerSettings
 
 
 @dataclass(slots=True, eq=False)

@@ -22,7 +22,7 @@ from drivers.simulated.linuxcnc.commands import (
 )
 from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Machine
 from drivers.simulated.served_device import Closeable
-from hexacell.cell.devices import ControllerSettings
+from hexacell.cell.controller import ControllerSettings
 
 HOST = "127.0.0.1"
 SERVER = "EMCNETSVR 1.1"

@@ -13,12 +13,8 @@ from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.of_controller import ControllerScales
 from drivers.interfaces import DeviceIdentity, EncoderBank, EncoderSample, StartupAction
 from drivers.simulated.linuxcnc.server import SimulatedController
-from hexacell.cell.devices import (
-    ControllerSettings,
-    EncoderSettings,
-    LinearEncoderSettings,
-    RotaryEncoderSettings,
-)
+from hexacell.cell.controller import ControllerSettings
+from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.cell.simulation import FaultKind
 from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
 

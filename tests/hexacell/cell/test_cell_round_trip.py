@@ -7,7 +7,7 @@ from typing import Any, get_args
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.cell import devices, limits, measuring, model, simulation
+from hexacell.cell import controller, devices, limits, measuring, model, simulation
 from hexacell.cell.loader import describe, dump, schema
 from hexacell.cell.robot import DEFAULT_MECHANISM
 
@@ -59,7 +59,7 @@ cells = st.builds(
     name=st.text(st.characters(categories=["L", "Nd"]), min_size=1, max_size=12),
     robot=st.builds(ROBOT, mechanism=st.just(DEFAULT_MECHANISM), nominal=geometries),
     controller=st.builds(
-        devices.ControllerSettings,
+        controller.ControllerSettings,
         config=printable,
         port=st.none() | st.integers(1, 65535),
         reload_command=st.lists(printable, max_size=3).map(tuple),

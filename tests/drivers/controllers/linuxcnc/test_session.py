@@ -13,7 +13,7 @@ from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.settings import Address, Timeouts
 from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import WireTrace
-from hexacell.cell.devices import ControllerSettings, RotaryControllerSettings
+from hexacell.cell.controller import ControllerSettings, RotaryControllerSettings
 from hexacell.errors import DeviceError, ExitCode, UsageError
 
 HELLO = "hello EMC hexacell 1.0"

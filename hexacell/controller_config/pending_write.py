@@ -86,7 +86,8 @@ def note_write(paths: Sequence[Path], before: Contents, after: Contents) -> None
     Raises:
         FileError: the note cannot be written, or somebody has put a link in its place.
     """
-    if (place := note_path(paths)).is_symlink():
+    place = note_path(paths)
+    if os.path.islink(place):  # noqa: PTH114 - Path.is_symlink raises where it cannot be told
         raise FileError("is a link, which would lead a note elsewhere", subject=place, action="Remove it")
     files = tuple(
         _NotedFile(path=path.absolute(), before=old.decode(_AS_TEXT), sha256_after=atomic_files.sha256(new))

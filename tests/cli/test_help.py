@@ -42,6 +42,7 @@ PAGES = [
     *([command] for command in COMMANDS),
     *(["cell", action] for action in ("validate", "schema", "show")),
     ["study", "paper"],
+    ["study", "experiment"],
 ]
 
 

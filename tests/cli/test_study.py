@@ -33,6 +33,16 @@ def test_the_paper_is_repeated_and_what_is_known_is_not_computed_again(typed, tm
     assert told["figures"]["4"][0]["noisy"]["refused"] == 1
 
 
+@pytest.mark.slow
+def test_the_experiment_is_repeated(typed, tmp_path: Path) -> None:
+    ended = typed("study", "experiment", "--draws", "1", "--processes", "2", "--folder", "kept")
+    assert ended.code == 0, ended.err
+    assert "P1 to P3 calibrate, P4 to P6 verify" in " ".join(ended.out.split())
+    assert max(map(len, ended.out.splitlines())) <= 80
+    assert len((tmp_path / "kept" / "experiment.jsonl").read_text().splitlines()) == 9
+    assert (tmp_path / "kept" / "experiment.svg").read_text().startswith("<svg ")
+
+
 def test_an_interrupted_study_goes_on_where_it_was(start, typed, tmp_path: Path) -> None:
     """Also after a power cut in the middle of a line."""
     process = start(*PAPER)

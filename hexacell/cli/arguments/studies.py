@@ -12,24 +12,30 @@ def add_study_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own 
     """Add them to the commands of a parser."""
     parser = add_parser(commands, "study", "repeat what was published of the method, on simulated robots")
     studies = parser.add_subparsers(title="studies", metavar="STUDY", required=True)
-    paper = add_command(
-        studies, "paper", "figures 4 and 5 and table 2 of Abtahi et al. (2010)", target="study.paper"
-    )
-    paper.add_argument(
+    for name, summary in (
+        ("paper", "figures 4 and 5 and table 2 of Abtahi et al. (2010)"),
+        ("experiment", "its experiment, figures 8 and 9, by the robot's repeatability"),
+    ):
+        _study(studies, name, summary)
+
+
+def _study(studies: Any, name: str, summary: str) -> None:  # noqa: ANN401
+    parser = add_command(studies, name, summary, target=f"study.{name}")
+    parser.add_argument(
         "--draws",
         type=positive,
         default=20,
         metavar="N",
         help="of orientations and noise, for each case (default: %(default)s)",
     )
-    paper.add_argument(
+    parser.add_argument(
         "--processes", type=positive, metavar="N", help="at a time (default: one for each processor)"
     )
-    paper.add_argument(
+    parser.add_argument(
         "--folder",
         type=Path,
         default=Path("hexacell-study"),
-        help="keeps each result, so that a study can be interrupted, and gets paper.svg "
+        help="keeps each result, so that a study can be interrupted, and gets a picture "
         "(default: %(default)s)",
     )
-    add_json(paper)
+    add_json(parser)

@@ -1,0 +1,69 @@
+"""The paper's experiment in a simulation: what is left is the robot's repeatability."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.study.experiment_summary import (
+    REPEATABILITIES_MM,
+    Reduction,
+    experiment_summary,
+    experiments_of,
+)
+from hexacell.study.paper_experiment import (
+    CALIBRATING,
+    ORIENTATIONS,
+    Differences,
+    Experiment,
+    ExperimentOutcome,
+    carry_out,
+)
+
+
+@pytest.fixture(scope="module")
+def repeatable():
+    return carry_out(Experiment(0.0, 0))
+
+
+def test_every_orientation_but_the_first_has_its_distance(repeatable) -> None:
+    for part in (repeatable.calibrating, repeatable.verifying):
+        assert len(part.before) == len(part.ours) == CALIBRATING * (ORIENTATIONS - 1)
+
+
+def test_a_repeatable_robot_comes_back_to_the_place(repeatable) -> None:
+    for part in (repeatable.calibrating, repeatable.verifying):
+        assert np.mean(part.before) > 5.0
+        assert np.mean(part.ours) < 0.2
+
+
+def test_what_is_left_of_another_robot_is_its_repeatability() -> None:
+    """Two places that scatter by s along each axis are 2.26 s apart in the mean: 4 s / sqrt(pi)."""
+    found = carry_out(Experiment(0.5, 0))
+    expected = 4.0 / np.sqrt(np.pi) * 0.5
+    assert 0.8 * expected < np.mean(found.calibrating.ours) < 2.0 * expected
+
+
+def test_the_same_experiment_is_the_same_again(repeatable) -> None:
+    assert carry_out(Experiment(0.0, 0)) == repeatable
+
+
+def test_means_of_draws_have_a_median_of_those_that_ended() -> None:
+    draws = [Differences((1.0, 3.0), (0.5, 0.7), (0.1, 0.3)), Differences((4.0, 6.0), (), (0.4, 0.6))]
+    found = Reduction.of(draws)
+    assert (found.before, found.paper, found.ours) == pytest.approx((3.5, 0.6, 0.35))
+
+
+def test_all_of_it_is_of_its_own_experiments() -> None:
+    experiments = experiments_of(2)
+    outcomes = {
+        key: ExperimentOutcome(
+            Differences((one.repeatability_mm,), (1.0,) if one.number else (), (0.1,)),
+            Differences((10.0 * one.repeatability_mm,), (2.0,), (0.2,)),
+        )
+        for key, one in experiments.items()
+    }
+    study = experiment_summary(experiments, outcomes)
+    assert tuple(row.calibrating.before for row in study.rows) == REPEATABILITIES_MM
+    assert {(row.draws, row.ended) for row in study.rows} == {(2, 1)}
+    assert study.example.calibrating.before == (2.0,)

@@ -51,7 +51,7 @@ def study_paper(folder: Path, draws: int, new_executor: NewExecutor, told: OnPro
         WorkersLost: executors break one after the other.
     """
     trials, kept = trials_of(draws), TypeAdapter(_Kept[Outcome])
-    found = _results(folder / "paper.jsonl", kept, trials, paper_simulation.carry_out, new_executor, told)
+    found = _results(folder / "paper.jsonl", kept, trials, paper_simulation.run_trial, new_executor, told)
     return summary(trials, found)
 
 
@@ -61,7 +61,7 @@ def study_experiment(
     """The paper's experiment, as :func:`study_paper`; the lines are in ``experiment.jsonl``."""
     experiments, kept = experiments_of(draws), TypeAdapter(_Kept[ExperimentOutcome])
     path = folder / "experiment.jsonl"
-    found = _results(path, kept, experiments, paper_experiment.carry_out, new_executor, told)
+    found = _results(path, kept, experiments, paper_experiment.run_experiment, new_executor, told)
     return experiment_summary(experiments, found)
 
 

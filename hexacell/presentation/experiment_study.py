@@ -24,7 +24,7 @@ def experiment_lines(study: ExperimentStudy) -> Iterator[str]:
     yield wrapped(
         "Mean distance of the ball from its first place at a point, mm, and by what share it falls: "
         f"{ORIENTATIONS} orientations within +-{AMPLITUDE_DEG:g} deg, medians of {study.rows[0].draws} "
-        "draws. P1 to P3 calibrate, P4 to P6 verify. P is the paper's estimator, which ends in so many draws. "
+        "draws. P1 to P3 calibrate, P4 to P6 verify. P is the paper's estimator, which ends in so many. "
         "The robot's geometry is what the paper identified; the first column is its repeatability, the "
         "standard deviation of each coordinate of the ball."
     )

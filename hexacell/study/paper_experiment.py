@@ -6,7 +6,8 @@ What the paper compares is where the ball is in every orientation against the fi
 and after.
 
 The real robot's repeatability was about 2 mm. Here the ball is off by chance in each pose, along each axis,
-with that standard deviation, and the encoders do not see it; deviations are measured to 0.01 mm. The paper does not say its orientations: here each of three angles is drawn between -20 and 20 deg.
+with that standard deviation, and the encoders do not see it; deviations are measured to 0.01 mm. The paper
+does not say its orientations: here each of three angles is drawn between -20 and 20 deg.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ class ExperimentOutcome:
     verifying: Differences
 
 
-def carry_out(experiment: Experiment) -> ExperimentOutcome:
+def run_experiment(experiment: Experiment) -> ExperimentOutcome:
     """Measure, identify by both estimators, and command the same poses again with what was found.
 
     Raises:

@@ -110,7 +110,7 @@ class Outcome:
     deviation_mm: float
 
 
-def carry_out(trial: Trial) -> Outcome:
+def run_trial(trial: Trial) -> Outcome:
     """Measure in a simulation without noise and with it, and identify from both.
 
     Raises:

@@ -17,13 +17,13 @@ from hexacell.study.paper_experiment import (
     Differences,
     Experiment,
     ExperimentOutcome,
-    carry_out,
+    run_experiment,
 )
 
 
 @pytest.fixture(scope="module")
 def repeatable():
-    return carry_out(Experiment(0.0, 0))
+    return run_experiment(Experiment(0.0, 0))
 
 
 def test_every_orientation_but_the_first_has_its_distance(repeatable) -> None:
@@ -39,13 +39,13 @@ def test_a_repeatable_robot_comes_back_to_the_place(repeatable) -> None:
 
 def test_what_is_left_of_another_robot_is_its_repeatability() -> None:
     """Two places that scatter by s along each axis are 2.26 s apart in the mean: 4 s / sqrt(pi)."""
-    found = carry_out(Experiment(0.5, 0))
+    found = run_experiment(Experiment(0.5, 0))
     expected = 4.0 / np.sqrt(np.pi) * 0.5
     assert 0.8 * expected < np.mean(found.calibrating.ours) < 2.0 * expected
 
 
 def test_the_same_experiment_is_the_same_again(repeatable) -> None:
-    assert carry_out(Experiment(0.0, 0)) == repeatable
+    assert run_experiment(Experiment(0.0, 0)) == repeatable
 
 
 def test_means_of_draws_have_a_median_of_those_that_ended() -> None:

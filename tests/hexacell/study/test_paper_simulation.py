@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hexacell.study.paper_simulation import Angles, Trial, carry_out
+from hexacell.study.paper_simulation import Angles, Trial, run_trial
 
 MOST = Trial(5, 11, 0)
 
 
 @pytest.fixture(scope="module")
 def most():
-    return carry_out(MOST)
+    return run_trial(MOST)
 
 
 def test_without_noise_both_find_the_robot(most) -> None:
@@ -27,18 +27,18 @@ def test_with_noise_errors_are_those_of_the_order_of_the_paper(most) -> None:
 
 
 def test_the_same_trial_is_the_same_again(most) -> None:
-    assert carry_out(MOST) == most
+    assert run_trial(MOST) == most
 
 
 def test_fewer_points_are_the_first_of_more(most) -> None:
     """So that a figure shows what further points add."""
-    fewer = carry_out(Trial(2, 11, 0))
+    fewer = run_trial(Trial(2, 11, 0))
     assert fewer.deviation_mm <= most.deviation_mm
 
 
 @pytest.mark.parametrize(("points", "orientations"), [(1, 11), (2, 5)])
 def test_what_cannot_be_identified_is_refused(points: int, orientations: int) -> None:
-    found = carry_out(Trial(points, orientations, 0))
+    found = run_trial(Trial(points, orientations, 0))
     assert found.exact.ours == found.noisy.ours == {}
     assert found.exact.paper_mm > 1.0
 

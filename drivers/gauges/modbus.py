@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 
+from drivers.errors import WrongAnswer
 from drivers.gauges.modbus_port import HOLDING, INPUT, REQUEST, ModbusPort
 from drivers.gauges.plausibility import decimals_of
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
@@ -15,7 +16,7 @@ from drivers.gauges.value_only import ValueOnlyGauge
 from drivers.serial.request_port import PortFactory
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
-from hexacell.errors import FileError
+from hexacell.errors import DeviceError, FileError
 
 FORMATS = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
 FUNCTIONS = {"holding": HOLDING, "input": INPUT}
@@ -49,6 +50,13 @@ class ModbusGauge(ValueOnlyGauge):
         resolution = settings.resolution_mm or 0.001
         self._decimals = decimals_of(
             resolution if self._modbus.type == "float32" else self._modbus.mm_per_unit
+        )
+
+    def _garbled(self, received: bytes) -> DeviceError:
+        return WrongAnswer(
+            f"answers {received!r}, no frame with a right checksum",
+            subject=self.subject,
+            action="Check its cable, and its baud rate and parity against serial in the cell file",
         )
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:

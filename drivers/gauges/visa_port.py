@@ -22,6 +22,8 @@ from hexacell.errors import DeviceError
 EXTRA = "visa"
 PURE_PYTHON = "@py"
 MS = 1000.0
+SURPLUS_S = 0.002
+FRAME_GAP_S = 0.04
 BYTE_STREAMS = ("::SOCKET", "ASRL")
 SERIAL = "ASRL"
 LINE_ATTRIBUTES = {"baudrate": "baud_rate", "bytesize": "data_bits"}
@@ -58,6 +60,7 @@ class VisaPort:
         self._resource: Any = None
         self._must_clear = False
         self._visa: Any = None
+        self._gap_s = SURPLUS_S
 
     def open(self) -> int:
         """Open the resource unless it is open; how often it has been opened.
@@ -87,7 +90,10 @@ class VisaPort:
         with self._visa_errors():
             if self._must_clear:
                 self._clear()
+            elif self._is_stream:
+                self._drop_surplus()
             self._record(TrafficDirection.SENT, request)
+            self._resource.timeout = MS * timeout_s  # of writing too
             self._resource.write_raw(request)
             return self._answer(terminator, timeout_s)
 
@@ -146,7 +152,7 @@ class VisaPort:
     def _some(self, timeout_s: float) -> bytes:
         """A byte of a stream, or a message; nothing if none comes in time."""
         self.require_not_closed()
-        self._resource.timeout = MS * (SLICE_S if self._is_stream else timeout_s)
+        self._resource.timeout = MS * (min(SLICE_S, timeout_s) if self._is_stream else timeout_s)
         try:
             data: bytes = self._resource.read_bytes(1) if self._is_stream else self._resource.read_raw()
         except self._visa.errors.VisaIOError as error:
@@ -169,6 +175,18 @@ class VisaPort:
             if quiet_from_s > give_up_s:
                 raise DeviceError(f"the device on {self.url} keeps sending unasked", subject=self.subject)
         self._must_clear = False
+
+    def _drop_surplus(self) -> None:
+        """Drop what came after the last answer.
+
+        After the first such bytes every question waits until the line is silent.
+        """
+        received = False
+        while self._some(self._gap_s):
+            received = True
+        if received and self._gap_s < FRAME_GAP_S:
+            self.surplus_count += 1
+            self._gap_s = FRAME_GAP_S
 
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if data and self._recorder is not None:

@@ -141,6 +141,19 @@ async def test_a_late_answer_is_not_that_of_the_next_question(transport):
         await cell.gauges[0].close()
 
 
+@pytest.mark.parametrize("transport", ["socket", "pty"])
+async def test_an_answer_that_comes_twice_is_not_that_of_the_next_question(transport):
+    with bench(transport) as cell:
+        [x, *_] = cell.gauges
+        await x.open()
+        cell.bank.faults("x")["repeated"](on=True)
+        await x.read()
+        for step in range(5):
+            cell.balls["x"] = 0.5 * step
+            assert (await x.read()).value_mm == pytest.approx(0.5 * step)
+        await x.close()
+
+
 async def _read_often(gauge: VisaGauge) -> None:
     for _ in range(6):
         await gauge.read()

@@ -60,7 +60,9 @@ Row = tuple[str, str, str, str]
 
 def plain(error: HexacellError) -> str:
     """A message without what differs from run to run."""
-    words = re.sub(r"(?<!\w)/[\w/.-]*\w", "PORT", str(error))
+    words = re.sub(r"ASRL\S+::INSTR", "PORT", str(error))
+    words = re.sub(r"b'[^']*\\x[^']*'", "BYTES", words)
+    words = re.sub(r"(?<!\w)/[\w/.-]*\w", "PORT", words)
     return re.sub(r"[+-]?\d+\.\d+", "#", words)
 
 

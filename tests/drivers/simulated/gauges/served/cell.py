@@ -10,10 +10,12 @@ from drivers.gauges.digimatic_usb import DigimaticUsbGauge
 from drivers.gauges.heidenhain_nd import HeidenhainGauge
 from drivers.gauges.keyence_dl_rs1a import KeyenceGauge
 from drivers.gauges.mitutoyo_id_h import IdHGauge
+from drivers.gauges.modbus import ModbusGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.gauges.uwave import UwaveGauge
+from drivers.gauges.visa import VisaGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_instrument
 from drivers.simulated.gauges.indicator import Indicator
@@ -36,7 +38,23 @@ MORE_DRIVERS: dict[str, Callable[..., SerialGauge]] = {
     "keyence-dl-rs1a": KeyenceGauge,
     "digimatic-usb": DigimaticUsbGauge,
     "uwave": UwaveGauge,
+    "visa": VisaGauge,
+    "modbus": ModbusGauge,
 }
+
+
+def described(protocol, number):
+    """What the cell file has to say of the gauge with that number."""
+    if protocol == "visa":
+        expect = {"UNIT:LENG?": "M"}
+        return {"visa": {"ask": "READ? (@{channel})", "mm_per_unit": 1000.0, "expect": expect}}
+    if protocol == "modbus":
+        place = {"register": 2 * number, "at_end": [0x7FFFFFFF]}
+        # a pseudo-terminal refuses the parity of a port that is opened again
+        return {"modbus": place, "serial": {"parity": "N"}}
+    return {}
+
+
 STREAM_DELAY_S = 0.02
 TRANSPORTS = ("pty", "socket")
 FAST = 100.0
@@ -58,6 +76,7 @@ class Cell:
                 channel=number,
                 timeout_s=timeout_s,
                 delay_s=STREAM_DELAY_S,
+                **described(protocol, number),
             )
             for number, (name, protocol) in enumerate(zip("xyz", protocols, strict=True), start=1)
         ]

@@ -72,6 +72,10 @@ def refused(typed: Any, served: Any, command: str, code: int, *words: str) -> st
     return str(outcome.err)
 
 
+def advises_a_search(told: str) -> bool:
+    return "`hexacell devices` shows what is connected" in " ".join(told.split())
+
+
 @pytest.mark.usefixtures("never_moves", "one_robot")
 def test_a_cell_without_faults(typed_here, cell_folder):
     before = cell_folder.snapshot()
@@ -104,6 +108,7 @@ def test_the_document_names_every_device(typed_here, cell_folder):
 def test_a_point_out_of_reach_is_named_with_its_leg(typed_here, cell_folder, command):
     cell_folder.edit(("[100.0, 100.0, 550.0],", "[100.0, 100.0, 1550.0],"))
     message = refused(typed_here, cell_folder, command, 2, "verification point 2")
+    assert not advises_a_search(message)
     assert re.search(r"\bleg [1-6]\b", message)
 
 
@@ -139,7 +144,8 @@ def test_gauges_carried_by_hand_need_a_person(typed_here, cell_folder):
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_port_that_is_not_there(typed_here, served, command):
     served.edit((port_of(served, "y"), "/dev/nowhere"))
-    refused(typed_here, served, command, 3, "gauge y: port /dev/nowhere is absent")
+    told = refused(typed_here, served, command, 3, "gauge y: port /dev/nowhere is absent")
+    assert advises_a_search(told) == (command == "preflight")
 
 
 @pytest.fixture
@@ -167,12 +173,12 @@ def test_two_gauges_with_their_cables_swapped(typed_here, served):
 
 def test_an_encoder_that_is_missing(typed_here, served):
     served.edit(("nodes = [1, 2, 3, 4, 5, 6]", "nodes = [1, 2, 3, 4, 5, 9]"))
-    refused(typed_here, served, "preflight", 3, "leg 6", "node 9")
+    assert advises_a_search(refused(typed_here, served, "preflight", 3, "leg 6", "node 9"))
 
 
 def test_a_bus_that_is_not_there(typed_here, served):
     served.cell.write_text(re.sub('channel = "[^"]*"', 'channel = "/dev/nowhere"', served.cell.read_text()))
-    refused(typed_here, served, "preflight", 3, "/dev/nowhere")
+    assert advises_a_search(refused(typed_here, served, "preflight", 3, "/dev/nowhere"))
 
 
 @pytest.fixture
@@ -189,7 +195,8 @@ def without_controller(served: Any, closed_port: int) -> None:
 
 def test_a_controller_that_is_not_there(typed_here, served, closed_port):
     without_controller(served, closed_port)
-    refused(typed_here, served, "preflight", 3, f"controller 127.0.0.1:{closed_port}")
+    told = refused(typed_here, served, "preflight", 3, f"controller 127.0.0.1:{closed_port}")
+    assert advises_a_search(told)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -5,17 +5,25 @@ from __future__ import annotations
 import argparse
 import asyncio
 
+from drivers.controllers.errors import ConnectionLost
+from drivers.errors import BusError, GaugeSilent, PortLost, SilentNodeError, WrongAnswer
 from hexacell.application.calibration_run import new_calibration, preflight
 from hexacell.application.offline import try_plan
 from hexacell.campaign.quick_trial import try_quick_level
 from hexacell.cli.cell_argument import cell_with_devices_at
 from hexacell.cli.console import Console
-from hexacell.errors import ExitCode
+from hexacell.errors import ExitCode, HexacellError, flatten_errors
 from hexacell.presentation.documents import preflight_document, quick_preflight_document
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.planning import plan_trial_lines, preflight_lines
 from hexacell.presentation.quick_level import quick_trial_text
 from procedures.calibration.workflow import Mode
+
+MISSING = (PortLost, GaugeSilent, WrongAnswer, BusError, SilentNodeError, ConnectionLost)
+SEARCH = (
+    "`hexacell devices` shows what is connected to this computer, as text for a cell file, and "
+    "`hexacell devices --diagnose NAME --cell CELL` watches one device of a cell"
+)
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -23,7 +31,12 @@ def main(options: argparse.Namespace) -> ExitCode:
     console = Console(options.json)
     cell = cell_with_devices_at(options.cell, console)
     mode = Mode(options.mode)
-    devices = asyncio.run(preflight(cell, mode, unattended=options.unattended))
+    try:
+        devices = asyncio.run(preflight(cell, mode, unattended=options.unattended))
+    except HexacellError as failed:
+        if any(isinstance(one, MISSING) for one in flatten_errors(failed)):
+            console.error(wrapped(f"hexacell: {SEARCH}"))
+        raise
     for line in preflight_lines(devices):
         console.print(wrapped(line, indent=6))
     if mode is Mode.QUICK:

@@ -19,7 +19,7 @@ from hexacell.cell.diagnostics import Diagnosis, ModelLookup
 from hexacell.cell.fields import Section
 from hexacell.cell.model import CellSettings, cell_model
 from hexacell.cell.robot import DEFAULT_MECHANISM
-from hexacell.errors import FileError, did_you_mean, joined
+from hexacell.errors import FileError, UsageError, did_you_mean, joined
 from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text
 from hexacell.storage.secrets import MASK, without_secrets
@@ -147,6 +147,9 @@ def validated(document: TomlDocument, model: type[SectionType], path: Path) -> S
         settings = model.model_validate_json(document.to_json(), strict=True)
     except ValidationError as refusal:
         errors |= diagnosis.explain_refusal(refusal)
+    except UsageError:  # a date is the name of no mechanism, and has its error already
+        if not errors:
+            raise
     if errors:
         in_order = sorted(errors.values(), key=lambda error: error.line or 0)
         count = f"{len(errors)} mistakes" if len(errors) < MOST_TOLD else "many mistakes; among them"

@@ -310,6 +310,17 @@ def test_damaged_files_give_plain_errors_only(cell_text, cell_path, edits):
         assert str(error).startswith(str(cell_path))  # noqa: PT017 - loading may also succeed
 
 
+def test_a_day_in_the_place_of_the_mechanism_is_refused_by_its_line(cell_text, load_text):
+    """It looks like the name of one in a JSON document."""
+    named = re.sub(r"(?m)^mechanism = .*$", "mechanism = 1979-05-27", cell_text, count=1)
+    assert named != cell_text
+    with pytest.raises((FileError, SeveralErrors)) as refused:
+        load_text(named)
+    told = refused.value
+    mistakes = told.errors if isinstance(told, SeveralErrors) else [told]
+    assert all(isinstance(mistake, FileError) and mistake.line for mistake in mistakes)
+
+
 @given(data=st.data())
 def test_values_of_any_kind_in_any_place_give_plain_errors_only(cell_text, load_text, data):
     lines = cell_text.splitlines()

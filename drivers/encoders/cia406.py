@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 from drivers.encoders.alarm_poll import AlarmPoll
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand
+from drivers.encoders.electronic_data_sheet import read_data_sheet
 from drivers.encoders.node_identity import (
     check_serial_number,
     check_step,
@@ -61,6 +64,7 @@ class EncoderSession:
         self._settings = settings
         self._history = SampleHistory(settings)
         try:
+            self._data_sheet = None if settings.eds is None else read_data_sheet(Path(settings.eds))
             self._start()
         except BaseException:
             self.bus.close()
@@ -109,6 +113,8 @@ class EncoderSession:
         check_step(node, self._settings)
         identity = read_identity(node, device_type)
         check_serial_number(node, identity, self._settings)
+        if self._data_sheet is not None and (differing := self._data_sheet.check(node)):
+            identity = replace(identity, remark="; ".join(filter(None, (identity.remark, differing))))
         switch_sync_counter_off(node)
         return identity
 

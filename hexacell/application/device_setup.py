@@ -35,7 +35,7 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
         HexacellError: a protocol has no driver, a password cannot be read, or the simulation cannot start.
     """
     require_drivers(cell)
-    settings = _with_dbc_file(with_passwords(cell.settings, cell.path.parent), cell.path.parent)
+    settings = _with_encoder_files(with_passwords(cell.settings, cell.path.parent), cell.path.parent)
     if settings.simulation is None:
         yield settings
         return
@@ -55,13 +55,15 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
         yield simulated.settings
 
 
-def _with_dbc_file(settings: CellSettings, folder: Path) -> CellSettings:
-    """The settings with the path of the DBC file, which is relative to the cell file."""
-    described = settings.encoders.dbc
-    if described is None:
-        return settings
-    dbc = described.model_copy(update={"file": str(folder / described.file)})
-    return settings.model_copy(update={"encoders": settings.encoders.model_copy(update={"dbc": dbc})})
+def _with_encoder_files(settings: CellSettings, folder: Path) -> CellSettings:
+    """The settings with the paths of the DBC and EDS files, which are relative to the cell file."""
+    described, eds = settings.encoders.dbc, settings.encoders.eds
+    changes: dict[str, object] = {}
+    if described is not None:
+        changes["dbc"] = described.model_copy(update={"file": str(folder / described.file)})
+    if eds is not None:
+        changes["eds"] = str(folder / eds)
+    return settings.model_copy(update={"encoders": settings.encoders.model_copy(update=changes)})
 
 
 def require_drivers(cell: Cell) -> None:

@@ -158,6 +158,11 @@ class EncoderSettings(Section, ABC):
     serial_numbers: tuple[Unsigned, Unsigned, Unsigned, Unsigned, Unsigned, Unsigned] | None = Field(
         None, description="object 1018h:4 of each node; another device is refused"
     )
+    eds: Text | None = Field(
+        None,
+        description="EDS file of the devices, relative to the cell file: they must be what it describes; "
+        "settings that differ from it are told",
+    )
     timeout_s: Positive = Field(0.5, description="longest wait for a complete round or an SDO answer")
     heartbeat_ms: int = Field(500, ge=0, le=65535, description="heartbeat period written to the nodes, ms")
     largest_speed: Positive | None = Field(

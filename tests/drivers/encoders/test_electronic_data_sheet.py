@@ -1,0 +1,165 @@
+"""Encoders against their maker's EDS file."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+
+from drivers.encoders.cia406 import Cia406Bank
+from drivers.encoders.electronic_data_sheet import read_data_sheet
+from drivers.encoders.object_dictionary import DEVICE_TYPE, PRESET, PRODUCT, VENDOR
+from hexacell.errors import DeviceError, FileError
+
+ABOUT = """[FileInfo]
+FileName=encoder.eds
+FileVersion=1
+EDSVersion=4.0
+
+[DeviceInfo]
+VendorName=Maker
+VendorNumber={vendor}
+ProductNumber=8
+SimpleBootUpSlave=1
+NrOfRXPDO=0
+NrOfTXPDO=2
+
+[MandatoryObjects]
+SupportedObjects=2
+1=0x1000
+2=0x1018
+
+[1000]
+ParameterName=Device type
+ObjectType=0x7
+DataType=0x0007
+AccessType=ro
+DefaultValue={kind}
+PDOMapping=0
+
+[1018]
+ParameterName=Identity
+ObjectType=0x9
+SubNumber=2
+
+[1018sub0]
+ParameterName=Highest sub-index
+ObjectType=0x7
+DataType=0x0005
+AccessType=ro
+DefaultValue=1
+
+[1018sub1]
+ParameterName=Vendor
+ObjectType=0x7
+DataType=0x0007
+AccessType=ro
+
+[OptionalObjects]
+SupportedObjects=2
+1=0x6000
+2=0x6003
+
+[6000]
+ParameterName=Operating parameters
+ObjectType=0x7
+DataType=0x0006
+AccessType=rw
+DefaultValue=0
+
+[6003]
+ParameterName=Preset
+ObjectType=0x7
+DataType=0x0004
+AccessType=rw
+DefaultValue=-5
+"""
+
+
+@pytest.fixture
+def sheet(tmp_path: Path):
+    """Writes a file; the raw nodes are vendor 0x99 and have no product."""
+
+    def write(vendor: str = "0x99", kind: str = "0x00080196") -> Path:
+        text = ABOUT.format(vendor=vendor, kind=kind).replace("ProductNumber=8\n", "")
+        (tmp_path / "encoder.eds").write_text(text)
+        return tmp_path / "encoder.eds"
+
+    return write
+
+
+def test_its_values_are_those_that_a_node_sends(tmp_path: Path) -> None:
+    (tmp_path / "encoder.eds").write_text(ABOUT.format(vendor="0x99", kind="0x00080196"))
+    values = read_data_sheet(tmp_path / "encoder.eds").values
+    assert (values[DEVICE_TYPE], values[VENDOR], values[PRODUCT]) == (0x0008_0196, 0x99, 8)
+    assert values[PRESET] == 2**32 - 5
+
+
+def test_names_may_be_in_any_encoding(sheet) -> None:
+    path = sheet()
+    path.write_bytes(path.read_bytes().replace(b"Maker", "M\u00e4ker".encode("latin-1")))
+    assert read_data_sheet(path).values[VENDOR] == 0x99
+
+
+async def test_devices_that_are_as_delivered_have_no_remark(raw, settings, sheet) -> None:
+    bank = Cia406Bank(settings.model_copy(update={"eds": str(sheet())}))
+    assert {identity.remark for identity in await bank.open()} == {""}
+    await bank.close()
+
+
+async def test_a_setting_that_was_changed_is_told_beside_a_warning(raw, settings, sheet) -> None:
+    raw.nodes[3].objects[0x6000, 0] = b"\x08\0"
+    raw.nodes[3].objects[0x6505, 0] = b"\x04\0"
+    bank = Cia406Bank(settings.model_copy(update={"eds": str(sheet())}))
+    remarks = [identity.remark for identity in await bank.open()]
+    await bank.close()
+    assert remarks[2] == (
+        "it reports a warning: object 6505h:0 is 0x0004; operating parameters 8, where encoder.eds has 0"
+    )
+    assert set(remarks[:2] + remarks[3:]) == {""}
+
+
+@pytest.mark.parametrize(
+    ("file", "told"),
+    [
+        ({"vendor": "0x12"}, "its vendor is 0x99, the file says 0x12"),
+        ({"kind": "0x000A0196"}, "its device type is 0x80196, the file says 0xA0196"),
+    ],
+)
+async def test_another_device_is_refused_by_its_leg(raw, settings, sheet, file, told) -> None:
+    bank = Cia406Bank(settings.model_copy(update={"eds": str(sheet(**file))}))
+    with pytest.raises(DeviceError, match=f"is not the device of encoder.eds: {told}") as refused:
+        await bank.open()
+    assert refused.value.subject == "encoder of leg 1 (node 1)"
+
+
+async def test_a_file_that_is_not_there_is_named(settings, tmp_path: Path) -> None:
+    bank = Cia406Bank(settings.model_copy(update={"eds": str(tmp_path / "none.eds")}))
+    with pytest.raises(FileError, match=r"none.eds: cannot be read: No such file"):
+        await bank.open()
+
+
+@pytest.mark.parametrize("text", ["", "nothing", "[FileInfo]\n", "[1000]\nParameterName=x\n", "\0\1\2"])
+def test_what_is_no_such_file_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "other.eds").write_text(text)
+    with pytest.raises(FileError, match=r"other.eds: is no EDS file of an encoder"):
+        read_data_sheet(tmp_path / "other.eds")
+
+
+@hypothesis_settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    place=st.integers(0, len(ABOUT)),
+    length=st.integers(0, 40),
+    piece=st.text(alphabet="[]=\n0x9zA\u00e4%$", max_size=12),
+)
+def test_damage_anywhere_gives_plain_errors_only(
+    tmp_path: Path, place: int, length: int, piece: str
+) -> None:
+    text = ABOUT.format(vendor="0x99", kind="0x00080196")
+    (tmp_path / "encoder.eds").write_text(text[:place] + piece + text[place + length :])
+    with suppress(FileError):
+        read_data_sheet(tmp_path / "encoder.eds")

@@ -79,7 +79,7 @@ def search_bus(bus: Mapping[str, Any]) -> BusFindings:
     """The nodes that answer on a bus, by node id."""
     try:
         with _opened(bus) as opened:
-            ids = _responding(opened)
+            ids = responding_nodes(opened)
             return BusFindings(bus, tuple(_described(opened, node) for node in ids))
     except HexacellError as error:
         return BusFindings(bus, problem=str(error))
@@ -91,7 +91,7 @@ def _opened(bus: Mapping[str, Any]) -> Iterator[EncoderBus]:
         yield opened
 
 
-def _responding(bus: EncoderBus) -> list[int]:
+def responding_nodes(bus: EncoderBus) -> list[int]:
     """The nodes that respond to a question to each: until no further one does for a while."""
     scanner = bus.network.scanner
     scanner.search()

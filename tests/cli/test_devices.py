@@ -16,11 +16,13 @@ from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
+from hexacell.errors import ExitCode
 from tests.cli.terminal import ended, start_at
 
 pytestmark = pytest.mark.usefixtures("lines_only")
 
 CELL = "simulated-hexaglide.toml"
+NO_BUS = "interface=virtual,channel=x"
 NOBODY = "127.0.0.1:1"
 """A port where no server listens."""
 
@@ -216,3 +218,36 @@ def test_a_cell_file_is_written_from_what_was_found_and_answers(
     assert [gauge.resolution_mm for gauge in written.gauges] == [0.001, 0.001, 0.0001]
     assert written.encoders.serial_numbers == tuple(range(1001, 1007))
     assert f"{written.controller.host}:{written.controller.port}" == controller
+
+
+def test_a_node_id_is_set_for_the_only_device_alone(start, terminal, addresses) -> None:
+    """The six encoders of the cell are all on this bus."""
+    _, adapter, _ = addresses
+    bus = f"interface=slcan,channel={adapter},sleep_after_open=0"
+    process = start_at(terminal, start, "devices", "--can", bus, "--set-node", "9")
+    terminal.read_until("Type yes: ")
+    terminal.type("yes\n")
+    assert ended(process, terminal) == ExitCode.HARDWARE
+    told = " ".join(terminal.shown.split())
+    assert "has several nodes: 1, 2, 3, 4, 5, 6. Connect the one device" in told
+
+
+def test_a_node_id_is_not_set_unless_a_person_agrees(start, terminal) -> None:
+    process = start_at(terminal, start, "devices", "--can", NO_BUS, "--set-node", "9")
+    terminal.read_until("Type yes: ")
+    terminal.type("no\n")
+    assert ended(process, terminal) == ExitCode.ANSWER_NEEDED
+    assert "Nothing was set" in terminal.shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (("--can", NO_BUS, "--set-node", "9"), 4, "Start it at a terminal"),
+        (("--set-node", "9"), 2, "--set-node wants one bus"),
+        (("--can", NO_BUS, "--set-node", "128"), 2, "--set-node"),
+    ],
+)
+def test_a_node_id_without_a_person_a_bus_or_a_number_is_refused(typed_here, arguments, code, told) -> None:
+    refused = typed_here("devices", *arguments)
+    assert (refused.code, told in refused.err) == (code, True)

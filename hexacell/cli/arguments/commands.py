@@ -8,6 +8,8 @@ from typing import Any, NoReturn
 
 from hexacell.errors import UsageError
 
+LARGEST_NODE_ID = 127
+
 
 class Parser(argparse.ArgumentParser):
     """A parser that raises instead of exiting, so that every error is reported in the same form.
@@ -88,5 +90,13 @@ def positive(text: str) -> int:
     """A number above zero; raises ``ValueError`` likewise."""
     number = int(text)
     if number < 1:
+        raise ValueError
+    return number
+
+
+def node_id(text: str) -> int:
+    """A CANopen node id, from 1 to 127; raises ``ValueError`` likewise."""
+    number = int(text)
+    if not 1 <= number <= LARGEST_NODE_ID:
         raise ValueError
     return number

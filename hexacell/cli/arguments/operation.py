@@ -12,6 +12,7 @@ from hexacell.cli.arguments.commands import (
     add_file,
     add_json,
     add_parser,
+    node_id,
     not_negative,
 )
 
@@ -50,6 +51,12 @@ def _devices(commands: Any) -> None:  # noqa: ANN401
         default="127.0.0.1:5007",
         metavar="HOST:PORT",
         help="where LinuxCNC's server may be (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--set-node",
+        type=node_id,
+        metavar="ID",
+        help="give the only device on a CAN bus this node id (LSS), after a question",
     )
     add_file(parser, "--write", "write a cell file: what was found, and your answers to the rest")
     parser.add_argument("--diagnose", metavar="NAME", help="watch a gauge, or encoders, of --cell")

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from drivers.discovery.node_ids import set_node_id
 from hexacell.application.device_diagnosis import diagnose
 from hexacell.application.device_search import SearchFindings, SearchRequest, search_devices
 from hexacell.application.found_cell import draft_of
@@ -22,12 +23,31 @@ from hexacell.screen.assistant import FirstCellAssistant
 
 
 def main(options: argparse.Namespace) -> ExitCode:
-    """Search, or watch one device of a cell; nothing moves, and no device is set."""
+    """Search, or watch one device of a cell; nothing moves. Only ``--set-node`` sets a device."""
     console = Console(options.json)
     if options.diagnose is not None and options.ports:
         problem = f"--diagnose watches a device of the cell, and {options.ports[0]} is a port"
         raise UsageError(problem, action="Leave the port out, or --diagnose")
+    if options.set_node is not None:
+        return _set_node(options, console)
     return _watch(options, console) if options.diagnose is not None else _search(options, console)
+
+
+def _set_node(options: argparse.Namespace, console: Console) -> ExitCode:
+    """Set the node id of the only device on a bus, once a person has agreed."""
+    if len(options.can) != 1:
+        raise UsageError("--set-node wants one bus", action="Name it: --can interface=slcan,channel=...")
+    if not is_interactive():
+        raise AnswerNeeded("--set-node changes a device for good", action="Start it at a terminal")
+    console.print(wrapped(f"The only device on this bus gets node id {options.set_node}, and keeps it."))
+    console.prompt("Is it the only one that is connected? Type yes: ")
+    if sys.stdin.readline().strip().lower() != "yes":
+        raise AnswerNeeded("it was not agreed", action="Nothing was set")
+    before = set_node_id(_bus(options.can[0]), options.set_node)
+    had = "had none" if before is None else f"had {before}"
+    console.print(f"Node {options.set_node} answers; it {had}.")
+    console.document({"node": options.set_node, "before": before})
+    return ExitCode.DONE
 
 
 def _search(options: argparse.Namespace, console: Console) -> ExitCode:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import uuid
 from collections.abc import AsyncIterator, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import can
@@ -15,8 +16,46 @@ from hexacell.cell.devices import LinearEncoderSettings
 from tests.drivers.encoders.raw_node import NMT, SDO_ANSWER, SDO_REQUEST, SYNC, RawNode, plain_objects
 from tests.waiting import until
 
+LSS_REQUEST, LSS_ANSWER = 0x7E5, 0x7E4
+SWITCH_GLOBAL, CONFIGURE_NODE_ID = 0x04, 0x11
+RESET_ALL = bytes((0x82, 0))
 MARKER = 0x7F0
 """An identifier that no node uses."""
+
+
+@dataclass
+class LayerSetting:
+    """How all devices in configuration state answer LSS requests (CiA 305).
+
+    ``nameless`` are devices without a node id, which answer nothing else; ``refusal`` is the error code
+    of an id that is not taken; ``forgets`` it at the reset.
+    """
+
+    nameless: int = 0
+    is_known: bool = True
+    refusal: int = 0
+    forgets: bool = False
+    is_configuring: bool = False
+    node: int | None = None
+
+    def answers(self, data: bytes, named: int) -> list[bytes]:
+        """Of each device that is meant."""
+        if data[0] == SWITCH_GLOBAL:
+            self.is_configuring = data[1] == 1
+        if data[0] == SWITCH_GLOBAL or not (self.is_configuring and self.is_known):
+            return []
+        if data[0] == CONFIGURE_NODE_ID and not self.refusal:
+            self.node = data[1]
+        code = self.refusal if data[0] == CONFIGURE_NODE_ID else 0
+        return [bytes((data[0], code)) + bytes(6)] * (named + self.nameless)
+
+    def renamed(self, nodes: dict[int, RawNode]) -> dict[int, RawNode]:
+        """The nodes after a reset."""
+        if self.node is None or self.forgets:
+            return nodes
+        [one] = nodes.values() or [RawNode(self.node, plain_objects(self.node))]
+        one.node = self.node
+        return {self.node: one}
 
 
 class RawBus:
@@ -28,6 +67,7 @@ class RawBus:
         self.heard: list[tuple[int, bytes]] = []
         self.syncs = 0
         self.synced = threading.Event()
+        self.layer_setting = LayerSetting()
         self._bus = can.Bus(self.channel, interface="virtual")
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run)
@@ -69,6 +109,11 @@ class RawBus:
     def _react(self, can_id: int, data: bytes) -> None:
         if can_id == SYNC:
             self._sync()
+        elif can_id == LSS_REQUEST:
+            for answer in self.layer_setting.answers(data, len(self.nodes)):
+                self.send(LSS_ANSWER, answer)
+        elif can_id == NMT and data == RESET_ALL:
+            self.nodes = self.layer_setting.renamed(self.nodes)
         elif can_id == NMT and data[1] in self.nodes:
             self.nodes[data[1]].state = {1: 0x05, 0x80: 0x7F}[data[0]]
         elif can_id - SDO_REQUEST in self.nodes:

@@ -1,0 +1,99 @@
+"""The node id of one CANopen device is set, by LSS (CiA 305): of an encoder that comes with another one.
+
+All devices in LSS configuration state take the same id. So the device must be alone on the bus, and devices
+are counted before anything is set.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
+from typing import Any
+
+from canopen.lss import CS_INQUIRE_VENDOR_ID, LssError, LssMaster
+
+from drivers.discovery.encoders import responding_nodes
+from drivers.encoders.can_bus import EncoderBus
+from drivers.errors import BusError
+from hexacell.errors import DeviceError
+
+RESPONSES = 0x7E4
+SECOND_RESPONSE_S = 0.1
+"""How long a second device may take to answer the same question."""
+
+_NMT, _RESET_COMMUNICATION = 0x000, bytes((0x82, 0))
+ALONE = "Connect the one device whose node id is to be set, and no other"
+
+
+def set_node_id(bus: Mapping[str, Any], node: int) -> int | None:
+    """Have the only device on a bus take a node id, and keep it; the id that it had, if it had one.
+
+    Args:
+        bus: settings for ``can.Bus``.
+        node: from 1 to 127.
+
+    Raises:
+        BusError: the bus cannot be opened, or has failed; or nothing has the id afterwards.
+        DeviceError: there is no device, or more than one; it does not know LSS, or refuses the id.
+    """
+    with closing(EncoderBus(bus, threading.Event())) as opened:
+        before = responding_nodes(opened)
+        if len(before) > 1:
+            told = ", ".join(map(str, before))
+            raise DeviceError(f"has several nodes: {told}", subject=opened.name, action=ALONE)
+        with _in_configuration_state(opened) as master:
+            _require_alone(opened, master)
+            _store(opened, master, node)
+        opened.network.send_message(_NMT, _RESET_COMMUNICATION)
+        _require_taken(opened, node)
+        return before[0] if before else None
+
+
+@contextmanager
+def _in_configuration_state(bus: EncoderBus) -> Iterator[LssMaster]:
+    master = bus.network.lss
+    master.send_switch_state_global(master.CONFIGURATION_STATE)  # type: ignore[no-untyped-call]
+    try:
+        yield master
+    finally:
+        master.send_switch_state_global(master.WAITING_STATE)  # type: ignore[no-untyped-call]
+
+
+def _require_alone(bus: EncoderBus, master: LssMaster) -> None:
+    """Also a device without a node id, which no search finds, answers what its vendor is."""
+    answers: list[int] = []
+    bus.network.subscribe(RESPONSES, lambda *_frame: answers.append(1))
+    try:
+        master.inquire_lss_address(CS_INQUIRE_VENDOR_ID)  # type: ignore[no-untyped-call]
+    except LssError as error:
+        raise DeviceError(
+            f"has no device that knows LSS: {error}",
+            subject=bus.name,
+            action="Check supply, cable and bit rate, or set its node id with its vendor's tool",
+        ) from error
+    bus.listen(SECOND_RESPONSE_S)
+    if len(answers) > 1:
+        raise DeviceError(f"has {len(answers)} devices that answer", subject=bus.name, action=ALONE)
+
+
+def _store(bus: EncoderBus, master: LssMaster, node: int) -> None:
+    try:
+        master.configure_node_id(node)  # type: ignore[no-untyped-call]
+        master.store_configuration()  # type: ignore[no-untyped-call]
+    except LssError as error:
+        raise DeviceError(
+            f"has a device that refuses node id {node}: {error}",
+            subject=bus.name,
+            action="Set it with its vendor's tool",
+        ) from error
+
+
+def _require_taken(bus: EncoderBus, node: int) -> None:
+    bus.network.scanner.reset()
+    if node not in responding_nodes(bus):
+        raise BusError(
+            f"has no node {node} after it was stored",
+            subject=bus.name,
+            action="Switch the device off and on, and look: hexacell devices --can",
+        )

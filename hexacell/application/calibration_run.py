@@ -11,6 +11,7 @@ from pathlib import Path
 from drivers.interfaces import DeviceIdentity
 from hexacell import __version__
 from hexacell.application.accepted_results import last_accepted_result
+from hexacell.application.changed_devices import with_changes
 from hexacell.application.device_setup import Connected, device_addresses, open_devices
 from hexacell.application.held_config import held_config
 from hexacell.application.journal_soundness import require_sound
@@ -147,7 +148,7 @@ async def _checked_devices(
                 failures += await device_failures(connected.devices)
                 failures += await start_failures(connected.devices, folder, settings.guards.free_disk_mb)
                 raise_all(failures)
-                yield connected
+                yield replace(connected, identities=with_changes(cell, connected.identities))
     except HexacellError as error:
         if not failures:
             raise

@@ -1,0 +1,67 @@
+"""Devices that are not what they were when the cell was last run: exchanged, set anew, plugged elsewhere.
+
+That may be on purpose, and a new run takes them as they are. But a preset, a reversed direction or an
+exchanged encoder changes what a robot is thought to do, so it is told with the device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+
+from drivers.interfaces import DeviceIdentity
+from hexacell.cell.loader import Cell
+from hexacell.errors import HexacellError
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from procedures.journal.line_format import decode
+from procedures.run import events
+
+COMPARED = {
+    "protocol": "protocol",
+    "description": "device",
+    "serial_number": "serial number",
+    "settings": "settings",
+    "port": "port",
+}
+
+
+def with_changes(cell: Cell, found: Iterable[DeviceIdentity]) -> tuple[DeviceIdentity, ...]:
+    """Devices as found, each with a remark on what differs from the last run that can be read."""
+    run, known = _last(cell)
+    return tuple(_remarked(one, known[one.name], run) if one.name in known else one for one in found)
+
+
+def _last(cell: Cell) -> tuple[str, dict[str, DeviceIdentity]]:
+    """The name of the last run, which its time is, and the devices with which it began."""
+    folder = runs_folder(cell)
+    for path in sorted(folder.iterdir(), reverse=True) if folder.is_dir() else ():
+        started = _started(RunFolder(path))
+        if started is not None and started.devices:
+            return path.name, {one.name: one for one in started.devices}
+    return "", {}
+
+
+def _started(run: RunFolder) -> events.RunStarted | None:
+    """The first event of a run; none where it cannot be read."""
+    with suppress(OSError, HexacellError), run.journal.open("rb") as journal:
+        entry = decode(journal.readline(), run.journal, 1)
+        if entry is not None and isinstance(entry.event, events.RunStarted):
+            return entry.event
+    return None
+
+
+def _remarked(now: DeviceIdentity, then: DeviceIdentity, run: str) -> DeviceIdentity:
+    changes = list(_changes(now, then))
+    if not changes:
+        return now
+    told = f"since the run {run}: {', '.join(changes)}"
+    return replace(now, remark="; ".join(filter(None, (now.remark, told))))
+
+
+def _changes(now: DeviceIdentity, then: DeviceIdentity) -> Iterator[str]:
+    """What a run of before did not tell is no change."""
+    for field, word in COMPARED.items():
+        before, after = getattr(then, field), getattr(now, field)
+        if before and before != after:
+            yield f"{word} {after or 'none'}, which was {before}"

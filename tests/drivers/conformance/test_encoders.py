@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
 from drivers.conformance import EncoderConformance, EncoderTwin, served_encoder_twin
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.encoders.cia406 import Cia406Bank
+from drivers.encoders.dbc import DbcBank
 from drivers.encoders.of_controller import ControllerScales
 from drivers.interfaces import DeviceIdentity, EncoderBank, EncoderSample, StartupAction
+from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.cell.simulation import FaultKind
+from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
 
 TIMEOUT_S = 1.0
@@ -102,6 +107,40 @@ class TestScalesOfAController(EncoderConformance):
         machine = MachineThatStands()
         with SimulatedController(machine, ControllerSettings(config="machine.ini")) as server:
             yield ControllerTwin(machine, server)
+
+
+class DbcTwin:
+    """Six encoders that a DBC file describes."""
+
+    def __init__(self, folder: Path) -> None:
+        (folder / "encoders.dbc").write_text(dbc_text())
+        described = {"file": str(folder / "encoders.dbc"), "signals": SIGNALS, "request": "080#"}
+        stated = LinearEncoderSettings.model_validate(
+            {"protocol": "dbc", "timeout_s": TIMEOUT_S, "measuring_step_nm": 500, "dbc": described}
+        )
+        assert stated.dbc is not None
+        self._joints: tuple[float, ...] = (0.0,) * 6
+        self.bank = SimulatedDbcBank(stated, stated.dbc, lambda: self._joints)
+        self.settings = stated.model_copy(update={"bus": self.bank.bus_settings})
+
+    def stand_at(self, joints: Sequence[float]) -> None:
+        self._joints = tuple(joints)
+
+    def inject(self, fault: FaultKind, *, on: bool) -> None:
+        self.bank.faults(3)[fault](on=on)
+
+    def close(self) -> None:
+        self.bank.close()
+
+
+class TestByDbcFile(EncoderConformance):
+    def driver(self, twin: EncoderTwin) -> EncoderBank:
+        return DbcBank(twin.settings)
+
+    @contextmanager
+    def twin(self) -> Iterator[EncoderTwin]:
+        with TemporaryDirectory() as folder, closing(DbcTwin(Path(folder))) as twin:
+            yield twin
 
 
 def test_samples_of_two_instants_are_found() -> None:

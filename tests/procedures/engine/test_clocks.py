@@ -41,6 +41,8 @@ MAY_LOOK = {
     "drivers/serial/port.py": "dates what went over a wire",
     "drivers/controllers/linuxcnc/connection.py": "likewise",
     "drivers/encoders/can_bus.py": "likewise",
+    "drivers/gauges/modbus_port.py": "likewise",
+    "drivers/gauges/visa_port.py": "likewise",
 }
 
 

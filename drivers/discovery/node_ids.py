@@ -90,7 +90,7 @@ def _store(bus: EncoderBus, master: LssMaster, node: int) -> None:
 
 
 def _require_taken(bus: EncoderBus, node: int) -> None:
-    bus.network.scanner.reset()
+    bus.network.scanner.reset()  # type: ignore[no-untyped-call]
     if node not in responding_nodes(bus):
         raise BusError(
             f"has no node {node} after it was stored",

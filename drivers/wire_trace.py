@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from operator import itemgetter
+from typing import Self
 
 from hexacell.errors import FileError
 
@@ -38,6 +40,11 @@ class TraceEntry:
     line: str
     direction: TrafficDirection
     data: bytes
+
+    @classmethod
+    def now(cls, line: str, direction: TrafficDirection, data: bytes) -> Self:
+        """Of bytes that are transferred at this moment."""
+        return cls(time.time(), line, direction, data)
 
     def __str__(self) -> str:
         """One line of text: time, line, direction, the bytes in hexadecimal and as characters."""

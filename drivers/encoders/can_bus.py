@@ -141,7 +141,7 @@ class EncoderBus:
     def _record(self, direction: TrafficDirection, message: can.Message) -> None:
         if self._trace is not None:
             text = f"{message.arbitration_id:03X}#{bytes(message.data).hex().upper()}"
-            self._trace(TraceEntry(time.time(), self.name, direction, text.encode()))
+            self._trace(TraceEntry.now(self.name, direction, text.encode()))
 
     def _error(self, what: str, cause: Exception) -> BusError:
         return BusError(

@@ -10,7 +10,6 @@ import logging
 import struct
 import termios
 import threading
-import time
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -18,6 +17,7 @@ from typing import Any
 
 from drivers.errors import PortLost
 from drivers.extras import optional
+from drivers.serial.errors import lost_port
 from drivers.serial.port import SLICE_S, NoAnswer
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError
@@ -107,7 +107,7 @@ class ModbusPort:
         """
         self.require_not_closed()
         if self._client is None:
-            raise self._lost("it is not open")
+            raise lost_port(self.subject, self.url, "it is not open")
         device, function, address, count = REQUEST.unpack(request)
         client, self._received = self._client, b""
         client.comm_params.timeout_connect = timeout_s
@@ -152,7 +152,7 @@ class ModbusPort:
             self._received = data
         if new and self._recorder is not None:
             direction = TrafficDirection.SENT if sending else TrafficDirection.RECEIVED
-            self._recorder(TraceEntry(time.time(), self.url, direction, new))
+            self._recorder(TraceEntry.now(self.url, direction, new))
         return data
 
     @contextmanager
@@ -164,18 +164,11 @@ class ModbusPort:
             raise NoAnswer(self._received) from error
         except (OSError, termios.error, self._modbus.exceptions.ModbusException) as error:
             self.close()
-            raise self._lost(str(error)) from error
+            raise lost_port(self.subject, self.url, str(error)) from error
 
     def _refused(self, device: int, code: int) -> DeviceError:
         return DeviceError(
             f"device {device} answers exception {code} ({EXCEPTIONS.get(code, 'of its maker')})",
             subject=self.subject,
             action="Correct device, kind and register in [gauges.modbus]",
-        )
-
-    def _lost(self, reason: str) -> PortLost:
-        return PortLost(
-            f"port {self.url} was lost ({reason})",
-            subject=self.subject,
-            action="Plug it in and open the device again; its zero is void",
         )

@@ -15,6 +15,7 @@ from typing import Any
 
 from drivers.errors import PortLost
 from drivers.extras import optional
+from drivers.serial.errors import lost_port
 from drivers.serial.port import FRAME_LIMIT, SLICE_S, NoAnswer
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError
@@ -86,7 +87,7 @@ class VisaPort:
         """
         self.require_not_closed()
         if self._resource is None:
-            raise self._lost("it is not open")
+            raise lost_port(self.subject, self.url, "it is not open", "Connect it")
         with self._visa_errors():
             if self._must_clear:
                 self._clear()
@@ -190,7 +191,7 @@ class VisaPort:
 
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if data and self._recorder is not None:
-            self._recorder(TraceEntry(time.time(), self.url, direction, data))
+            self._recorder(TraceEntry.now(self.url, direction, data))
 
     @contextmanager
     def _visa_errors(self) -> Iterator[None]:
@@ -198,11 +199,4 @@ class VisaPort:
             yield
         except (OSError, termios.error, self._visa.errors.Error) as error:
             self.close()
-            raise self._lost(str(error)) from error
-
-    def _lost(self, reason: str) -> PortLost:
-        return PortLost(
-            f"port {self.url} was lost ({reason})",
-            subject=self.subject,
-            action="Connect it and open the device again; its zero is void",
-        )
+            raise lost_port(self.subject, self.url, str(error), "Connect it") from error

@@ -25,6 +25,15 @@ _CAUSES = {
 }
 
 
+def lost_port(subject: str, url: str, reason: str, action: str = "Plug it in") -> PortLost:
+    """The error for the port ``url``, which was open."""
+    return PortLost(
+        f"port {url} was lost ({reason})",
+        subject=subject,
+        action=f"{action} and open the device again; its zero is void",
+    )
+
+
 @contextmanager
 def opening_errors(subject: str, url: str) -> Iterator[None]:
     """Convert the errors of opening the port ``url``.

@@ -18,7 +18,7 @@ from math import inf
 import serial
 
 from drivers.errors import PortLost
-from drivers.serial.errors import opening_errors
+from drivers.serial.errors import lost_port, opening_errors
 from drivers.serial.frame_log import FrameLog
 from drivers.serial.framing import LINE_ENDS, cut_frame, is_copies
 from drivers.serial.parity import have_terminal_check, in_software
@@ -120,7 +120,7 @@ class SerialPort:
                 continuously.
         """
         if self._port is None:
-            raise self._lost("it is not open")
+            raise lost_port(self.subject, self.url, "it is not open")
         with self._port_errors():
             for _ in range(EXCHANGE_TRIES):
                 self._resynchronise(self._port)
@@ -137,7 +137,7 @@ class SerialPort:
             DeviceError: The port is not open, was lost, or is being closed.
         """
         if self._port is None:
-            raise self._lost("it is not open")
+            raise lost_port(self.subject, self.url, "it is not open")
         with self._port_errors():
             if not self._port.in_waiting:
                 self._empty_at = self.now()
@@ -281,7 +281,7 @@ class SerialPort:
 
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if data and self._recorder is not None:
-            self._recorder(TraceEntry(time.time(), self.url, direction, data))
+            self._recorder(TraceEntry.now(self.url, direction, data))
 
     @contextmanager
     def _port_errors(self) -> Iterator[None]:
@@ -289,20 +289,13 @@ class SerialPort:
             yield
         except (OSError, termios.error) as error:
             self.close()
-            raise self._lost(str(error)) from error
+            raise lost_port(self.subject, self.url, str(error)) from error
 
     def _not_silent(self) -> DeviceError:
         return DeviceError(
             f"the device on {self.url} keeps sending unasked",
             subject=self.subject,
             action="Switch its continuous output off, or correct port and protocol in the cell file",
-        )
-
-    def _lost(self, reason: str) -> PortLost:
-        return PortLost(
-            f"port {self.url} was lost ({reason})",
-            subject=self.subject,
-            action="Plug it in and open the device again; its zero is void",
         )
 
 

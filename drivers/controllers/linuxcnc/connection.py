@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import os
 import re
-import time
 from collections import deque
 from collections.abc import Callable
 from typing import Self
@@ -234,7 +233,7 @@ class Connection:
         if self._recorder is None or not data:
             return
         data = without_passwords(data, self._address)  # traces are handed to others
-        self._recorder(TraceEntry(time.time(), self._address.name, direction, data))
+        self._recorder(TraceEntry.now(self._address.name, direction, data))
 
 
 def without_passwords(data: bytes, address: Address) -> bytes:

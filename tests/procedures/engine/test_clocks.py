@@ -38,11 +38,7 @@ MAY_LOOK = {
     "hexacell/application/telling_people.py": "gives up notices that were tried and are days old",
     "hexacell/storage/cell_lock.py": "says since when somebody holds a cell",
     "procedures/journal/line_format.py": "dates a record",
-    "drivers/serial/port.py": "dates what went over a wire",
-    "drivers/controllers/linuxcnc/connection.py": "likewise",
-    "drivers/encoders/can_bus.py": "likewise",
-    "drivers/gauges/modbus_port.py": "likewise",
-    "drivers/gauges/visa_port.py": "likewise",
+    "drivers/wire_trace.py": "dates what went over a wire",
 }
 
 

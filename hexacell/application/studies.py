@@ -9,25 +9,19 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Generic, cast
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from hexacell.errors import FileError
 from hexacell.storage import atomic_files
-from hexacell.study import paper_experiment, paper_simulation
-from hexacell.study.experiment_summary import ExperimentStudy, experiment_summary, experiments_of
-from hexacell.study.paper_experiment import ExperimentOutcome
-from hexacell.study.paper_simulation import Outcome
-from hexacell.study.paper_summary import PaperStudy, summary, trials_of
+from hexacell.study.definition import ResultType, Study, SummaryType, TaskType
 from hexacell.study.tasks import results_of
 
 OnProgress = Callable[[int, int], None]
 """Told how many tasks of how many are done."""
 
 NewExecutor = Callable[[], Executor]
-TaskType = TypeVar("TaskType")
-ResultType = TypeVar("ResultType")
 
 
 class _Kept(BaseModel, Generic[ResultType]):
@@ -37,32 +31,32 @@ class _Kept(BaseModel, Generic[ResultType]):
     outcome: ResultType
 
 
-def study_paper(folder: Path, draws: int, new_executor: NewExecutor, told: OnProgress) -> PaperStudy:
-    """The paper's simulations; what ``folder`` has of them already is not computed again.
+def run_study(
+    study: Study[TaskType, ResultType, SummaryType],
+    folder: Path,
+    draws: int,
+    new_executor: NewExecutor,
+    told: OnProgress,
+) -> SummaryType:
+    """What a study says; what ``folder`` has of its results already is not computed again.
 
     Args:
-        folder: gets a line for each trial, in ``paper.jsonl``.
-        draws: of the orientations and of the noise, for each kind of trial.
-        new_executor: what carries out the trials, such as :func:`processes`; another one where it breaks.
+        study: one of them.
+        folder: gets a line for each task, in a file ``.jsonl`` named after the study.
+        draws: as many as the study is to make.
+        new_executor: what carries out the tasks, such as :func:`processes`; another one where it breaks.
         told: of the progress.
 
     Raises:
         FileError: the folder cannot be written, or has another file of that name.
         WorkersLost: executors break one after the other.
     """
-    trials, kept = trials_of(draws), TypeAdapter(_Kept[Outcome])
-    found = _results(folder / "paper.jsonl", kept, trials, paper_simulation.run_trial, new_executor, told)
-    return summary(trials, found)
-
-
-def study_experiment(
-    folder: Path, draws: int, new_executor: NewExecutor, told: OnProgress
-) -> ExperimentStudy:
-    """The paper's experiment, as :func:`study_paper`; the lines are in ``experiment.jsonl``."""
-    experiments, kept = experiments_of(draws), TypeAdapter(_Kept[ExperimentOutcome])
-    path = folder / "experiment.jsonl"
-    found = _results(path, kept, experiments, paper_experiment.run_experiment, new_executor, told)
-    return experiment_summary(experiments, found)
+    tasks = study.tasks_of(draws)
+    path = folder / f"{study.name}.jsonl"
+    kept = cast("type[_Kept[ResultType]]", _Kept.__class_getitem__(study.result_type))
+    return study.summary(
+        tasks, _results(path, TypeAdapter(kept), tasks, study.carry_out, new_executor, told)
+    )
 
 
 def _results(

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.study.paper_experiment import Differences, Experiment, ExperimentOutcome
+from hexacell.study.definition import Study
+from hexacell.study.paper_experiment import Differences, Experiment, ExperimentOutcome, run_experiment
 
 REPEATABILITIES_MM = (0.002, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 PAPER_REDUCTION = 0.60
@@ -85,3 +86,9 @@ def experiment_summary(
 def _median(differences: Iterable[Sequence[float]]) -> float:
     means = [float(np.mean(one)) for one in differences if one]
     return float(np.median(means)) if means else float("nan")
+
+
+EXPERIMENT = Study(
+    "experiment", "experiments", experiments_of, run_experiment, ExperimentOutcome, experiment_summary
+)
+"""The paper's experiment."""

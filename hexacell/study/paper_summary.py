@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.study.paper_simulation import Angles, Errors, Outcome, Trial
+from hexacell.study.definition import Study
+from hexacell.study.paper_simulation import Angles, Errors, Outcome, Trial, run_trial
 
 MOST_POINTS = 5
 FIGURES = {4: 11, 5: 5}
@@ -151,3 +152,7 @@ def _after(errors: Errors, steps: int) -> float:
 def _median(values: Iterable[float]) -> float:
     found = list(values)
     return float(np.median(found)) if found else float("nan")
+
+
+PAPER = Study("paper", "trials", trials_of, run_trial, Outcome, summary)
+"""The paper's simulations."""

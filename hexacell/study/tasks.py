@@ -8,12 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
-from typing import TypeVar
 
 from hexacell.errors import HexacellError
-
-TaskType = TypeVar("TaskType")
-ResultType = TypeVar("ResultType")
+from hexacell.study.definition import ResultType, TaskType
 
 MOST_LOSSES = 5
 """Executors that may break in a row without a single result."""

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.application.studies import processes, study_paper
-from hexacell.study.paper_summary import PAPER_EXACT_MM, PAPER_NOISY_MM, PaperStudy
+from hexacell.application.studies import processes, run_study
+from hexacell.study.paper_summary import PAPER, PAPER_EXACT_MM, PAPER_NOISY_MM, PaperStudy
 
 pytestmark = pytest.mark.benchmark
 
@@ -27,7 +27,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> PaperStudy:
 
 @cache
 def _study(folder: Path) -> PaperStudy:
-    return study_paper(folder, DRAWS, processes(None), lambda *_: None)
+    return run_study(PAPER, folder, DRAWS, processes(None), lambda *_: None)
 
 
 def test_one_point_never_identifies(study, say) -> None:

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from hexacell.cli.arguments import studies
 from hexacell.errors import ExitCode
+from hexacell.presentation.studies import STUDIES
 
 PAPER = ("study", "paper", "--draws", "1", "--processes", "2", "--folder", "kept")
 
@@ -74,3 +76,7 @@ def test_what_is_no_study_is_not_overwritten(typed_here, tmp_path: Path) -> None
 def test_a_number_of_draws_is_above_zero(typed_here, number: str) -> None:
     refused = typed_here("study", "paper", "--draws", number)
     assert (refused.code, "--draws" in refused.err) == (ExitCode.USAGE, True)
+
+
+def test_the_command_has_every_study_and_no_other() -> None:
+    assert [row.name for row in studies.STUDIES] == list(STUDIES)

@@ -3,42 +3,24 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from hexacell.application.studies import processes, study_experiment, study_paper
+from hexacell.application.studies import processes, run_study
 from hexacell.cli.console import Console
 from hexacell.cli.progress import task_bar
 from hexacell.errors import ExitCode
-from hexacell.presentation.experiment_study import experiment_document, experiment_lines, experiment_picture
-from hexacell.presentation.paper_figures import study_picture
-from hexacell.presentation.paper_study import study_document, study_lines
+from hexacell.presentation.studies import STUDIES
 from hexacell.storage import atomic_files
 
 
-def paper(options: argparse.Namespace) -> ExitCode:
-    """The simulations of the paper; a picture of its figures goes into the folder."""
-    console = Console(options.json)
-    with task_bar("trials") as told:
-        study = study_paper(options.folder, options.draws, processes(options.processes), told)
-    for line in study_lines(study):
+def main(options: argparse.Namespace) -> ExitCode:
+    """One of the studies; its picture goes into the folder of its results."""
+    console, shown = Console(options.json), STUDIES[options.study]
+    with task_bar(shown.study.unit) as told:
+        found = run_study(shown.study, options.folder, options.draws, processes(options.processes), told)
+    for line in shown.lines(found):
         console.print(line)
-    _draw(options.folder / "paper.svg", study_picture(study), console)
-    console.document(study_document(study))
+    picture = options.folder / f"{shown.study.name}.svg"
+    atomic_files.write_atomically(picture, shown.picture(found).encode())
+    console.print(f"\nThe same as a picture: {picture}")
+    console.document(shown.document(found))
     return ExitCode.DONE
-
-
-def experiment(options: argparse.Namespace) -> ExitCode:
-    """The experiment of the paper, likewise."""
-    console = Console(options.json)
-    with task_bar("experiments") as told:
-        study = study_experiment(options.folder, options.draws, processes(options.processes), told)
-    for line in experiment_lines(study):
-        console.print(line)
-    _draw(options.folder / "experiment.svg", experiment_picture(study), console)
-    console.document(experiment_document(study))
-    return ExitCode.DONE
-
-
-def _draw(path: Path, picture: str, console: Console) -> None:
-    atomic_files.write_atomically(path, picture.encode())
-    console.print(f"\nThe two figures as a picture: {path}")

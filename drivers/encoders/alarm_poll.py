@@ -12,7 +12,7 @@ from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, WARNINGS,
 ALARM_POLL_S = 0.1
 """Shortest period at which the alarm entries are read."""
 
-BUS_SHARE = 0.03
+BUS_SHARE = 0.02
 """Of the time of samples that follow each other without a pause, so much goes to reading alarm entries."""
 
 WARNINGS_EVERY = 10
@@ -59,7 +59,7 @@ class AlarmPoll:
         """
         now_s = time.monotonic()
         self._sampling_s += now_s - self._begun_s
-        emergencies = sum(monitor.emergencies for monitor in self._monitors)
+        emergencies = sum([monitor.emergencies for monitor in self._monitors])
         if emergencies == self._emergencies_seen and not self._is_due(now_s):
             return
         self._polls += 1
@@ -82,4 +82,4 @@ class AlarmPoll:
             value &= ~_COMMUNICATION
         if value & ~self._known.get((node, entry), 0):
             word = "a warning" if entry is WARNINGS else "an alarm"
-            raise invalid_sample(f"has {word} ({entry} is {value:#06x})", node.leg)
+            raise invalid_sample(f"has {word} ({entry} is {value:#06x})", node.leg.subject)

@@ -136,6 +136,8 @@ class EncoderBus:
         try:
             self._bus.send(message, timeout=SEND_TIMEOUT_S)
         except Exception as error:
+            if self._failure is not None:
+                raise self._error("has failed", self._failure) from self._failure
             raise self._error("does not accept a frame", error) from error
 
     def _record(self, direction: TrafficDirection, message: can.Message) -> None:

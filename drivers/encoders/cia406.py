@@ -62,7 +62,8 @@ class EncoderSession:
     ) -> None:
         self.bus = EncoderBus(bus_settings(settings), closing, trace)
         self._settings = settings
-        self._history = SampleHistory(settings)
+        self._legs = tuple(Leg(number, node) for number, node in enumerate(settings.nodes, 1))
+        self._history = SampleHistory(settings, [leg.subject for leg in self._legs])
         try:
             self._data_sheet = None if settings.eds is None else read_data_sheet(Path(settings.eds))
             self._start()
@@ -72,9 +73,8 @@ class EncoderSession:
 
     def read(self) -> EncoderSample:
         """One complete sample; valid only if no fault is found after it."""
-        self.bus.check()
         self._alarms.begin_sample()
-        counts = self._sampler.sample(signed=self._settings.signed)
+        counts = self._sampler.sample()
         self._alarms.check()
         self.bus.check()
         self._history.check_signs(counts)
@@ -88,7 +88,7 @@ class EncoderSession:
 
     def _start(self) -> None:
         settings = self._settings
-        legs = tuple(Leg(number, node) for number, node in enumerate(settings.nodes, 1))
+        legs = self._legs
         nodes = tuple(EncoderNode(leg, self.bus, settings.timeout_s) for leg in legs)
         for node in nodes:
             node.command(NmtCommand.ENTER_PRE_OPERATIONAL)
@@ -102,12 +102,12 @@ class EncoderSession:
         )
         for monitor in monitors:
             monitor.start_heartbeat_timeout()
-        self._sampler = SyncSampler(legs, channels, self.bus, settings.timeout_s)
+        self._sampler = SyncSampler(legs, channels, self.bus, settings.timeout_s, signed=settings.signed)
         self.bus.health_check = partial(_check_all, nodes, monitors, self._sampler)
         self._alarms = AlarmPoll(nodes, monitors)
         for node in nodes:
             node.command(NmtCommand.START)
-        self._sampler.self_test(signed=settings.signed)
+        self._sampler.self_test()
 
     def _identify(self, node: EncoderNode, device_type: DeviceType) -> DeviceIdentity:
         check_step(node, self._settings)
@@ -121,8 +121,9 @@ class EncoderSession:
 
 def joint_variables(counts: tuple[int, ...], settings: EncoderSettings) -> tuple[float, ...]:
     """Joint variables q, in their unit: direction x counts x step + offset."""
+    step = settings.step
     terms = zip(settings.direction, counts, settings.offset, strict=True)
-    return tuple(direction * count * settings.step + offset for direction, count, offset in terms)
+    return tuple([direction * count * step + offset for direction, count, offset in terms])
 
 
 def _check_all(

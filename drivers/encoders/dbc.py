@@ -68,7 +68,7 @@ class DbcSession:
         self._settings, self._described = settings, described
         self._database: Database = read_database(described, settings.unit, settings.step)
         self._latest: dict[int, _Received] = {}
-        self._history = SampleHistory(settings)
+        self._history = SampleHistory(settings, [_subject(signal) for signal in self._database.signals])
         self._bus = EncoderBus(bus_settings(settings), closing, trace, self._accepts)
         try:
             for frame in self._database.frames:

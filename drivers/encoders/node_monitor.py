@@ -61,10 +61,13 @@ class NodeMonitor:
         bus.network.subscribe(HEARTBEAT + leg.node, self._on_heartbeat)
         bus.network.subscribe(EMERGENCY + leg.node, self._on_emergency)
 
-    @property
-    def is_silent(self) -> bool:
+    def is_silent(self, now_s: float) -> bool:
         """Whether its heartbeat is overdue."""
-        return self._last_heartbeat is not None and time.monotonic() - self._last_heartbeat > self.timeout_s
+        return self._last_heartbeat is not None and now_s - self._last_heartbeat > self.timeout_s
+
+    def has_fault(self, now_s: float) -> bool:
+        """Whether it restarted, is silent, or reports an error."""
+        return self.restarted or self.emergency is not None or self.is_silent(now_s)
 
     def start_heartbeat_timeout(self) -> None:
         """From now on a missing heartbeat is a fault, unless heartbeats are off."""
@@ -95,22 +98,26 @@ class NodeMonitor:
 
 def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
     """Raise if a node restarted, its heartbeat is overdue, or it reports an error."""
-    restarted = [monitor.leg for monitor in monitors if monitor.restarted]
+    now_s = time.monotonic()
+    faulty = [monitor for monitor in monitors if monitor.has_fault(now_s)]
+    if not faulty:
+        return
+    restarted = [monitor.leg for monitor in faulty if monitor.restarted]
     if restarted:
         raise _restarted(restarted)
-    silent = [monitor for monitor in monitors if monitor.is_silent]
+    silent = [monitor for monitor in faulty if monitor.is_silent(now_s)]
     if silent:
         what = f"no heartbeat for {silent[0].timeout_s:.2g} s"
         raise silent_nodes(what, [monitor.leg for monitor in silent], all_legs=len(silent) == len(monitors))
-    for monitor in monitors:
+    for monitor in faulty:
         if monitor.emergency is not None:
             action = _CHECK_BUS if monitor.is_about_the_bus else _CHECK_DEVICE
-            raise invalid_sample(f"reports {monitor.emergency}", monitor.leg, action)
+            raise invalid_sample(f"reports {monitor.emergency}", monitor.leg.subject, action)
 
 
-def invalid_sample(what: str, leg: Leg, action: str = _CHECK_DEVICE) -> InvalidSampleError:
+def invalid_sample(what: str, subject: str, action: str = _CHECK_DEVICE) -> InvalidSampleError:
     """The error for positions that the device itself reports as invalid, or that cannot be."""
-    return InvalidSampleError(f"{what}; its position cannot be trusted", subject=leg.subject, action=action)
+    return InvalidSampleError(f"{what}; its position cannot be trusted", subject=subject, action=action)
 
 
 def _restarted(legs: Sequence[Leg]) -> RestartedNodeError:

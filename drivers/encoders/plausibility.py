@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 
-from drivers.encoders.canopen_node import Leg
 from drivers.encoders.node_monitor import invalid_sample
 from drivers.errors import WrongSetting
 from hexacell.cell.devices import EncoderSettings
@@ -15,21 +15,25 @@ MARGIN = 1.0
 
 
 class SampleHistory:
-    """The latest sample of six joints, for one opening of the encoders."""
+    """The latest sample of six joints, for one opening of the encoders.
 
-    def __init__(self, settings: EncoderSettings) -> None:
+    ``subjects`` are the subjects of messages about legs 1 to 6.
+    """
+
+    def __init__(self, settings: EncoderSettings, subjects: Sequence[str]) -> None:
         self._settings = settings
+        self._subjects = subjects
         self._latest: tuple[float, tuple[float, ...]] | None = None
 
     def check_signs(self, counts: tuple[int, ...]) -> None:
         """Raise ``WrongSetting`` if counts are negative ones, read as unsigned."""
         if self._settings.signed:
             return
-        for leg, count in zip(self._legs(), counts, strict=True):
+        for subject, count in zip(self._subjects, counts, strict=True):
             if count >= NEGATIVE:
                 raise WrongSetting(
                     f"shows {count} counts, as a negative number does that is read as unsigned",
-                    subject=leg.subject,
+                    subject=subject,
                     action="Write `signed = true` under [encoders]",
                 )
 
@@ -39,13 +43,10 @@ class SampleHistory:
         if self._latest is not None and speed is not None:
             before_s, before = self._latest
             farthest = MARGIN + speed * (now - before_s)
-            for leg, one, other in zip(self._legs(), before, positions, strict=True):
+            for subject, one, other in zip(self._subjects, before, positions, strict=True):
                 if abs(other - one) > farthest:
                     unit = self._settings.unit
                     raise invalid_sample(
-                        f"jumped from {one:.3f} to {other:.3f} {unit} in {now - before_s:.2g} s", leg
+                        f"jumped from {one:.3f} to {other:.3f} {unit} in {now - before_s:.2g} s", subject
                     )
         self._latest = now, positions
-
-    def _legs(self) -> list[Leg]:
-        return [Leg(number, node) for number, node in enumerate(self._settings.nodes, 1)]

@@ -28,24 +28,35 @@ class SyncSampler:
     before the next SYNC. Those that do not come are written off; the next sample then counts only if
     no response follows it: failed SYNCs follow each other within two time-outs, and a leg that lags
     behind responds at the same rate.
+
+    What need not wait is done while frames are on the wire: a position is decoded as it comes, and the bus
+    is checked after the SYNC. On a fast bus this is the time between a round and the next one.
     """
 
     def __init__(
-        self, legs: Sequence[Leg], channels: Sequence[PositionChannel], bus: EncoderBus, timeout_s: float
+        self,
+        legs: Sequence[Leg],
+        channels: Sequence[PositionChannel],
+        bus: EncoderBus,
+        timeout_s: float,
+        *,
+        signed: bool,
     ) -> None:
         self._legs = legs
         self._channels = channels
         self._bus = bus
         self._timeout_s = timeout_s
+        self._signed = signed
         self._outstanding = [0] * len(legs)
-        self._frames = [b""] * len(legs)
+        self._counts: list[int | None] = [None] * len(legs)
+        self._lengths = [0] * len(legs)
         self._index = {channel.cob_id: index for index, channel in enumerate(channels)}
         self._foreign_sync = False
         for channel in channels:
             bus.network.subscribe(channel.cob_id, self._on_position)
         bus.network.subscribe(SYNC, self._on_foreign_sync)
 
-    def sample(self, *, signed: bool) -> tuple[int, ...]:
+    def sample(self) -> tuple[int, ...]:
         """One complete sample, the counts of all legs, after at most ``MAX_SYNCS`` SYNCs.
 
         It is valid if :meth:`EncoderBus.check` finds nothing after it.
@@ -53,23 +64,24 @@ class SyncSampler:
         for _ in range(MAX_SYNCS):
             is_synchronized = self._await_late_responses()
             self._send_sync()
+            self._bus.check()
             if not self._bus.wait_for(self._is_complete, self._timeout_s):
                 continue
             if not is_synchronized:
                 self._bus.listen(LATE_RESPONSE_TIMEOUTS * self._timeout_s)
-            return self._decode(signed=signed)
+            return self._received()
         raise self._silent()
 
-    def self_test(self, *, signed: bool) -> None:
+    def self_test(self) -> None:
         """Take one sample and listen for surplus responses."""
-        self.sample(signed=signed)
+        self.sample()
         self._bus.listen(SECOND_RESPONSE_S)
 
     def check(self) -> None:
         """Raise if a leg sent more positions than there were SYNCs, or another master sends SYNC."""
-        for leg, outstanding in zip(self._legs, self._outstanding, strict=True):
-            if outstanding < 0:
-                raise duplicated_node("sent more positions than there were SYNCs", leg)
+        if min(self._outstanding) < 0:
+            leg = self._legs[self._outstanding.index(min(self._outstanding))]
+            raise duplicated_node("sent more positions than there were SYNCs", leg)
         if self._foreign_sync:
             raise BusError(
                 "another master sends SYNC on it",
@@ -79,7 +91,7 @@ class SyncSampler:
 
     def _await_late_responses(self) -> bool:
         """Wait for late responses; false if some were written off."""
-        if self._bus.wait_for(self._is_complete, self._timeout_s):
+        if self._is_complete() or self._bus.wait_for(self._is_complete, self._timeout_s):
             return True
         with self._bus.condition:
             self._outstanding = [min(outstanding, 0) for outstanding in self._outstanding]
@@ -91,19 +103,18 @@ class SyncSampler:
         self._bus.network.send_message(SYNC, b"")
 
     def _is_complete(self) -> bool:
-        return not any(outstanding > 0 for outstanding in self._outstanding)
+        return max(self._outstanding) <= 0
 
-    def _decode(self, *, signed: bool) -> tuple[int, ...]:
-        counts = []
-        for leg, channel, frame in zip(self._legs, self._channels, self._frames, strict=True):
-            if len(frame) < channel.length:
-                raise DeviceError(
-                    f"sent {len(frame)} bytes where its position needs {channel.length}",
-                    subject=leg.subject,
-                    action="Open the encoders again; if it stays so, use another device",
-                )
-            counts.append(channel.counts(frame, signed=signed))
-        return tuple(counts)
+    def _received(self) -> tuple[int, ...]:
+        counts = tuple(count for count in self._counts if count is not None)
+        if len(counts) < len(self._counts):
+            index = self._counts.index(None)
+            raise DeviceError(
+                f"sent {self._lengths[index]} bytes where its position needs {self._channels[index].length}",
+                subject=self._legs[index].subject,
+                action="Open the encoders again; if it stays so, use another device",
+            )
+        return counts
 
     def _silent(self) -> SilentNodeError:
         silent = [
@@ -114,8 +125,11 @@ class SyncSampler:
 
     def _on_position(self, can_id: int, data: bytearray, _timestamp: float) -> None:
         index = self._index[can_id]
+        channel = self._channels[index]
+        is_whole = len(data) >= channel.length
+        self._lengths[index] = len(data)
+        self._counts[index] = channel.counts(bytes(data), signed=self._signed) if is_whole else None
         self._outstanding[index] -= 1
-        self._frames[index] = bytes(data)
         if self._is_complete():
             self._bus.condition.notify_all()
 

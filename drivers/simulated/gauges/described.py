@@ -18,7 +18,7 @@ class ByRequest(SingleIndicator):
 
     def __init__(self, indicators: Mapping[int, Indicator], request: RequestSettings) -> None:
         super().__init__(indicators)
-        self._request = request
+        self._asked = request.ask.encode("latin-1")
         self._template = _Template(request)
 
     @staticmethod
@@ -26,12 +26,17 @@ class ByRequest(SingleIndicator):
         """Without an example a plain number."""
         return f"{value:+.{5 if inch else 3}f}\r".encode()
 
+    def split(self, received: bytes) -> tuple[list[bytes], bytes]:
+        """What it is asked need not end like a line: it may be one control character."""
+        *before, rest = received.split(self._asked)
+        return [self._asked.rstrip(b"\r\n") for _ in before], rest[-len(self._asked) :]
+
     def answer(self, command: bytes) -> bytes:
-        """The value; commands come without their carriage return."""
+        """The value; commands come without their line end."""
         return self._reply(command.decode("latin-1")) if self.indicator.powered else b""
 
     def _reply(self, command: str) -> bytes:
-        if command != self._request.ask.rstrip("\r\n"):
+        if command.encode("latin-1") != self._asked.rstrip(b"\r\n"):
             return b""
         shown = self.indicator.shown()
         return self.at_end if shown is None else self._template.filled(shown, 1)

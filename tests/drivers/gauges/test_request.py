@@ -123,3 +123,21 @@ def test_what_the_simulated_gauge_answers_is_understood(value, description):
     )
     assert shown.value == pytest.approx(value, abs=0.51e-4)
     assert shown.decimals == 4
+
+
+def test_the_simulated_one_is_asked_by_what_is_no_line_too():
+    described = RequestSettings.model_validate(ID_H | {"ask": "\x02"})
+    twin = simulated_instrument("request", {1: Indicator(lambda: 1.5)}, described)
+    commands, rest = twin.split(b"\x02\x02")
+    assert (commands, rest) == ([b"\x02"] * 2, b"")
+    assert twin.answer(commands[0]) == b"GN01,+0001.5000\r\n"
+
+
+def test_the_simulated_one_hears_a_question_that_comes_in_parts():
+    twin = simulated_instrument(
+        "request", {1: Indicator(lambda: 1.5)}, RequestSettings.model_validate(ID_H)
+    )
+    commands, rest = twin.split(b"GA01\r")
+    assert commands == []
+    commands, rest = twin.split(rest + b"\n")
+    assert (commands, rest) == ([b"GA01"], b"")

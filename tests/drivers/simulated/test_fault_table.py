@@ -38,7 +38,7 @@ READINGS = 5
 ENCODER_READINGS = 50
 AT_ONCE = 4
 DBC_FAULTS: tuple[FaultKind, ...] = ("silent", "alarm", "frozen", "jumped")
-NOT_DUE = {("uwave", "late")}
+NOT_DUE = {("uwave", "late"), ("stream", "late")}
 """What comes unasked is due at no time: such a line pauses once, and what is told depends on when."""
 
 RIGHT_MM = 0.0051
@@ -57,6 +57,9 @@ BEYOND_ONE_DEVICE = {
     "switched on again": "the reference, when it is measured again",
 }
 """What sees a fault that one device alone does not show."""
+
+WHERE_THE_UNIT_IS_UNTOLD = {"in inches": "the gauge trial"}
+"""Gauges whose answers tell their unit refuse it; others either do not have this fault, or show it nowhere."""
 
 Row = tuple[str, str, str, str]
 
@@ -82,7 +85,8 @@ def row(device: str, fault: str, error: HexacellError | None, *, is_right: bool)
         return device, fault, f"`{type(error).__name__}`", plain(error)
     if is_right and fault not in BEYOND_ONE_DEVICE:
         return device, fault, "reads right", ""
-    return device, fault, "not by itself", f"seen by {BEYOND_ONE_DEVICE[fault]}"
+    seen_by = (BEYOND_ONE_DEVICE | WHERE_THE_UNIT_IS_UNTOLD)[fault]
+    return device, fault, "not by itself", f"seen by {seen_by}"
 
 
 async def gauge_row(protocol: str, fault: FaultKind) -> Row:

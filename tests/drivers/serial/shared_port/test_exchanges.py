@@ -16,7 +16,7 @@ async def test_an_answer_is_complete_and_read_by_one_thread(fake):
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
     await link.close()
-    assert port.threads == {"serial fake_0"}
+    assert port.threads == {"serial fake"}
     assert not port.is_open
 
 

@@ -12,7 +12,9 @@ from drivers.gauges.keyence_dl_rs1a import KeyenceGauge
 from drivers.gauges.mitutoyo_id_h import IdHGauge
 from drivers.gauges.modbus import ModbusGauge
 from drivers.gauges.mux10 import Mux10Gauge
+from drivers.gauges.request import RequestGauge
 from drivers.gauges.serial_gauge import SerialGauge
+from drivers.gauges.stream import StreamGauge
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.gauges.uwave import UwaveGauge
 from drivers.gauges.visa import VisaGauge
@@ -40,6 +42,18 @@ MORE_DRIVERS: dict[str, Callable[..., SerialGauge]] = {
     "uwave": UwaveGauge,
     "visa": VisaGauge,
     "modbus": ModbusGauge,
+    "request": RequestGauge,
+    "stream": StreamGauge,
+}
+REQUEST = {
+    "ask": "GA01\r\n",
+    "answer": r"GN01,([+-]\d{4}\.\d{4})",
+    "example": "GN01,+0016.2345\r\n",
+    "at_end": "ERROR",
+}
+STREAM = {
+    "answer": r"(?P<channel>\d\d):(?P<number>[+-]\d{3}\.\d{3})",
+    "example": "01:+012.345\r\n",
 }
 
 
@@ -52,6 +66,10 @@ def described(protocol, number):
         place = {"register": 2 * number, "at_end": [0x7FFFFFFF]}
         # a pseudo-terminal refuses the parity of a port that is opened again
         return {"modbus": place, "serial": {"parity": "N"}}
+    if protocol == "request":
+        return {"request": REQUEST}
+    if protocol == "stream":
+        return {"stream": STREAM}
     return {}
 
 

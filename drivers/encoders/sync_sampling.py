@@ -109,8 +109,9 @@ class SyncSampler:
         counts = tuple(count for count in self._counts if count is not None)
         if len(counts) < len(self._counts):
             index = self._counts.index(None)
+            needed = self._channels[index].length
             raise DeviceError(
-                f"sent {self._lengths[index]} bytes where its position needs {self._channels[index].length}",
+                f"sent {self._lengths[index]} bytes where its position needs {needed}",
                 subject=self._legs[index].subject,
                 action="Open the encoders again; if it stays so, use another device",
             )

@@ -59,7 +59,7 @@ BEYOND_ONE_DEVICE = {
 """What sees a fault that one device alone does not show."""
 
 WHERE_THE_UNIT_IS_UNTOLD = {"in inches": "the gauge trial"}
-"""Gauges whose answers tell their unit refuse it; others either do not have this fault, or show it nowhere."""
+"""Of a gauge that does not tell its unit, and shows as many decimals in inches."""
 
 Row = tuple[str, str, str, str]
 

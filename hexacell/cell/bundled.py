@@ -22,13 +22,22 @@ def bundled_config(name: str) -> Path:
     Raises:
         UsageError: no such config comes with the package; the message names the nearest.
     """
-    configs = sorted(path for path in _folder().iterdir() if not path.name.startswith("."))
-    known = {path.stem: path for path in configs if not path.name.endswith(CONTROLLER)}
+    known = _configs()
     found = known.get(name) or known.get(name.removesuffix(".toml"))
     if found is None:
         action = did_you_mean(name, known) or f"There are: {', '.join(known)}"
         raise UsageError(f"no cell called '{name}' comes with hexacell", action=action)
     return found
+
+
+def bundled_names() -> tuple[str, ...]:
+    """The names of all cells that come with the package."""
+    return tuple(_configs())
+
+
+def _configs() -> dict[str, Path]:
+    configs = sorted(path for path in _folder().iterdir() if not path.name.startswith("."))
+    return {path.stem: path for path in configs if not path.name.endswith(CONTROLLER)}
 
 
 def _folder() -> Path:

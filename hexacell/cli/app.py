@@ -10,6 +10,7 @@ from importlib import import_module
 from hexacell.cli.console import Console, lost_output
 from hexacell.cli.fault_report import fault_line
 from hexacell.cli.parser import make_parser
+from hexacell.cli.platform_support import require_platform
 from hexacell.cli.signals import stop_signals_as_sigint
 from hexacell.errors import ExitCode, HexacellError, UsageError
 
@@ -30,6 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with stop_signals_as_sigint():
             _require_usable(typed)
             options = parser.parse_args(typed)
+            require_platform(options.target, is_detachable=getattr(options, "detachable", False))
             module, _, command = options.target.partition(".")
             code = getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options)
             return _unless_output_is_lost(int(code), console)

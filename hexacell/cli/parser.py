@@ -36,7 +36,7 @@ def make_parser() -> Parser:
     parser.add_argument("--version", action="version", version=f"hexacell {__version__}")
     # argparse aligns the commands below with the metavar, which must be about as long as they are.
     commands = parser.add_subparsers(
-        title="commands", prog="hexacell", metavar="COMMAND ...", required=True
+        title="commands", prog="hexacell", metavar="COMMAND [...]", required=True
     )
     add_run_commands(commands)
     add_record_commands(commands)

@@ -8,8 +8,10 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from types import FrameType
 
-STOP_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
-"""Sent by a service manager, or when the terminal is closed."""
+STOP_SIGNALS = tuple(
+    number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None)) is not None
+)
+"""Sent by a service manager, or when the terminal is closed. Windows has no SIGHUP."""
 
 
 @contextmanager

@@ -35,6 +35,7 @@ COMMANDS = (
     "notify",
     "serve",
     "cell",
+    "completion",
     "study",
 )
 PAGES = [
@@ -87,7 +88,7 @@ def test_help_names_every_command_in_one_line_each_and_every_exit_code(capsys, m
     with pytest.raises(SystemExit):
         main(["--help"])
     lines = capsys.readouterr().out.splitlines()
-    begun = lines.index("  COMMAND ...") + 1
+    begun = lines.index("  COMMAND [...]") + 1
     assert [line.split()[0] for line in lines[begun : begun + len(COMMANDS)]] == list(COMMANDS)
     codes = " ".join(lines[lines.index("exit codes:") :])
     assert all(f" {code} " in codes for code in (0, 1, 2, 3, 4, 5, 6, 7, 70, 130))

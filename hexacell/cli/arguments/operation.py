@@ -16,6 +16,8 @@ from hexacell.cli.arguments.commands import (
     not_negative,
 )
 
+SHELLS = ("bash", "zsh", "fish")
+
 
 def add_operation_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
     """Add those to the commands of a parser."""
@@ -25,6 +27,7 @@ def add_operation_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's 
     _notify(commands)
     _serve(commands)
     _cell(commands)
+    _completion(commands)
 
 
 def _devices(commands: Any) -> None:  # noqa: ANN401
@@ -109,9 +112,7 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
 
 
 def _status(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands, "status", "all cells at a glance: latest verdicts, what waits for a person"
-    )
+    parser = add_command(commands, "status", "all cells at a glance: verdicts, and what waits for a person")
     parser.add_argument("cells", type=Path, nargs="*", metavar="CELL", help="cell files (TOML)")
     add_archive(parser, "instead of cell files: all cells that share this archive")
     add_file(parser, "--metrics", "write it as metrics for Prometheus' node exporter too")
@@ -145,3 +146,10 @@ def _cell(commands: Any) -> None:  # noqa: ANN401
     show = add_parser(actions, "show", "print it with defaults filled in, and the origin of each value")
     add_cell(show)
     add_json(show)
+
+
+def _completion(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(
+        commands, "completion", "print a script that lets a shell complete commands and files"
+    )
+    parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help=f"one of {', '.join(SHELLS)}")

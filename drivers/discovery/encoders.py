@@ -1,15 +1,19 @@
-"""Which CAN adapters are there, and which nodes answer on a bus: one question to each of 127 node ids."""
+"""Which CAN adapters are there, and what is on a bus.
+
+It is listened to for a while, for encoders that are no CANopen nodes; then each of 127 node ids is asked.
+"""
 
 from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from drivers.discovery.frames import FoundFrame, OverheardFrames, of_no_node
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg
 from drivers.encoders.object_dictionary import (
@@ -21,13 +25,16 @@ from drivers.encoders.object_dictionary import (
     UNITS_PER_TURN,
     DeviceType,
 )
+from drivers.errors import BusError
 from drivers.serial.port import NoAnswer, SerialPort
 from hexacell.errors import HexacellError
 from hexacell.kinematics.parameters import JointUnit
 
 TIMEOUT_S = 0.5
 FIRST_RESPONSE_S = 2.0
-"""Longest wait for the first node: on a busy computer an adapter takes its time."""
+"""Longest wait for an adapter, and for the first node: on a busy computer they take their time."""
+
+LISTEN_S = 1.0
 
 SLCAN_LINE = {"baudrate": 115200}
 SLCAN_VERSION = re.compile(rb"V[0-9A-Fa-f]{4}\r")
@@ -49,10 +56,11 @@ class FoundNode:
 
 @dataclass(frozen=True, slots=True)
 class BusFindings:
-    """What is on a bus, or why it could not be opened."""
+    """What is on a bus, or why it cannot be used. ``frames`` came by themselves, and of no such node."""
 
     bus: Mapping[str, Any]
     nodes: tuple[FoundNode, ...] = ()
+    frames: tuple[FoundFrame, ...] = ()
     problem: str = ""
 
 
@@ -71,24 +79,33 @@ def speaks_slcan(port: str) -> bool:
     line = SerialPort(port, SLCAN_LINE, threading.Event())
     with closing(line), suppress(HexacellError, NoAnswer):
         line.open()
-        return SLCAN_VERSION.fullmatch(line.exchange(b"V\r", b"\r", TIMEOUT_S)) is not None
+        return SLCAN_VERSION.fullmatch(line.exchange(b"V\r", b"\r", FIRST_RESPONSE_S)) is not None
     return False
 
 
 def search_bus(bus: Mapping[str, Any]) -> BusFindings:
-    """The nodes that answer on a bus, by node id."""
+    """What sends by itself on a bus, and the nodes that answer, by node id."""
+    overheard = OverheardFrames()
     try:
-        with _opened(bus) as opened:
-            ids = responding_nodes(opened)
-            return BusFindings(bus, tuple(_described(opened, node) for node in ids))
+        with closing(EncoderBus(bus, threading.Event(), accepts=overheard.accepts)) as opened:
+            return _findings(bus, opened, overheard)
     except HexacellError as error:
         return BusFindings(bus, problem=str(error))
 
 
-@contextmanager
-def _opened(bus: Mapping[str, Any]) -> Iterator[EncoderBus]:
-    with closing(EncoderBus(bus, threading.Event())) as opened:
-        yield opened
+def _findings(bus: Mapping[str, Any], opened: EncoderBus, overheard: OverheardFrames) -> BusFindings:
+    try:
+        opened.listen(LISTEN_S)
+        frames = overheard.counted(LISTEN_S)
+        ids = responding_nodes(opened)
+        nodes = tuple(_described(opened, node) for node in ids)
+    except BusError as error:
+        raise BusError(
+            error.problem,
+            subject=opened.name,
+            action="Check cable and termination, or try another bit rate",
+        ) from error
+    return BusFindings(bus, nodes, of_no_node(frames, ids))
 
 
 def responding_nodes(bus: EncoderBus) -> list[int]:

@@ -53,7 +53,7 @@ class EncoderBus:
         self.health_check: Callable[[], None] = lambda: None
         self._interrupted = interrupted
         self._trace = trace
-        self._accepts = accepts or _is_canopen
+        self._accepts = accepts or is_canopen
         self._failure: Exception | None = None
         self._error_frames: deque[float] = deque(maxlen=ERROR_FRAMES)
         self._closing = threading.Event()
@@ -170,7 +170,7 @@ class _Network(canopen.Network):
             self._send(frame)
 
 
-def _is_canopen(message: can.Message) -> bool:
+def is_canopen(message: can.Message) -> bool:
     """Whether it is a data frame with an 11-bit id, sent by another participant."""
     return message.is_rx and not (message.is_remote_frame or message.is_extended_id)
 

@@ -9,13 +9,22 @@ from typing import Any
 import tomlkit
 
 from drivers.discovery.encoders import BusFindings, FoundNode
+from drivers.discovery.frames import FoundFrame
 from drivers.discovery.gauges import FoundGauge, PortFindings
 from drivers.serial.adapters import SerialPortFound
 from hexacell.application.device_search import SearchFindings
-from hexacell.application.found_cell import LEGS, encoder_keys, found_bank, found_gauges, gauge_keys
+from hexacell.application.found_cell import (
+    LEGS,
+    encoder_keys,
+    found_bank,
+    found_gauges,
+    gauge_keys,
+    unknown_encoders,
+)
 from hexacell.kinematics.parameters import JointUnit
 
 AXES = "xyz"
+FRAMES_TOLD = 12
 
 
 def search_document(found: SearchFindings) -> dict[str, Any]:
@@ -51,6 +60,8 @@ def cell_lines(found: SearchFindings) -> Iterator[str]:
         yield from _gauge_section(axis, gauge)
     if bank := found_bank(found):
         yield from _encoder_section(*bank)
+    elif (bus := unknown_encoders(found)) is not None:
+        yield from _described_encoder_section(bus)
     if found.controller is not None:
         address = {"host": found.controller.host, "port": found.controller.port}
         yield from ("[controller]", *_keys({"protocol": "linuxcncrsh", **address}), "")
@@ -77,10 +88,25 @@ def _bus_lines(bus: BusFindings) -> Iterator[str]:
     name = " ".join(str(bus.bus[key]) for key in ("interface", "channel", "bitrate") if key in bus.bus)
     if bus.problem:
         yield f"CAN {name}: {bus.problem}"
+    elif bus.frames and not bus.nodes:
+        yield f"CAN {name}: no CANopen node answers, but there are frames"
     elif not bus.nodes:
         yield f"CAN {name}: no node answers; check supply and termination, or try another --bitrate"
     for node in bus.nodes:
         yield f"CAN {name}, node {node.node}: {_node_words(node)}"
+    yield from _overheard_lines(name, bus.frames)
+
+
+def _overheard_lines(name: str, frames: tuple[FoundFrame, ...]) -> Iterator[str]:
+    for frame in frames[:FRAMES_TOLD]:
+        yield f"CAN {name}, frame {_number(frame)}: {_frame_words(frame)}"
+    if len(frames) > FRAMES_TOLD:
+        yield f"CAN {name}: frames with {len(frames) - FRAMES_TOLD} further identifiers"
+    if frames:
+        yield (
+            f"CAN {name}: no CANopen node that answers sends these frames. If they are of encoders, name "
+            'the DBC file of their maker, with protocol = "dbc" (docs/drivers.md)'
+        )
 
 
 def _node_words(node: FoundNode) -> str:
@@ -92,6 +118,16 @@ def _node_words(node: FoundNode) -> str:
     if node.serial_number is not None:
         words.append(f"serial number {node.serial_number}")
     return ", ".join(words)
+
+
+def _number(frame: FoundFrame) -> str:
+    """As candump has it: 11 bits in three digits, 29 in eight."""
+    return f"{frame.identifier:0{8 if frame.is_extended else 3}X}"
+
+
+def _frame_words(frame: FoundFrame) -> str:
+    data = "its data change" if frame.changes else "its data stay the same"
+    return f"{frame.length} bytes, {frame.per_second:.0f} a second, {data}"
 
 
 def _gauge_section(axis: str, gauge: FoundGauge) -> Iterator[str]:
@@ -111,6 +147,20 @@ def _encoder_section(bus: BusFindings, encoders: tuple[FoundNode, ...]) -> Itera
     yield f"bus = {{ {shown} }}"
     yield f"nodes = {nodes}  # of legs 1 to 6{needed}"
     yield from _keys(encoder_keys(encoders))
+    yield ""
+
+
+def _described_encoder_section(bus: BusFindings) -> Iterator[str]:
+    """Encoders that only a DBC file describes: which of the frames are theirs, nothing tells."""
+    frames = [_number(frame) for frame in bus.frames[:FRAMES_TOLD]]
+    yield from ("[encoders]", *_keys({"protocol": "dbc"}))
+    yield f"bus = {{ {', '.join(_keys(bus.bus))} }}"
+    yield "measuring_step_nm = 1000  # no coarser than the steps in the DBC file"
+    yield ""
+    yield "[encoders.dbc]"
+    yield 'file = "encoders.dbc"  # of their maker'
+    yield f"# Message.Signal of legs 1 to 6, from the messages among {', '.join(frames)}:"
+    yield from _keys({"signals": [f"ENC{leg}.Position" for leg in range(1, LEGS + 1)]})
     yield ""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,14 +11,16 @@ from pathlib import Path
 import pytest
 from serial.tools import list_ports
 
+from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
-from hexacell.cell.described_devices import StreamSettings, VisaSettings
-from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.described_devices import DbcSettings, StreamSettings, VisaSettings
+from hexacell.cell.devices import GaugeSettings, LinearEncoderSettings
 from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import ExitCode
 from tests.cli.terminal import ended, start_at
+from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 
 pytestmark = pytest.mark.usefixtures("lines_only")
 
@@ -115,6 +118,25 @@ def test_gauges_that_send_unasked_are_heard(typed_here, streams) -> None:
     assert "channel 203: uwave: Mitutoyo U-WAVE, shows DT10203+0000001.250M" in said
     assert "sends '+01.25 mm' by itself at 9600 baud" in said
     assert 'protocol = "stream" (docs/drivers.md)' in said
+
+
+@pytest.mark.usefixtures("no_ports")
+def test_encoders_of_another_kind_are_told_by_their_frames(typed_here, tmp_path) -> None:
+    (tmp_path / "encoders.dbc").write_text(dbc_text())
+    described = DbcSettings(file=str(tmp_path / "encoders.dbc"), signals=SIGNALS)
+    settings = LinearEncoderSettings(protocol="dbc", measuring_step_nm=500, dbc=described)
+    with SimulatedDbcBank(settings, described, lambda: [12.5] * 6) as bank:
+        bus = f"interface=virtual,channel={bank.channel}"
+        outcome = typed_here("devices", "--can", bus, "--controller", NOBODY, "--json")
+    assert outcome.code == 0, outcome.err
+    said = " ".join(outcome.err.split())
+    assert "no CANopen node answers, but there are frames" in said
+    assert re.search(r"frame 201: 6 bytes, [1-9]\d* a second, its data stay the same", said)
+    assert 'protocol = "dbc" (docs/drivers.md)' in said
+    told = tomllib.loads(outcome.document["cell"])["encoders"]
+    told["bus"] = dict(told["bus"])
+    assert LinearEncoderSettings.model_validate(told).dbc is not None
+    assert "among 201, 202, 203, 204, 205, 206" in outcome.document["cell"]
 
 
 @pytest.mark.usefixtures("no_ports")

@@ -1,0 +1,99 @@
+"""What comes on a bus unasked: counted by identifier, and told apart from CANopen nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import can
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.discovery.encoders import search_bus
+from drivers.discovery.frames import MAX_IDENTIFIERS, FoundFrame, OverheardFrames, of_no_node
+from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
+
+STRANGER, EXTENDED = 0x321, 0x18FF0001
+NODE_IDS = st.sets(st.integers(1, 127), max_size=6)
+
+
+def frame(number: int, data: bytes = b"\1", **kind: bool) -> can.Message:
+    return can.Message(arbitration_id=number, data=data, **{"is_extended_id": False} | kind)
+
+
+def test_frames_are_counted_by_identifier_and_changes_of_their_data_are_seen() -> None:
+    overheard = OverheardFrames()
+    for data in (b"\1\2", b"\1\2", b"\1\2", b"\1\3"):
+        overheard.accepts(frame(0x202, data))
+        overheard.accepts(frame(0x201, data[:1]))
+    overheard.accepts(frame(0x201, is_extended_id=True))
+    assert overheard.counted(2.0) == (
+        FoundFrame(0x201, False, 1, 2.0, changes=False),
+        FoundFrame(0x201, True, 1, 0.5, changes=False),
+        FoundFrame(0x202, False, 2, 2.0, changes=True),
+    )
+
+
+def test_what_was_sent_or_has_no_data_is_not_counted() -> None:
+    overheard = OverheardFrames()
+    assert not overheard.accepts(frame(0x201, is_rx=False))
+    assert not overheard.accepts(can.Message(arbitration_id=0x201, is_remote_frame=True))
+    assert overheard.counted(1.0) == ()
+
+
+def test_a_bus_full_of_identifiers_fills_no_memory() -> None:
+    overheard = OverheardFrames()
+    for number in range(2 * MAX_IDENTIFIERS):
+        overheard.accepts(frame(number))
+    assert len(overheard.counted(1.0)) == MAX_IDENTIFIERS
+
+
+@given(nodes=NODE_IDS, service=st.sampled_from([0x80, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700]))
+def test_no_frame_of_a_node_is_told(nodes: set[int], service: int) -> None:
+    frames = [FoundFrame(service + node, False, 4, 1.0, changes=False) for node in range(1, 128)]
+    told = {one.identifier - service for one in of_no_node(frames, nodes)}
+    assert told == set(range(1, 128)) - nodes
+
+
+@contextmanager
+def sending(channel: str, *messages: can.Message) -> Iterator[None]:
+    """A device that sends these again and again."""
+    bus = SimulatedCanBus(channel)
+
+    def send() -> None:
+        assert bus.bus is not None
+        for message in messages:
+            bus.bus.send(message)
+
+    PeriodicAction(bus, 0.005, send)
+    bus.start()
+    try:
+        yield
+    finally:
+        bus.close()
+
+
+def test_a_stranger_among_nodes_is_told_with_length_and_rate(raw) -> None:
+    strange = (frame(STRANGER, b"\1\2\3"), frame(EXTENDED, bytes(8), is_extended_id=True))
+    with sending(raw.channel, *strange, frame(0x701, b"\5"), frame(0x80, b"")):
+        found = search_bus({"interface": "virtual", "channel": raw.channel})
+    assert [node.node for node in found.nodes] == [1, 2, 3, 4, 5, 6]
+    told = [(one.identifier, one.is_extended, one.length) for one in found.frames]
+    assert told == [(STRANGER, False, 3), (EXTENDED, True, 8)]
+    assert all(one.per_second > 0 for one in found.frames)
+
+
+def test_a_bus_of_another_bit_rate_is_told() -> None:
+    channel = "another-bit-rate"
+    with sending(channel, can.Message(is_error_frame=True)):
+        found = search_bus({"interface": "virtual", "channel": channel})
+    assert "error frames within 1 s" in found.problem
+    assert "try another bit rate" in found.problem
+
+
+@pytest.mark.parametrize("number", [0x000, 0x080, 0x100])
+def test_frames_of_all_nodes_are_told_only_where_there_are_none(number: int) -> None:
+    one = FoundFrame(number, False, 0, 1.0, changes=False)
+    assert of_no_node([one], []) == (one,)
+    assert of_no_node([one], [5]) == ()

@@ -10,7 +10,6 @@ import logging
 import struct
 import termios
 import threading
-from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -19,7 +18,8 @@ from drivers.errors import PortLost
 from drivers.extras import optional
 from drivers.serial.errors import lost_port
 from drivers.serial.port import SLICE_S, NoAnswer
-from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
+from drivers.serial.request_port import LibraryPort
+from drivers.wire_trace import TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError
 
 EXTRA = "modbus"
@@ -39,7 +39,7 @@ LINE_KEYS = ("baudrate", "bytesize", "parity", "stopbits")
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
-class ModbusPort:
+class ModbusPort(LibraryPort):
     """One serial line with Modbus devices; ``settings`` are those of the line."""
 
     def __init__(
@@ -50,19 +50,11 @@ class ModbusPort:
         recorder: TraceRecorder | None = None,
         worst_latency_s: float = 2.0,
     ) -> None:
-        self.url = url
-        self.subject = f"port {url}"
-        self.unsolicited: deque[bytes] = deque(maxlen=64)
-        self.open_count = 0
-        self.surplus_count = 0
-        self._settings: dict[str, Any] = {name: settings[name] for name in LINE_KEYS if name in settings}
-        self._closing = closing
-        self._recorder = recorder
-        self._worst_latency_s = worst_latency_s
+        super().__init__(url, settings, closing, recorder, worst_latency_s)
+        self._line: dict[str, Any] = {name: settings[name] for name in LINE_KEYS if name in settings}
         self._client: Any = None
         self._modbus: Any = None
         self._received = b""
-        self._must_clear = False
 
     def open(self) -> int:
         """Open the line unless it is open; how often it has been opened.
@@ -75,7 +67,7 @@ class ModbusPort:
         if self._client is None:
             self._modbus = optional("pymodbus", EXTRA, self.subject)
             client = optional("pymodbus.client", EXTRA, self.subject).ModbusSerialClient(
-                self.url, retries=0, trace_packet=self._record, **self._settings
+                self.url, retries=0, trace_packet=self._note, **self._line
             )
             if not self._connects(client):
                 raise PortLost(
@@ -122,15 +114,6 @@ class ModbusPort:
             raise NoAnswer(self._received)
         return struct.pack(f">{count}H", *answer.registers)
 
-    def require_silence(self) -> None:
-        """Drop what comes before the next request."""
-        self._must_clear = True
-
-    def require_not_closed(self) -> None:
-        """Raise if this program has closed the line or is closing it."""
-        if self._closing.is_set():
-            raise PortLost(f"port {self.url} is closed", subject=self.subject)
-
     def close(self) -> None:
         """Close the line; closing twice is harmless."""
         client, self._client = self._client, None
@@ -146,13 +129,11 @@ class ModbusPort:
             self._client.socket.reset_input_buffer()
         self._must_clear = False
 
-    def _record(self, sending: bool, data: bytes) -> bytes:
+    def _note(self, sending: bool, data: bytes) -> bytes:
         new = data if sending else data.removeprefix(self._received)  # all since the request comes
         if not sending:
             self._received = data
-        if new and self._recorder is not None:
-            direction = TrafficDirection.SENT if sending else TrafficDirection.RECEIVED
-            self._recorder(TraceEntry.now(self.url, direction, new))
+        self._record(TrafficDirection.SENT if sending else TrafficDirection.RECEIVED, new)
         return data
 
     @contextmanager

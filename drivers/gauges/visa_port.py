@@ -8,7 +8,6 @@ from __future__ import annotations
 import termios
 import threading
 import time
-from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -17,7 +16,8 @@ from drivers.errors import PortLost
 from drivers.extras import optional
 from drivers.serial.errors import lost_port
 from drivers.serial.port import FRAME_LIMIT, SLICE_S, NoAnswer
-from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
+from drivers.serial.request_port import LibraryPort
+from drivers.wire_trace import TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError
 
 EXTRA = "visa"
@@ -32,7 +32,7 @@ PARITIES = {"N": "none", "E": "even", "O": "odd", "M": "mark", "S": "space"}
 STOP_BITS = {1: "one", 1.5: "one_and_a_half", 2: "two"}
 
 
-class VisaPort:
+class VisaPort(LibraryPort):
     """One VISA resource; ``settings`` are ``backend`` and, of a serial one, those of the line.
 
     Sockets and serial lines are read byte by byte, so that closing never waits long, and are silent for
@@ -48,18 +48,9 @@ class VisaPort:
         recorder: TraceRecorder | None = None,
         worst_latency_s: float = 2.0,
     ) -> None:
-        self.url = url
-        self.subject = f"port {url}"
-        self.unsolicited: deque[bytes] = deque(maxlen=64)
-        self.open_count = 0
-        self.surplus_count = 0
-        self._settings = dict(settings)
-        self._closing = closing
-        self._recorder = recorder
-        self._worst_latency_s = worst_latency_s
+        super().__init__(url, settings, closing, recorder, worst_latency_s)
         self._is_stream = any(word in url.upper() for word in BYTE_STREAMS)
         self._resource: Any = None
-        self._must_clear = False
         self._visa: Any = None
         self._gap_s = SURPLUS_S
 
@@ -97,15 +88,6 @@ class VisaPort:
             self._resource.timeout = MS * timeout_s  # of writing too
             self._resource.write_raw(request)
             return self._answer(terminator, timeout_s)
-
-    def require_silence(self) -> None:
-        """Drop what comes before the next request."""
-        self._must_clear = True
-
-    def require_not_closed(self) -> None:
-        """Raise if this program has closed the resource or is closing it."""
-        if self._closing.is_set():
-            raise PortLost(f"port {self.url} is closed", subject=self.subject)
 
     def close(self) -> None:
         """Close the resource; closing twice is harmless."""
@@ -188,10 +170,6 @@ class VisaPort:
         if received and self._gap_s < FRAME_GAP_S:
             self.surplus_count += 1
             self._gap_s = FRAME_GAP_S
-
-    def _record(self, direction: TrafficDirection, data: bytes) -> None:
-        if data and self._recorder is not None:
-            self._recorder(TraceEntry.now(self.url, direction, data))
 
     @contextmanager
     def _visa_errors(self) -> Iterator[None]:

@@ -206,6 +206,37 @@ async def test_after_a_lost_encoder_bus_the_reference_is_confirmed_again(at_seco
     assert not happened(rig, events.SetInvalidated)
 
 
+def jumped_while_away(rig: Any, jump_mm: float) -> Any:
+    """The bus of the encoders is lost at a record; that of leg 3 comes back with another zero."""
+    encoders, shown = rig.bench.encoders, rig.bench.encoders.shown
+
+    def unplug() -> None:
+        encoders.failure = BusError("has died", subject="encoder bus")
+
+    async def back() -> Any:
+        encoders.failure = None
+        encoders.shown = lambda: [q + jump_mm * (leg == 3) for leg, q in enumerate(shown(), 1)]
+        return encoders._answering("encoder 1")
+
+    encoders.open = back
+    return failing(KEY, unplug)
+
+
+async def test_an_encoder_that_jumped_while_it_was_away_is_named(at_second_point) -> None:
+    rig = at_second_point
+    with pytest.raises(HexacellError, match=r"encoder 3: shows slider 3 at .* See whether it slipped"):
+        await rig.run(jumped_while_away(rig, 3.0), policy=UNATTENDED)
+    assert "P2" not in [str(event.at) for event in happened(rig, events.ReferenceConfirmed)]
+
+
+async def test_a_small_jump_while_it_was_away_costs_the_set(at_second_point) -> None:
+    rig = at_second_point
+    assert await until_closed(rig, jumped_while_away(rig, 0.2), policy=UNATTENDED)
+    (invalidated,) = happened(rig, events.SetInvalidated)
+    assert str(invalidated.at) == "P2"
+    assert invalidated.reason.startswith("back at its reference q3 shows +0.2")
+
+
 async def test_a_device_that_cannot_be_reopened_ends_the_run(at_second_point) -> None:
     rig = at_second_point
     encoders = rig.bench.encoders

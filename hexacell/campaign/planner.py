@@ -37,7 +37,7 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Record, deviation_of, joints_of
-from hexacell.motion.path_check import is_clear
+from hexacell.motion.path_check import stands_clear
 from hexacell.motion.paths import find_route
 from hexacell.robot_model import Robot
 
@@ -305,7 +305,7 @@ class Plan:
         wanted = belief.margins_at(actual) if certainly else None
         if not belief.keeps_limits(actual.poses, actual.joints, wanted)[0]:
             return False
-        return is_clear(belief, reference, reference)
+        return stands_clear(belief, reference, actual)
 
     def _reachable(self, state: CampaignState, points: list[int]) -> list[int]:
         """Those of some points to which clear lines lead from the present pose; all where that is unknown.

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.experiment_design.predicted_records import GaugeZero, PredictedRecords, predict_records
@@ -103,13 +104,11 @@ class TravelConstraint:
         poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
         sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, poses, joints)
         sigma = belief.orientation_sigma_from(sensitivity)
-        is_uncertain = sigma > UNCERTAIN_SIGMA
-        samples = SAMPLES_UNCERTAIN if is_uncertain else SAMPLES
-        sampled = _sample(belief, samples, joints, poses, sensitivity)
+        if sigma > UNCERTAIN_SIGMA:
+            return _nearly_all_hold(belief, joints, poses, sensitivity)
+        sampled = _sample(belief, _standard_normal(SAMPLES, len(belief.free)), joints, poses, sensitivity)
         if len(sampled.found) < FEWEST_SAMPLES:
             return np.zeros(len(targets), dtype=bool)
-        if is_uncertain:
-            return _nearly_all_within(sampled, belief.limits, UNCERTAIN_SHARE)
         return _all_within(sampled, belief.limits, 1.0 / (1.0 + sigma / HALF_TRAVEL_SIGMA))
 
     @cached_property
@@ -137,16 +136,42 @@ class _SampledRobots:
     deviations: Array
     leg_margins: Array
 
+    def with_others(self, others: _SampledRobots, rows: NDArray[np.intp]) -> _SampledRobots:
+        """These at some of the targets, and others at the same targets."""
+        return _SampledRobots(
+            np.concatenate([self.found[:, rows], others.found]),
+            np.concatenate([self.deviations[:, rows], others.deviations]),
+            np.concatenate([self.leg_margins[:, rows], others.leg_margins]),
+        )
+
+
+def _nearly_all_hold(belief: RobotBelief, joints: Array, poses: PoseBatch, sensitivity: Sensitivity) -> Mask:
+    """At which targets the constraint holds on all of many sampled robots but the worst.
+
+    A few of them are tried first: what they exclude, which is most, all of them exclude.
+    """
+    variates = _standard_normal(SAMPLES_UNCERTAIN, len(belief.free))
+    few = _sample(belief, variates[:SAMPLES], joints, poses, sensitivity)
+    holds = _nearly_all_within(few, belief.limits, UNCERTAIN_SHARE)
+    rows = np.flatnonzero(holds)
+    if len(rows):
+        at = np.append(0, 1 + rows)
+        others = _sample(belief, variates[SAMPLES:], joints[at], poses[at], sensitivity[at])
+        sampled = few.with_others(others, rows)
+        are_enough = len(sampled.found) >= FEWEST_SAMPLES
+        holds[rows] = are_enough and _nearly_all_within(sampled, belief.limits, UNCERTAIN_SHARE)
+    return holds
+
 
 def _sample(
-    belief: RobotBelief, samples: int, joints: Array, poses: PoseBatch, sensitivity: Sensitivity
+    belief: RobotBelief, variates: Array, joints: Array, poses: PoseBatch, sensitivity: Sensitivity
 ) -> _SampledRobots:
-    """Solve n poses, the reference first, for robots sampled from the belief.
+    """Solve n poses, the reference first, for robots sampled from the belief by normal ``variates`` (r, p).
 
     Samples that cannot take the reference are dropped: the true robot could.
     """
-    root = np.linalg.cholesky(belief.covariance)
-    errors = _standard_normal(samples, len(belief.free)) @ root.T @ belief.basis.T
+    samples, root = len(variates), np.linalg.cholesky(belief.covariance)
+    errors = variates @ root.T @ belief.basis.T
     count, margin = len(joints), belief.limits.singularity_margin
     # Newton's method starts where linear propagation puts the pose of each robot.
     steps = np.einsum("nip,rp->rni", sensitivity.parameters, errors).reshape(-1, 6)

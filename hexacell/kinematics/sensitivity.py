@@ -24,6 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexacell.kinematics.forward import assembly_mode
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
@@ -50,6 +51,9 @@ class Sensitivity:
     joints: Array
     parameters: Array
     mode: Array
+
+    def __getitem__(self, rows: NDArray[np.intp]) -> Sensitivity:
+        return Sensitivity(self.joints[rows], self.parameters[rows], self.mode[rows])
 
 
 def pose_sensitivity(

@@ -86,17 +86,13 @@ def _amplitudes(uniform: Array, scale: Array, amplitudes: Amplitudes) -> Array:
     return np.where(scale < amplitudes.value, SMALLEST_SHARE ** (1.0 - uniform), large)
 
 
-def reachable_targets(
-    belief: RobotBelief, poses: PoseBatch, mode: Array | None = None, *, legs_too: bool = True
-) -> ReachableTargets:
+def reachable_targets(belief: RobotBelief, poses: PoseBatch, mode: Array | None = None) -> ReachableTargets:
     """Those of the poses that the estimated robot takes within its limits.
 
-    With an assembly ``mode`` (1,), only poses on that mode: no path leads to another one. Without
-    ``legs_too`` the limits of passive joints and legs, which cost most, are left to the caller.
+    With an assembly ``mode`` (1,), only poses on that mode: no path leads to another one.
     """
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
-    keeps = belief.keeps_limits if legs_too else belief.limits.allow_poses
-    rows = np.flatnonzero(keeps(poses, joints))
+    rows = np.flatnonzero(belief.keeps_limits(poses, joints))
     poses, joints = poses[rows], joints[rows]
     margin = belief.limits.singularity_margin
     clear, modes = margin_and_mode(belief.mechanism, belief.estimate, poses, joints, margin)

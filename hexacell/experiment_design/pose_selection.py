@@ -75,13 +75,12 @@ def select_pose(
     """
     belief = planner.belief
     poses = PoseBatch.at(zero.reference, orientations @ zero.orientation)
-    targets = reachable_targets(belief, poses, zero.mode(belief), legs_too=False)
-    records = predict_records(belief, zero, targets)
+    records = predict_records(belief, zero, reachable_targets(belief, poses, zero.mode(belief)))
     if not len(records):
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
     gains = criterion.gain(belief.covariance, records.jacobian, records.covariance)
     search = _PathSearch(TravelConstraint(belief, zero), planner)
-    for ranked in _ranking(belief, records, gains):
+    for ranked in _batches(_ranking(belief, records, gains), COMMAND_BATCH):
         commands, found = commands_for(belief, records.targets[ranked])
         for few in _batches(np.flatnonzero(found), PATH_BATCH):
             rows = ranked[few]
@@ -115,23 +114,10 @@ def select_from_list(
     return selected
 
 
-def _ranking(belief: RobotBelief, records: PredictedRecords, gains: Array) -> Iterator[Rows]:
-    """Rows of the records inside the travel by linear propagation, the best first, batch by batch.
-
-    Legs are checked batch by batch too: the first one is usually enough.
-    """
-    inside = np.flatnonzero(records.within(belief.limits, TRAVEL_SHARE))
-    waiting, left = np.empty(0, dtype=np.intp), MOST_CANDIDATES
-    for rows in _batches(inside[np.argsort(-gains[inside], kind="stable")], COMMAND_BATCH):
-        targets = records.targets[rows]
-        waiting = np.concatenate([waiting, rows[belief.keeps_legs(targets.poses, targets.joints)]])
-        if len(waiting) >= COMMAND_BATCH:
-            yield waiting[:COMMAND_BATCH]
-            waiting, left = waiting[COMMAND_BATCH:], left - COMMAND_BATCH
-        if not left:
-            return
-    if len(waiting):
-        yield waiting
+def _ranking(belief: RobotBelief, records: PredictedRecords, gains: Array) -> Rows:
+    """Rows of the records inside the travel by linear propagation, the best first."""
+    rows = np.flatnonzero(records.within(belief.limits, TRAVEL_SHARE))
+    return rows[np.argsort(-gains[rows], kind="stable")][:MOST_CANDIDATES]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

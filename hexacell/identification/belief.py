@@ -128,13 +128,10 @@ class RobotBelief:
         the least ones; an unreachable pose (NaN) does not.
         """
         kept = self.limits.allow_poses(poses, joints)
-        kept[kept] = self.keeps_legs(poses[kept], joints[kept], wanted)
-        return kept
-
-    def keeps_legs(self, poses: PoseBatch, joints: Array, wanted: Array | None = None) -> Mask:
-        """At which of n poses its passive joints and legs do; arguments as of :meth:`keeps_limits`."""
+        of_estimate = (self.mechanism, self.estimate, poses[kept], joints[kept])
         wanted = self.least_margins if wanted is None else wanted
-        return self.limits.allow_legs(self.mechanism, self.estimate, poses, joints, wanted)
+        kept[kept] = self.limits.allow_legs(*of_estimate, wanted)
+        return kept
 
     def standing_at(
         self, command: PoseBatch, actual: ActualPoses, wanted: Array | None = None

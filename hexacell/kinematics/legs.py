@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rotations import Array, Mask
 
 PAIRS = np.array(list(combinations(range(6), 2)))
 """Of legs, counted from 0."""
@@ -36,6 +36,10 @@ class Legs:
     platform_joints: Array
     rotations: Array
     carriers: Array | None = None
+
+    def __getitem__(self, rows: Mask) -> Legs:
+        carriers = None if self.carriers is None else self.carriers[rows]
+        return Legs(self.base_joints[rows], self.platform_joints[rows], self.rotations[rows], carriers)
 
     @property
     def directions(self) -> Array:

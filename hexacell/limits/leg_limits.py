@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.kinematics.legs import Legs, angles_between
-from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rotations import Array, Mask
 
 ROUNDING = 1e-9
 """Of an angle, rad, or a length, mm: a pose at a limit is within it."""
@@ -52,6 +52,17 @@ class LegLimits:
         if self.distance_mm == 0.0:
             return angles
         return np.column_stack([angles, legs.smallest_distance() - self.distance_mm])
+
+    def keeps(self, legs: Legs, wanted: Array | float = 0.0) -> Mask:
+        """At which of n poses all :meth:`margins` are at least those wanted (m,).
+
+        Distances take most of the time, so that they are computed only where the angles are kept.
+        """
+        least = np.broadcast_to(wanted, 12 + (self.distance_mm != 0.0))
+        kept: Mask = (self.spare_angles(legs).reshape(-1, 12) >= least[:12]).all(axis=-1)
+        if self.distance_mm != 0.0:
+            kept[kept] = legs[kept].smallest_distance() - self.distance_mm >= least[12]
+        return kept
 
     def margins_for(self, turn: float, radius_mm: float) -> Array:
         """Margins (m,) that hold should a platform of some radius turn by an angle, rad."""

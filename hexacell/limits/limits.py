@@ -148,8 +148,9 @@ class Limits:
         wanted: Array | float = 0.0,
     ) -> Mask:
         """At which of n poses a robot's passive joints and legs keep their limits, with margins (m,)."""
-        margins = self.leg_margins(mechanism, geometry, poses, joints)
-        return np.asarray((margins >= wanted).all(axis=-1))
+        if self.legs is None:
+            return np.ones(len(joints), dtype=bool)
+        return self.legs.keeps(mechanism.legs(geometry, poses, joints), wanted)
 
     def leg_margins(
         self, mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array

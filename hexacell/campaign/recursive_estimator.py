@@ -13,6 +13,7 @@ from hexacell.campaign.estimate_chain import ChainedEstimate, update_estimate
 from hexacell.errors import LimitError
 from hexacell.experiment_design.predicted_records import GaugeZero, gauge_zero_at
 from hexacell.identification.belief import RobotBelief
+from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import MeasurementSet, Record, RecordId
 from hexacell.robot_model import Robot
@@ -67,6 +68,7 @@ class OnlineEstimator:
         self._tries_other_starts = tries_other_starts
         self._records: tuple[Record, ...] = ()
         self._last: ChainedEstimate | None = None
+        self._problem: Problem | None = None
 
     def estimate(self, measurements: MeasurementSet) -> OnlineEstimate:
         """The estimate from some records, in their order.
@@ -76,10 +78,10 @@ class OnlineEstimator:
         """
         records = measurements.records
         if records[: len(self._records)] != self._records:
-            self._records, self._last = (), None
+            self._records, self._last, self._problem = (), None, None
         for count in range(len(self._records) + 1, len(records) + 1):
-            problem = self._robot.problem(MeasurementSet(records[:count]))
-            self._last = update_estimate(problem, self._last, self._tries_other_starts)
+            self._problem = self._robot.problem(MeasurementSet(records[:count]), self._problem)
+            self._last = update_estimate(self._problem, self._last, self._tries_other_starts)
             self._records = records[:count]
         if self._last is None:
             return OnlineEstimate(self._robot.belief(), None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +55,7 @@ class ReachableTargets:
         return ReachableTargets(self.poses[rows], self.joints[rows])
 
 
+@lru_cache(maxsize=64)
 def orientations(
     count: int,
     tilt: float,
@@ -77,7 +79,9 @@ def orientations(
     heading, zero = 2.0 * np.pi * heading, np.zeros(count)
     tilts = angle[:, None] * np.stack([np.cos(heading), np.sin(heading), zero], axis=-1)
     twists = np.stack([zero, zero, twist], axis=-1)
-    return rotations.from_vector(tilts) @ rotations.from_vector(twists)
+    turned: Array = rotations.from_vector(tilts) @ rotations.from_vector(twists)
+    turned.setflags(write=False)  # it is given to all who ask for the same
+    return turned
 
 
 def _amplitudes(uniform: Array, scale: Array, amplitudes: Amplitudes) -> Array:

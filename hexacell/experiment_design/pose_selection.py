@@ -36,10 +36,10 @@ from hexacell.kinematics.rotations import Array
 from hexacell.motion.paths import Path, PathPlanner, Rows
 
 MOST_CANDIDATES = 240
-COMMAND_BATCH = 48
+COMMAND_BATCHES = (12, 24, 48)
 PATH_BATCH = 4
-"""The best candidates are examined, their commands in batches and their paths in smaller ones: one of the
-first few is usually taken."""
+"""The best candidates are examined, their commands in batches, of the last size in the end, and their paths
+in smaller ones: one of the first few is usually taken."""
 
 WAYPOINT_GAIN_RATIO = 1.2
 """How much more a candidate must gain to be reached over waypoints, which take more moves."""
@@ -80,7 +80,7 @@ def select_pose(
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
     gains = criterion.gain(belief.covariance, records.jacobian, records.covariance)
     search = _PathSearch(TravelConstraint(belief, zero), planner)
-    for ranked in _batches(_ranking(belief, records, gains), COMMAND_BATCH):
+    for ranked in _batches(_ranking(belief, records, gains), *COMMAND_BATCHES):
         commands, found = commands_for(belief, records.targets[ranked])
         for few in _batches(np.flatnonzero(found), PATH_BATCH):
             rows = ranked[few]
@@ -162,5 +162,10 @@ class _PathSearch:
         return None
 
 
-def _batches(rows: Rows, size: int) -> Iterator[Rows]:
-    return (rows[first : first + size] for first in range(0, len(rows), size))
+def _batches(rows: Rows, *sizes: int) -> Iterator[Rows]:
+    """Batches of some sizes, and then of the last of them."""
+    first, waiting = 0, list(sizes)
+    while first < len(rows):
+        size = waiting.pop(0) if len(waiting) > 1 else waiting[0]
+        yield rows[first : first + size]
+        first += size

@@ -145,7 +145,9 @@ class _SampledRobots:
         )
 
 
-def _nearly_all_hold(belief: RobotBelief, joints: Array, poses: PoseBatch, sensitivity: Sensitivity) -> Mask:
+def _nearly_all_hold(
+    belief: RobotBelief, joints: Array, poses: PoseBatch, sensitivity: Sensitivity
+) -> Mask:
     """At which targets the constraint holds on all of many sampled robots but the worst.
 
     A few of them are tried first: what they exclude, which is most, all of them exclude.

@@ -13,8 +13,12 @@ geometry and the joint variables change linearly to (G, q) in a few stages, and 
 the solution of the one before. The sign of det J changes only at a singularity. A solution on which
 the sign differs from that at x0 is on another assembly mode and counts as not found.
 
+One stage is enough where Newton's method contracts from x0 at once: the second step is at most a quarter
+of the first one.
+
 Sources: Merlet, Parallel Robots, 2nd ed. 2006 (Newton's method and assembly modes);
-Allgower and Georg, Numerical Continuation Methods, 1990.
+Allgower and Georg, Numerical Continuation Methods, 1990;
+Deuflhard, Newton Methods for Nonlinear Problems, 2004, sec. 5.1 (contraction along a homotopy).
 """
 
 from __future__ import annotations
@@ -46,6 +50,9 @@ MAX_ROTATION_RAD = 0.5
 
 CONTINUATION_STAGES = (2, 8, 32)
 """Numbers of stages, tried in this order."""
+
+LARGEST_CONTRACTION = 0.25
+"""Of the first two Newton steps, where one stage is enough."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,6 +91,7 @@ class _NewtonIteration:
         joints: Array,
         start: PoseBatch,
         mode: Array | None,
+        largest_contraction: float,
     ) -> None:
         self.positions, self.rotations = np.array(start.positions), np.array(start.rotations)
         self.found = np.zeros(len(joints), dtype=bool)
@@ -92,6 +100,9 @@ class _NewtonIteration:
         self._joints, self._poses = joints, start
         self._error, self._jacobian = mechanism.residual_and_jacobian(geometry, start, joints)
         self._mode = assembly_mode(self._jacobian) if mode is None else mode
+        self._largest_contraction = largest_contraction
+        self._first_sizes: Array | None = None
+        self._contracts = np.ones(len(joints), dtype=bool)
 
     def errors(self) -> Array:
         """Largest absolute constraint of each active pose, mm."""
@@ -100,7 +111,10 @@ class _NewtonIteration:
 
     def step(self) -> None:
         """Advance all active poses by one step."""
-        self._poses = apply_twist(self._poses, _damped_step(self._jacobian, self._error))
+        step, sizes = _damped_step(self._jacobian, self._error)
+        if self._largest_contraction < np.inf:
+            self._judge(sizes)
+        self._poses = apply_twist(self._poses, step)
         self._error, self._jacobian = self._mechanism.residual_and_jacobian(
             self._geometry, self._poses, self._joints
         )
@@ -113,8 +127,20 @@ class _NewtonIteration:
         self.positions[rows] = self._poses.positions[finished]
         self.rotations[rows] = self._poses.rotations[finished]
         modes = assembly_mode(self._jacobian[finished][converged])
-        self.found[rows[converged]] = modes == self._mode[rows[converged]]
+        rows = rows[converged]
+        self.found[rows] = (modes == self._mode[rows]) & self._contracts[rows]
         self._keep_active(np.flatnonzero(~finished))
+
+    def _judge(self, sizes: Array) -> None:
+        """Compare the second step of each active pose with its first one, which was not to be shortened."""
+        if self._first_sizes is None:
+            self._first_sizes = np.empty(len(self._contracts))
+            self._first_sizes[self.rows] = sizes
+            self._contracts[self.rows] = sizes <= 1.0
+            return
+        contracts = sizes <= self._largest_contraction * self._first_sizes[self.rows]
+        self._contracts[self.rows] &= contracts
+        self._largest_contraction = np.inf
 
     def _keep_active(self, kept: NDArray[np.intp]) -> None:
         self.rows, self._poses, self._joints = self.rows[kept], self._poses[kept], self._joints[kept]
@@ -123,16 +149,19 @@ class _NewtonIteration:
             self._geometry = self._geometry.subset(kept)
 
 
-def _damped_step(jacobian: Array, error: Array) -> Array:
-    """Newton steps (n, 6), shortened to the largest translation and rotation."""
+def _damped_step(jacobian: Array, error: Array) -> tuple[Array, Array]:
+    """Newton steps (n, 6), shortened to the largest translation and rotation.
+
+    And what they were (n,) as a share of the largest ones.
+    """
     try:
         step = -np.linalg.solve(jacobian, error[..., None])[..., 0]
     except np.linalg.LinAlgError:
         step = -(np.linalg.pinv(jacobian) @ error[..., None])[..., 0]
     translation, rotation = step[..., :3] / MAX_TRANSLATION_MM, step[..., 3:] / MAX_ROTATION_RAD
     squares = np.maximum(np.sum(translation * translation, axis=-1), np.sum(rotation * rotation, axis=-1))
-    damped: Array = step / np.maximum(1.0, np.sqrt(squares))[..., None]
-    return damped
+    sizes: Array = np.sqrt(squares)
+    return step / np.maximum(1.0, sizes)[..., None], sizes
 
 
 def forward_kinematics(
@@ -144,13 +173,15 @@ def forward_kinematics(
     mode: Array | None = None,
     tolerance_mm: float = TOLERANCE_MM,
     max_steps: int = MAX_STEPS,
+    largest_contraction: float = np.inf,
 ) -> ForwardResult:
     """Poses of n joint vectors (n, 6), mm, by damped Newton's method from nearby poses ``start``.
 
     A pose that has converged is not changed further. ``mode`` (n,) is the required assembly mode, by
-    default that of ``start``; ``tolerance_mm`` is the largest constraint of a solution.
+    default that of ``start``; ``tolerance_mm`` is the largest constraint of a solution. Poses whose second
+    step is more than ``largest_contraction`` of the first one are not found.
     """
-    iteration = _NewtonIteration(mechanism, geometry, joints, start, mode)
+    iteration = _NewtonIteration(mechanism, geometry, joints, start, mode, largest_contraction)
     for _ in range(max_steps):
         # Written so that a pose with the error NaN, which no step can improve, is finished as well.
         iteration.finish(~(iteration.errors() >= tolerance_mm), tolerance_mm)
@@ -179,8 +210,7 @@ def continue_solution(
     """
     if start_joints is None:
         start_joints = joints
-    poses = start
-    found = np.zeros(len(joints), dtype=bool)
+    poses, found = _continue_at_once(mechanism, (start_geometry, geometry), (start_joints, joints), start)
     for stages in stage_counts:
         rows = np.flatnonzero(~found)
         if not len(rows):
@@ -191,6 +221,25 @@ def continue_solution(
         poses = poses.with_rows(rows, result.poses)
         found[rows] = result.found
     return ForwardResult(poses, found)
+
+
+def _continue_at_once(
+    mechanism: Mechanism,
+    geometries: tuple[Geometry, Geometry | GeometryBatch],
+    joints: tuple[Array, Array],
+    start: PoseBatch,
+) -> tuple[PoseBatch, Mask]:
+    """The poses where Newton's method contracts from the start, and which these are (n,)."""
+    result = forward_kinematics(
+        mechanism,
+        geometries[1],
+        joints[1],
+        start,
+        mode=assembly_mode(mechanism.residual_and_jacobian(geometries[0], start, joints[0])[1]),
+        max_steps=MAX_STAGE_STEPS,
+        largest_contraction=LARGEST_CONTRACTION,
+    )
+    return start.with_rows(result.found, result.poses[result.found]), result.found.copy()
 
 
 def _continue_in_stages(

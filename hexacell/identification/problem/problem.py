@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -313,12 +313,14 @@ def build_problem(
     earlier: Sequence[CommandingGeometry] = (),
     systematic: SystematicModel = no_systematic_errors,
     unknowns: int = 0,
+    before: Problem | None = None,
 ) -> Problem:
     """The problem of a measurement set.
 
     The poses were commanded under the ``controller``'s geometry, in any frames, or in the same frames under
     ``provisional`` ones, in the frame convention, the last one used last. Records from before the last
     calibration may have been commanded under the drawing, or under ``earlier`` geometries in their frames.
+    ``before`` is the problem of some of these records, if it is known: their start poses are taken from it.
 
     Raises:
         IdentifiabilityError: joint variables do not belong to the commanded poses, or for most records
@@ -332,7 +334,11 @@ def build_problem(
     commands = CommandedPoses.of(mechanism, measurements.poses[order], [*here, *earlier], branch, joints)
     EncoderConsistency(commands, joints, labels, branch, prior.centre, prior.leg_widths(mechanism)).check()
     initial = provisional[-1] if provisional else commands.most_frequent_geometry
-    start = commands.solve_poses(initial, joints)
+    free = mechanism.convention.free_parameters(initial)
+    if before is None or not np.array_equal(before.initial_parameters, free):
+        start = commands.solve_poses(initial, joints)
+    else:
+        start = _with_others(before, labels, lambda rows: commands[rows].solve_poses(initial, joints[rows]))
     _require_start_poses(start.found, labels)
     return Problem(
         mechanism=mechanism,
@@ -342,7 +348,7 @@ def build_problem(
         deviations=change.deviations(measurements.deviations[order]),
         first_rows=_first_rows(labels[:, 0]),
         commands=commands,
-        initial_parameters=mechanism.convention.free_parameters(initial),
+        initial_parameters=free,
         start=start.poses,
         has_start_pose=start.found,
         labels=labels,
@@ -350,6 +356,19 @@ def build_problem(
         systematic=systematic,
         unknowns=unknowns,
     )
+
+
+def _with_others(
+    before: Problem, labels: NDArray[np.int_], solve: Callable[[NDArray[np.intp]], ForwardResult]
+) -> ForwardResult:
+    """The start poses of records (n) with some ``labels``: of a problem before, and of the others solved."""
+    places = {tuple(label): place for place, label in enumerate(before.labels.tolist())}
+    known = np.array([places.get(tuple(label), -1) for label in labels.tolist()], dtype=np.intp)
+    new = np.flatnonzero(known < 0)
+    solved = solve(new)
+    found = before.has_start_pose[known]
+    found[new] = solved.found
+    return ForwardResult(before.start[known].with_rows(new, solved.poses), found)
 
 
 def _require_start_poses(found: Mask, labels: NDArray[np.int_]) -> None:

@@ -135,6 +135,7 @@ class _Search:
         self.centre = problem.prior.free
         self.now = start
         self.centring = NuisanceElimination(problem, start.weights)
+        self._linear: ReducedSystem | None = None
         self.options = options
         self.damping = options.damping
         self.growth = 2.0
@@ -143,7 +144,9 @@ class _Search:
 
     def linear(self) -> ReducedSystem:
         """The linear problem at the iterate."""
-        return self.centring.system(self.now.residuals, self.now.jacobian)
+        if self._linear is None:
+            self._linear = self.centring.system(self.now.residuals, self.now.jacobian)
+        return self._linear
 
     def advance(self) -> Termination | None:
         """Try one step; returns why the search has ended, if it has."""
@@ -165,6 +168,7 @@ class _Search:
     def _accept(self, step: _Step, poses: PoseBatch, gain: _Gain) -> None:
         self.now = measurement_model.predict(self.problem, self.now.free + step.free, poses)
         self.centring = NuisanceElimination(self.problem, self.now.weights)
+        self._linear = None
         self.damping *= max(0.1, 1.0 - (2.0 * gain.ratio - 1.0) ** 3)
         self.damping = max(self.damping, SMALLEST_DAMPING)
         self.growth, self.rejections = 2.0, 0

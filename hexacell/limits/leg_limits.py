@@ -59,7 +59,7 @@ class LegLimits:
         Distances take most of the time, so that they are computed only where the angles are kept.
         """
         least = np.broadcast_to(wanted, 12 + (self.distance_mm != 0.0))
-        kept: Mask = (self.spare_angles(legs).reshape(-1, 12) >= least[:12]).all(axis=-1)
+        kept = np.asarray((self.spare_angles(legs).reshape(-1, 12) >= least[:12]).all(axis=-1))
         if self.distance_mm != 0.0:
             kept[kept] = legs[kept].smallest_distance() - self.distance_mm >= least[12]
         return kept

@@ -361,7 +361,7 @@ def build_problem(
 def _with_others(
     before: Problem, labels: NDArray[np.int_], solve: Callable[[NDArray[np.intp]], ForwardResult]
 ) -> ForwardResult:
-    """The start poses of records (n) with some ``labels``: of a problem before, and of the others solved."""
+    """The start poses of records (n): those of a problem before, the others solved."""
     places = {tuple(label): place for place, label in enumerate(before.labels.tolist())}
     known = np.array([places.get(tuple(label), -1) for label in labels.tolist()], dtype=np.intp)
     new = np.flatnonzero(known < 0)

@@ -209,9 +209,9 @@ class Plan:
         return planned_systematic_mm(self.robot, self.task, sets, self.earlier)
 
     @cached_property
-    def _last_out_of_reach(self) -> dict[_Progress, frozenset[int]]:
-        """Points that are not to be begun, by what that depends on."""
-        return {}
+    def _last_out_of_reach(self) -> list[tuple[_Progress, frozenset[int]]]:
+        """Points that are not to be begun, with what that depends on: the last answer, if there was one."""
+        return []
 
     @cached_property
     def _estimator(self) -> RecordEstimator:
@@ -274,11 +274,10 @@ class Plan:
 
         A point that is only too uncertain may be measured later, if there is another one to learn from.
         """
-        key = (state.measurements.records, state.done, state.point)
-        if key not in self._last_out_of_reach:
-            self._last_out_of_reach.clear()  # only the last one is asked for again
-            self._last_out_of_reach[key] = self._find_out_of_reach(state)
-        return self._last_out_of_reach[key]
+        last, progress = self._last_out_of_reach, (state.measurements.records, state.done, state.point)
+        if not last or last[0][0] != progress:
+            last[:] = [(progress, self._find_out_of_reach(state))]
+        return last[0][1]
 
     def _find_out_of_reach(self, state: CampaignState) -> frozenset[int]:
         others = {point for point in self.points if point not in state.done and point != state.point}

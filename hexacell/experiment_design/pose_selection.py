@@ -32,7 +32,7 @@ from hexacell.experiment_design.predicted_records import (
 from hexacell.experiment_design.travel_monte_carlo import TravelConstraint
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rotations import Array, Mask
 from hexacell.motion.paths import Path, PathPlanner, Rows
 
 MOST_CANDIDATES = 240
@@ -82,10 +82,9 @@ def select_pose(
     search = _PathSearch(TravelConstraint(belief, zero), planner)
     for ranked in _batches(_ranking(belief, records, gains), *COMMAND_BATCHES):
         commands, found = commands_for(belief, records.targets[ranked])
-        for few in _batches(np.flatnonzero(found), PATH_BATCH):
-            rows = ranked[few]
-            if selected := search.first_safe(records[rows], commands[few], gains[rows]):
-                return selected
+        rows = ranked[found]
+        if selected := search.first_safe(records[rows], commands[found], gains[rows]):
+            return selected
     raise LimitError("no orientation surely keeps the ball inside the gauges' travel")
 
 
@@ -106,7 +105,7 @@ def select_from_list(
     inside = np.flatnonzero(records.within(belief.limits, TRAVEL_SHARE))[skipped:]
     search = _PathSearch(TravelConstraint(belief, zero), planner)
     no_preference = np.full(len(inside), np.inf)
-    selected = search.first_safe(records[inside], commands[rows[inside]], no_preference)
+    selected = search.first_of_few(records[inside], commands[rows[inside]], no_preference)
     if selected is None:
         raise LimitError(
             "none of the poses left in the list surely keeps the ball inside the gauges' travel"
@@ -130,10 +129,21 @@ class _PathSearch:
     def first_safe(
         self, records: PredictedRecords, commands: PoseBatch, gains: Array
     ) -> SelectedPose | None:
-        """The first of some ranked candidates with a safe path to it."""
-        if not len(records):
-            return None
-        rows = np.flatnonzero(self.travel.holds(records))
+        """The first of some ranked candidates with a safe path to it; a few are examined together."""
+        rows = np.arange(len(records))
+        for some in _batches(rows, len(rows) if self.travel.is_uncertain else PATH_BATCH):
+            holds = self.travel.holds(records[some])
+            for few in _batches(some, PATH_BATCH):
+                arguments = records[few], commands[few], gains[few]
+                if selected := self.first_of_few(*arguments, holds[few - some[0]]):
+                    return selected
+        return None
+
+    def first_of_few(
+        self, records: PredictedRecords, commands: PoseBatch, gains: Array, holds: Mask | None = None
+    ) -> SelectedPose | None:
+        """The best of a few, straight paths first; ``holds``: at which the constraint does, if known."""
+        rows = np.flatnonzero(self.travel.holds(records) if holds is None else holds)
         if not len(rows):
             return None
         paths = self.planner.options(commands)

@@ -50,6 +50,9 @@ UNCERTAIN_SHARE = 0.4
 
 SAMPLES = 24
 SAMPLES_UNCERTAIN = 240
+STAGES_UNCERTAIN = (24, 96)
+"""After how many samples the targets that they exclude are left out."""
+
 SIGMAS = 4.0
 
 FEWEST_SAMPLES = 6
@@ -57,6 +60,10 @@ FEWEST_SAMPLES = 6
 
 MARGIN_SHARE = 0.5
 """Of the singularity margin, which all sampled robots must keep."""
+
+
+TOLERANCE_MM = 1e-4
+"""Of the constraints of sampled robots, whose deviations are compared with millimetres of travel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +90,7 @@ class TravelConstraint:
         return bool(linear.all() or self._holds_for_samples(targets[~linear]).all())
 
     def _holds_linearly(self, records: PredictedRecords) -> Mask:
-        if self._is_uncertain:
+        if self.is_uncertain:
             return np.zeros(len(records), dtype=bool)
         within = records.within(self.belief.limits, LINEAR_SHARE)
         return within & self._legs_are_free(records.targets)
@@ -112,7 +119,8 @@ class TravelConstraint:
         return _all_within(sampled, belief.limits, 1.0 / (1.0 + sigma / HALF_TRAVEL_SIGMA))
 
     @cached_property
-    def _is_uncertain(self) -> bool:
+    def is_uncertain(self) -> bool:
+        """Whether so little is known that targets take many samples; they cost less together."""
         return self._orientation_sigma > UNCERTAIN_SIGMA
 
     @cached_property
@@ -136,12 +144,21 @@ class _SampledRobots:
     deviations: Array
     leg_margins: Array
 
-    def with_others(self, others: _SampledRobots, rows: NDArray[np.intp]) -> _SampledRobots:
-        """These at some of the targets, and others at the same targets."""
+    def __len__(self) -> int:
+        return len(self.found)
+
+    def at(self, targets: Mask) -> _SampledRobots:
+        """The same robots at some of the targets."""
         return _SampledRobots(
-            np.concatenate([self.found[:, rows], others.found]),
-            np.concatenate([self.deviations[:, rows], others.deviations]),
-            np.concatenate([self.leg_margins[:, rows], others.leg_margins]),
+            self.found[:, targets], self.deviations[:, targets], self.leg_margins[:, targets]
+        )
+
+    def with_others(self, others: _SampledRobots) -> _SampledRobots:
+        """These and others at the same targets."""
+        return _SampledRobots(
+            np.concatenate([self.found, others.found]),
+            np.concatenate([self.deviations, others.deviations]),
+            np.concatenate([self.leg_margins, others.leg_margins]),
         )
 
 
@@ -152,17 +169,20 @@ def _nearly_all_hold(
 
     A few of them are tried first: what they exclude, which is most, all of them exclude.
     """
-    variates = _standard_normal(SAMPLES_UNCERTAIN, len(belief.free))
-    few = _sample(belief, variates[:SAMPLES], joints, poses, sensitivity)
-    holds = _nearly_all_within(few, belief.limits, UNCERTAIN_SHARE)
-    rows = np.flatnonzero(holds)
-    if len(rows):
-        at = np.append(0, 1 + rows)
-        others = _sample(belief, variates[SAMPLES:], joints[at], poses[at], sensitivity[at])
-        sampled = few.with_others(others, rows)
-        are_enough = len(sampled.found) >= FEWEST_SAMPLES
-        holds[rows] = are_enough and _nearly_all_within(sampled, belief.limits, UNCERTAIN_SHARE)
-    return holds
+    few, *others = np.split(_standard_normal(SAMPLES_UNCERTAIN, len(belief.free)), STAGES_UNCERTAIN)
+    sampled = _sample(belief, few, joints, poses, sensitivity)
+    within = _nearly_all_within(sampled, belief.limits, UNCERTAIN_SHARE)
+    holds = within.copy()
+    for more in others:
+        if not holds.any():
+            break
+        at = np.append(0, 1 + np.flatnonzero(holds))
+        sampled = sampled.at(within).with_others(
+            _sample(belief, more, joints[at], poses[at], sensitivity[at])
+        )
+        within = _nearly_all_within(sampled, belief.limits, UNCERTAIN_SHARE)
+        holds[holds] = within
+    return holds & (len(sampled) >= FEWEST_SAMPLES)
 
 
 def _sample(
@@ -181,7 +201,9 @@ def _sample(
     vectors = (belief.estimate.vector + errors).repeat(count, axis=0)
     robots = GeometryBatch(belief.mechanism.parameters, vectors)
     start, mode = apply_twist(poses[rows], steps), sensitivity.mode[rows]
-    result = forward_kinematics(belief.mechanism, robots, joints[rows], start, mode=mode)
+    result = forward_kinematics(
+        belief.mechanism, robots, joints[rows], start, mode=mode, tolerance_mm=TOLERANCE_MM
+    )
     found = result.found.reshape(samples, count)
     everywhere = (robots, result.poses, joints[rows])
     is_clear = has_singularity_margin(belief.mechanism, *everywhere, MARGIN_SHARE * margin)

@@ -119,16 +119,16 @@ class _NewtonIteration:
             self._geometry, self._poses, self._joints
         )
 
-    def finish(self, finished: Mask, tolerance_mm: float) -> None:
-        """Store the present values of some active poses as final."""
+    def finish(self, finished: Mask, converged: Mask) -> None:
+        """Store the present values of some active poses as final; those that converged are found."""
         if not finished.any():
             return
-        rows, converged = self.rows[finished], self.errors()[finished] < tolerance_mm
+        rows = self.rows[finished]
         self.positions[rows] = self._poses.positions[finished]
         self.rotations[rows] = self._poses.rotations[finished]
-        modes = assembly_mode(self._jacobian[finished][converged])
-        rows = rows[converged]
-        self.found[rows] = (modes == self._mode[rows]) & self._contracts[rows]
+        rows = self.rows[converged]
+        same_mode = assembly_mode(self._jacobian[converged]) == self._mode[rows]
+        self.found[rows] = same_mode & self._contracts[rows]
         self._keep_active(np.flatnonzero(~finished))
 
     def _judge(self, sizes: Array) -> None:
@@ -183,12 +183,14 @@ def forward_kinematics(
     """
     iteration = _NewtonIteration(mechanism, geometry, joints, start, mode, largest_contraction)
     for _ in range(max_steps):
+        errors = iteration.errors()
         # Written so that a pose with the error NaN, which no step can improve, is finished as well.
-        iteration.finish(~(iteration.errors() >= tolerance_mm), tolerance_mm)
+        iteration.finish(~(errors >= tolerance_mm), errors < tolerance_mm)
         if not len(iteration.rows):
             break
         iteration.step()
-    iteration.finish(np.ones(len(iteration.rows), dtype=bool), tolerance_mm)
+    else:
+        iteration.finish(np.ones(len(iteration.rows), dtype=bool), iteration.errors() < tolerance_mm)
     return ForwardResult(PoseBatch(iteration.positions, iteration.rotations), iteration.found)
 
 

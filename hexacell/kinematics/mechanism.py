@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cached_property
 from typing import Literal, Protocol
 
 import numpy as np
@@ -37,7 +37,7 @@ class ConstraintDerivatives:
     parameters: Array
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FrameConvention:
     """Parameters that the choice of frames sets to zero, and groups that it makes equal.
 
@@ -50,9 +50,12 @@ class FrameConvention:
     zero: tuple[str, ...]
     equal: tuple[tuple[str, ...], ...]
 
-    @cache  # noqa: B019 - a convention lives as long as its mechanism's class
     def basis(self) -> Array:
         """The (P, p) matrix from the free parameters to all parameters; its entries are 0 and 1."""
+        return self._basis
+
+    @cached_property
+    def _basis(self) -> Array:
         representative = {name: group[0] for group in self.equal for name in group}
         free = self.free_names()
         matrix = np.zeros((len(self.parameters), len(free)))
@@ -69,9 +72,12 @@ class FrameConvention:
             name for name in self.parameters.names if name not in self.zero and name not in dependent
         )
 
-    @cache  # noqa: B019
     def free_rows(self) -> NDArray[np.intp]:
         """Indices of the free parameters in a vector (P,) of all parameters."""
+        return self._free_rows
+
+    @cached_property
+    def _free_rows(self) -> NDArray[np.intp]:
         return self.parameters.rows(self.free_names())
 
     def free_parameters(self, geometry: Geometry) -> Array:

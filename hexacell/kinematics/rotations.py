@@ -55,17 +55,22 @@ def skew(vector: ArrayLike) -> Array:
     return matrix
 
 
+_SKEW = skew(_IDENTITY).reshape(3, 9)
+"""Cross-product matrices in rows: one product is faster than six assignments."""
+
+
 def from_vector(vector: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues' formula)."""
     vector = np.asarray(vector, dtype=float)
-    squared = np.einsum("...i,...i->...", vector, vector)[..., None, None]
+    squared = np.einsum("...i,...i->...", vector, vector)[..., None]
     half = 0.5 * np.sqrt(squared)
     # Below this half angle the quotient is 1 to the last bit; at zero it is undefined.
     quotient = np.sin(half) / half if half.min(initial=1.0) > 1e-9 else _sine_quotient(half)
     quadratic = 0.5 * quotient**2
-    rotation: Array = (quotient * np.cos(half)) * skew(vector)
-    rotation += quadratic * (vector[..., :, None] * vector[..., None, :])
-    rotation += (1.0 - quadratic * squared) * _IDENTITY
+    flat = (quotient * np.cos(half) * vector) @ _SKEW
+    rotation: Array = flat.reshape(*vector.shape, 3)
+    rotation += (quadratic * vector)[..., :, None] * vector[..., None, :]
+    rotation += (1.0 - quadratic * squared)[..., None] * _IDENTITY
     return rotation
 
 

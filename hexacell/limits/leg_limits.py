@@ -56,10 +56,14 @@ class LegLimits:
     def keeps(self, legs: Legs, wanted: Array | float = 0.0) -> Mask:
         """At which of n poses all :meth:`margins` are at least those wanted (m,).
 
-        Distances take most of the time, so that they are computed only where the angles are kept.
+        Distances take most of the time, and the platform's joints limit most, so that each is computed only
+        where those before it are kept.
         """
         least = np.broadcast_to(wanted, 12 + (self.distance_mm != 0.0))
-        kept = np.asarray((self.spare_angles(legs).reshape(-1, 12) >= least[:12]).all(axis=-1))
+        at_platform = angles_between(legs.directions_in_platform, self.platform_axes)
+        kept = np.asarray((self.platform_cones - at_platform >= least[6:12]).all(axis=-1))
+        at_base = angles_between(legs[kept].directions_in_carriers, self.base_axes)
+        kept[kept] = (self.base_cones - at_base >= least[:6]).all(axis=-1)
         if self.distance_mm != 0.0:
             kept[kept] = legs[kept].smallest_distance() - self.distance_mm >= least[12]
         return kept

@@ -25,7 +25,6 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.experiment_design.predicted_records import GaugeZero, PredictedRecords, predict_records

@@ -69,3 +69,20 @@ def test_limits_that_include_a_pose_allow_it_and_nothing_beyond():
     assert are_kept(widened, turned([1, 0, 0], 10.0))[0]
     assert not are_kept(widened, turned([1, 0, 0], 33.1))[0]
     np.testing.assert_allclose(np.degrees(widened.base_cones), 20.0)
+
+
+@pytest.mark.parametrize("distance", [0.0, 40.0])
+@pytest.mark.parametrize("wanted", [0.0, 0.05])
+def test_limits_are_kept_where_no_margin_is_less_than_wanted(distance, wanted):
+    random = np.random.default_rng(3)
+    some = [turned(random.normal(size=3), angle) for angle in random.uniform(0.0, 25.0, 40)]
+    joints = [
+        np.concatenate([getattr(legs, name) for legs in some])
+        for name in ("base_joints", "platform_joints")
+    ]
+    joints[0] += random.normal(scale=40.0, size=joints[0].shape)
+    legs = Legs(*joints, np.concatenate([legs.rotations for legs in some]))
+    kept = limits(distance=distance).keeps(legs, wanted)
+    np.testing.assert_array_equal(kept, are_kept(limits(distance=distance), legs, wanted))
+    assert kept.any()
+    assert not kept.all()

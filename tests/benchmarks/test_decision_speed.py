@@ -1,0 +1,89 @@
+"""How long it takes to choose the next pose: with the refit of the estimate, at 44 to 54 records.
+
+Times are of the processor, the quickest of some repeats. What must hold on any machine is the ratio to
+numpy's time for many small solves.
+"""
+
+from __future__ import annotations
+
+import copy
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.decisions import CampaignState, Decision, Finished, MeasurePose
+from hexacell.campaign.dry_run import VirtualCampaign
+from hexacell.campaign.planner import Plan
+from hexacell.campaign.recursive_estimator import OnlineEstimator
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.measurements.records import MeasurementSet
+from hexacell.robot_model import robot_of
+from hexacell.virtual_robot import VirtualRobot
+from tests.benchmarks.virtual_calibration import robot_that_reaches
+
+LATE = range(44, 55)
+REPEATS = 5
+MOST_MS = 15.0
+SMALL_SOLVES = 1000
+MOST_REFERENCES = 2.2
+
+Moment = tuple[Plan, CampaignState, MeasurePose]
+"""A plan, a state, and what was decided."""
+
+
+@pytest.fixture(scope="module")
+def campaign() -> tuple[list[Moment], float]:
+    """The late moments of a whole campaign, and its processor seconds."""
+    cell = load_cell(bundled_config("simulated-hexaglide"))
+    robot, random = robot_of(cell), np.random.default_rng(1)
+    virtual = VirtualRobot(robot, robot_that_reaches(cell, robot, random), random)
+    running = VirtualCampaign(Plan(cell.settings, robot, with_forecast=False), virtual)
+    moments: list[Moment] = []
+    decision: Decision | None = None
+    begun = time.process_time()
+    while not isinstance(decision, Finished):
+        plan, state = running.plan, running.state
+        decision = running.step()
+        if isinstance(decision, MeasurePose) and len(state.measurements) in LATE:
+            moments.append((plan, state, decision))
+    return moments, time.process_time() - begun
+
+
+def seconds_of(moment: Moment) -> float:
+    """The quickest of some repetitions of a decision, each with the estimate of before the last record."""
+    plan, state, decided = moment
+    estimator = OnlineEstimator(plan.robot)
+    estimator.estimate(MeasurementSet(state.measurements.records[:-1]))
+    taken = []
+    for _ in range(REPEATS):
+        again = replace(plan, estimator=copy.copy(estimator))
+        _ = again.task, again.budget  # made once in a campaign
+        begun = time.process_time()
+        decision = again.decide(state)
+        taken.append(time.process_time() - begun)
+        assert isinstance(decision, MeasurePose)
+        assert decision.pose == decided.pose
+    return min(taken)
+
+
+def reference_seconds() -> float:
+    """numpy's time for many solves of a few 6 x 6 systems."""
+    matrices, values = np.eye(6) + 0.01 * np.ones((12, 6, 6)), np.ones((12, 6, 1))
+    begun = time.process_time()
+    for _ in range(SMALL_SOLVES):
+        np.linalg.solve(matrices, values)
+    return time.process_time() - begun
+
+
+def test_a_late_decision(campaign, say) -> None:
+    moments, seconds = campaign
+    reference = min(reference_seconds() for _ in range(REPEATS))
+    late = float(np.median([seconds_of(moment) for moment in moments]))
+    reference = min(reference, *(reference_seconds() for _ in range(REPEATS)))
+    say("a decision at 44 to 54 records", f"{1e3 * late:.1f} ms", f"at most {MOST_MS:g} ms")
+    say("  as a multiple of 1,000 small solves", f"{late / reference:.2f}", f"{MOST_REFERENCES:g}")
+    say("a campaign of 55 records, deciding and measuring virtually", f"{seconds:.1f} s", "-")
+    assert late <= MOST_REFERENCES * reference

@@ -76,12 +76,11 @@ def test_limits_that_include_a_pose_allow_it_and_nothing_beyond():
 def test_limits_are_kept_where_no_margin_is_less_than_wanted(distance, wanted):
     random = np.random.default_rng(3)
     some = [turned(random.normal(size=3), angle) for angle in random.uniform(0.0, 25.0, 40)]
-    joints = [
+    base, platform, rotations = (
         np.concatenate([getattr(legs, name) for legs in some])
-        for name in ("base_joints", "platform_joints")
-    ]
-    joints[0] += random.normal(scale=40.0, size=joints[0].shape)
-    legs = Legs(*joints, np.concatenate([legs.rotations for legs in some]))
+        for name in ("base_joints", "platform_joints", "rotations")
+    )
+    legs = Legs(base + random.normal(scale=40.0, size=base.shape), platform, rotations)
     kept = limits(distance=distance).keeps(legs, wanted)
     np.testing.assert_array_equal(kept, are_kept(limits(distance=distance), legs, wanted))
     assert kept.any()

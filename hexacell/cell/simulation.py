@@ -46,6 +46,8 @@ FaultKind = Literal[
     "jumped",
     "alarm",
     "warning",
+    "two steps",
+    "SYNC counter",
     "forward kinematics",
     "old config",
 ]

@@ -72,6 +72,12 @@ class SimulatedEncoderBank(Closeable):
             "silent": partial(self._set_fault, encoder.set_silent),
             "alarm": partial(self._set_fault, encoder.set_alarm),
             "warning": partial(self._set_fault, encoder.set_warning),
+            "two steps": partial(self._set_fault, encoder.set_two_steps),
+            "SYNC counter": partial(self._set_fault, encoder.set_sync_counter),
+            "switched on again": partial(self._set_fault, encoder.switch_on_again),
+            "repeated": partial(self._set_fault, encoder.set_doubled),
+            "reversed": partial(self._set_fault, encoder.set_reversed),
+            "zeroed": partial(self._set_fault, encoder.set_zeroed),
             "frozen": partial(self._set_fault, encoder.set_frozen),
             "jumped": partial(self._set_fault, partial(encoder.set_shifted, self._jump_counts)),
         }

@@ -26,6 +26,10 @@ DIRTY_SCALE = 0x02
 """Bit of the warnings: the light of the scale is at its limit."""
 POSITION_ERROR = 0x21
 """Error register: generic and device profile specific."""
+WRONG_SYNC, COMMUNICATION_ERROR = 0x8240, 0x11
+"""Emergency of a SYNC of unexpected length, and the error register with it."""
+REVERSED = 1 << 3
+COUNTER_OVERFLOW = 240
 
 _NOT_NOW = 0x0800_0022
 _READ_ONLY = 0x0601_0002
@@ -40,8 +44,9 @@ class SimulatedEncoder:
     ) -> None:
         self.data = data
         self.counts = 0
-        self._is_silent = self._is_frozen = False
+        self._is_silent = self._is_frozen = self._is_doubled = False
         self._shift = 0
+        self._told_of_sync = False
         self._bus = bus
         self._vendor = vendor
         self._real_seconds = real_seconds
@@ -80,20 +85,50 @@ class SimulatedEncoder:
         """Count so much more, as after a lost revolution, or as before."""
         self._shift = counts if on else 0
 
+    def set_reversed(self, *, on: bool) -> None:
+        """Count in the other direction, or as it should."""
+        self._set(object_dictionary.OPERATING_PARAMETERS, struct.pack("<H", REVERSED * on))
+
+    def set_zeroed(self, *, on: bool) -> None:
+        """Press the preset: the present position becomes 0; what it did stays."""
+        if on:
+            self._shift -= self.counts
+            self._set(object_dictionary.OFFSET, struct.pack("<i", self._shift))
+
+    def set_doubled(self, *, on: bool) -> None:
+        """Answer a SYNC twice, as where another device has the same node id."""
+        self._is_doubled = on
+
+    def set_two_steps(self, *, on: bool) -> None:
+        """Tell two measuring steps, one a tenth of the other, or one."""
+        self._set(object_dictionary.MEASURING_STEP, struct.pack("<I", self.data.step // (10 if on else 1)))
+
+    def set_sync_counter(self, *, on: bool) -> None:
+        """Want a counter in each SYNC, or none."""
+        self._told_of_sync = False
+        self._set(object_dictionary.SYNC_COUNTER, bytes((COUNTER_OVERFLOW * on,)))
+
+    def switch_on_again(self, *, on: bool) -> None:
+        """Boot, as after a loss of its supply."""
+        if on and self._node.has_network():
+            self._stop_event_timers()
+            self.boot()
+
     def set_warning(self, *, on: bool) -> None:
         """Set a warning, as of a dirty scale, or clear it; nothing is sent."""
-        self._node.set_data(object_dictionary.WARNINGS, 0, bytes((DIRTY_SCALE * on, 0)))
+        self._set(object_dictionary.WARNINGS, bytes((DIRTY_SCALE * on, 0)))
 
     def sample(self, counts: int) -> None:
         """Take the present position."""
         if not self._is_frozen:
-            self.counts = counts + self._shift
+            is_reversed = self._value(object_dictionary.OPERATING_PARAMETERS, 0) & REVERSED
+            self.counts = (-counts if is_reversed else counts) + self._shift
 
     def set_alarm(self, *, on: bool) -> None:
         """Report that there is no magnet, or that it is back, and set the error register."""
         code, register = (NO_MAGNET, POSITION_ERROR) if on else (0, 0)
-        self._node.set_data(object_dictionary.ERROR_REGISTER, 0, bytes((register,)))
-        self._bus.send_message(0x80 + self.data.node, struct.pack("<HB5x", code, register))
+        self._set(object_dictionary.ERROR_REGISTER, bytes((register,)))
+        self._send_emergency(code, register)
 
     def boot(self) -> None:
         """Boot with default settings: boot-up message, then PRE-OPERATIONAL."""
@@ -107,17 +142,33 @@ class SimulatedEncoder:
     def on_sync(self) -> Iterator[tuple[int, bytes]]:
         """The frames (COB-ID, data) sent at this SYNC, with the present sample."""
         self._syncs += 1
-        if not self.is_operational or self._is_silent:
+        if not self.is_operational or self._is_silent or self._misses_counter():
             return
         for number in range(1, len(self._vendor.tpdos) + 1):
             transmission_type = self._value(0x1800 + number - 1, 2)
             if transmission_type in _SYNCHRONOUS and self._syncs % transmission_type == 0:
-                yield from self._frames(number)
+                for _ in range(1 + self._is_doubled):
+                    yield from self._frames(number)
 
     def send(self, cob_id: int, data: bytes) -> None:
         """Send a PDO, if the node is operational."""
         if self.is_operational:
             self._bus.send_message(cob_id, data)
+
+    def _set(self, index: int, data: bytes) -> None:
+        self._node.set_data(index, 0, data)
+
+    def _send_emergency(self, code: int, register: int) -> None:
+        self._bus.send_message(0x80 + self.data.node, struct.pack("<HB5x", code, register))
+
+    def _misses_counter(self) -> bool:
+        """Whether it wants a counter in the SYNC, which this bus never has; told once."""
+        if not self._value(object_dictionary.SYNC_COUNTER, 0):
+            return False
+        if not self._told_of_sync:
+            self._told_of_sync = True
+            self._send_emergency(WRONG_SYNC, COMMUNICATION_ERROR)
+        return True
 
     def _on_nmt(self, _can_id: int, data: bytearray, _timestamp: float) -> None:
         command, addressed = data[:2]

@@ -72,8 +72,12 @@ ROTARY = replace(EVENTS_AND_SYNC, device_type=MULTI_TURN)
 POSITION = 0x6004
 POSITION_OF_MAGNET = 0x6020
 ERROR_REGISTER = 0x1001
+SYNC_COUNTER = 0x1019
+OPERATING_PARAMETERS = 0x6000
+MEASURING_STEP = 0x6501
 ALARMS = 0x6503
 WARNINGS = 0x6505
+OFFSET = 0x6509
 TPDO_OFF = 1 << 31
 MAPPING_SLOTS = 8
 
@@ -104,6 +108,7 @@ def _communication(vendor: Vendor, serial_number: int) -> Iterator[_Row]:
     yield _Row(0x1000, 0, "device type", UNSIGNED32, vendor.device_type)
     yield _Row(ERROR_REGISTER, 0, "error register", UNSIGNED8, 0)
     yield _Row(0x1017, 0, "producer heartbeat time", UNSIGNED16, 0, "rw")
+    yield _Row(SYNC_COUNTER, 0, "overflow of the counter in SYNC", UNSIGNED8, 0, "rw")
     yield _Row(0x1018, 0, "number of identity entries", UNSIGNED8, 4)
     yield _Row(0x1018, 1, "vendor", UNSIGNED32, 0x0000_0406)
     yield _Row(0x1018, 2, "product code", UNSIGNED32, vendor.device_type >> 16)
@@ -113,7 +118,7 @@ def _communication(vendor: Vendor, serial_number: int) -> Iterator[_Row]:
 
 
 def _profile(vendor: Vendor, step: int, position: int) -> Iterator[_Row]:
-    yield _Row(0x6000, 0, "operating parameters", UNSIGNED16, 0, "rw")
+    yield _Row(OPERATING_PARAMETERS, 0, "operating parameters", UNSIGNED16, 0, "rw")
     if vendor.magnets == 1:
         yield _Row(POSITION, 0, "position", position, 0)
     else:
@@ -128,10 +133,11 @@ def _profile(vendor: Vendor, step: int, position: int) -> Iterator[_Row]:
         yield _Row(0x6005, 2, "speed step", UNSIGNED32, 100)
     yield _Row(0x6030, 0, "number of speeds", UNSIGNED8, 1)
     yield _Row(0x6030, 1, "speed", INTEGER16, 0)
-    yield _Row(0x6501, 0, "measuring step", UNSIGNED32, step)
+    yield _Row(MEASURING_STEP, 0, "measuring step", UNSIGNED32, step)
     yield _Row(ALARMS, 0, "alarms", UNSIGNED16, 0)
     yield _Row(0x6504, 0, "supported alarms", UNSIGNED16, 1)
     yield _Row(WARNINGS, 0, "warnings", UNSIGNED16, 0)
+    yield _Row(OFFSET, 0, "offset", INTEGER32, 0)
 
 
 def _tpdo(number: int, tpdo: TpdoDefaults, node: int) -> Iterator[_Row]:

@@ -34,6 +34,7 @@ from tests.drivers.simulated.gauges.served.cell import MORE_DRIVERS, PROTOCOLS, 
 TABLE = Path(__file__).parents[3] / "docs" / "device-faults.md"
 BEGIN = "<!-- made by tests/drivers/simulated/test_fault_table.py -->\n"
 BEFORE_MM, AFTER_MM = 1.0, 1.5
+ENCODER_BEFORE_MM, ENCODER_AFTER_MM = 30.0, 30.5
 READINGS = 5
 ENCODER_READINGS = 50
 AT_ONCE = 4
@@ -115,14 +116,14 @@ async def gauge_row(protocol: str, fault: FaultKind) -> Row:
 
 async def encoder_row(fault: FaultKind) -> Row:
     settings = LinearEncoderSettings(timeout_s=1.0, heartbeat_ms=5000, largest_speed_mm_s=1000.0)
-    at = [0.0]
+    at = [ENCODER_BEFORE_MM]
     simulated = SimulatedEncoderBank(settings, lambda: at * 6, CellClock(1.0))
     bank = Cia406Bank(settings.model_copy(update={"bus": simulated.bus_settings}))
     try:
         await bank.open()
         await bank.read()
         simulated.faults(3)[fault](on=True)
-        at[0] = 0.5
+        at[0] = ENCODER_AFTER_MM
         found: list[float] = []
 
         async def read_often() -> None:
@@ -130,9 +131,8 @@ async def encoder_row(fault: FaultKind) -> Row:
                 found.append((await bank.read()).positions[2])
 
         error = await told(read_often)
-        return row(
-            "encoders, cia406", fault, error, is_right=abs(found[-1] - 0.5) < RIGHT_MM if found else False
-        )
+        is_right = bool(found) and abs(found[-1] - ENCODER_AFTER_MM) < RIGHT_MM
+        return row("encoders, cia406", fault, error or await told(bank.open), is_right=is_right)
     finally:
         await bank.close()
         simulated.close()

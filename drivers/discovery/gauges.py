@@ -24,6 +24,8 @@ from hexacell.errors import DeviceError, HexacellError
 
 TIMEOUT_S = 0.5
 UWAVE = "uwave"
+HEIDENHAIN = "heidenhain-nd"
+"""Asked last: an instrument that waits for the end of a line adds this question to the next one."""
 BAUD_RATES = (9600, 115200)
 DESCRIBE_QUESTION = 'Say what it is asked with protocol = "visa" (docs/drivers.md)'
 DESCRIBE = 'Describe its lines with protocol = "stream" (docs/drivers.md)'
@@ -65,9 +67,8 @@ async def search_port(port: str, factories: Mapping[str, GaugeFactory]) -> PortF
     """Ask in every protocol, then listen; the first that is answered is the port's."""
     if visa.SEPARATOR in port:
         return await _identify(port)
-    for protocol, factory in factories.items():
-        if protocol == UWAVE:
-            continue
+    for protocol in sorted(factories.keys() - {UWAVE}, key=lambda name: (name == HEIDENHAIN, name)):
+        factory = factories[protocol]
         try:
             found = await _channels(protocol, factory, port)
         except HexacellError as error:

@@ -73,6 +73,7 @@ class EncoderSession:
 
     def read(self) -> EncoderSample:
         """One complete sample; valid only if no fault is found after it."""
+        self.bus.check()
         self._alarms.begin_sample()
         counts = self._sampler.sample()
         self._alarms.check()

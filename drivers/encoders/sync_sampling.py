@@ -29,8 +29,8 @@ class SyncSampler:
     no response follows it: failed SYNCs follow each other within two time-outs, and a leg that lags
     behind responds at the same rate.
 
-    What need not wait is done while frames are on the wire: a position is decoded as it comes, and the bus
-    is checked after the SYNC. On a fast bus this is the time between a round and the next one.
+    A position is decoded as it comes, while others are on the wire: what is done after the last one is a
+    tenth of a round on a fast bus.
     """
 
     def __init__(
@@ -59,12 +59,12 @@ class SyncSampler:
     def sample(self) -> tuple[int, ...]:
         """One complete sample, the counts of all legs, after at most ``MAX_SYNCS`` SYNCs.
 
-        It is valid if :meth:`EncoderBus.check` finds nothing after it.
+        It is valid if :meth:`EncoderBus.check` finds nothing before it and after it: a surplus response
+        from before would pass for one to its SYNC.
         """
         for _ in range(MAX_SYNCS):
             is_synchronized = self._await_late_responses()
             self._send_sync()
-            self._bus.check()
             if not self._bus.wait_for(self._is_complete, self._timeout_s):
                 continue
             if not is_synchronized:

@@ -48,6 +48,7 @@ async def test_rounds_come_as_often_as_the_bus_allows(bitrate: int, say, monkeyp
         say("  incomplete rounds", f"{taken.syncs - ROUNDS} of {ROUNDS}", "none")
     assert by_thread.syncs == by_coroutine.syncs == ROUNDS
     assert ROUNDS / by_thread.seconds >= LEAST_SHARE * allowed
+    assert ROUNDS / by_coroutine.seconds >= LEAST_SHARE * allowed
 
 
 @dataclass(frozen=True)

@@ -165,6 +165,17 @@ async def test_more_positions_than_syncs_are_reported_as_a_second_device(raw, ba
         await bank.read()
 
 
+async def test_a_surplus_position_never_passes_for_that_of_a_later_sync(raw, bank):
+    await bank.open()
+    await bank.read()
+    raw.send(raw.nodes[4].tpdo, counts(77))
+    await raw.delivered_to(bank)
+    raw.nodes[4].answers_sync = lambda _sync: []
+    for _ in range(2):
+        with pytest.raises(DeviceError, match=r"leg 4 \(node 4\).*more positions than there were SYNCs"):
+            await bank.read()
+
+
 async def test_sync_of_another_master_is_an_error(raw, bank):
     await bank.open()
     raw.send(0x80)

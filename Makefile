@@ -1,7 +1,7 @@
 # All commands of a newcomer or of CI. Each target sets up .venv first, which takes milliseconds and no
 # network once it is done.
 #
-#   make demo | test | test-full | test-linuxcnc | lint | bench | screenshots | clean
+#   make demo | test | test-full | test-linuxcnc | lint | bench | docs | figures | screenshots | clean
 #   make test ARGS="-k gauges"       more arguments for the program
 #   make PYTHON=python3.12 test      the Python for .venv, the first time
 
@@ -21,7 +21,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # The matrices are small: threads of the linear algebra only slow them down.
 export OPENBLAS_NUM_THREADS = 1
 
-.PHONY: demo test test-full test-linuxcnc lint bench screenshots clean venv
+.PHONY: demo test test-full test-linuxcnc lint bench docs figures screenshots clean venv
 
 demo: venv
 	.venv/bin/hexacell demo $(ARGS)
@@ -49,6 +49,20 @@ lint: venv
 
 venv:
 	@.ci/venv "$(PYTHON)"
+
+# A site that needs no network, neither to be made nor to be read; whatever is wrong in it is an error.
+docs: venv
+	$(RUN) sphinx --fail-on-warning --keep-going --quiet -c docs . build/site $(ARGS)
+	@echo "hexacell: the site is build/site/index.html"
+
+# The pictures of README and docs, as docs/figures.md has them.
+figures: venv
+	HEXACELL_UPDATE_SNAPSHOTS=1 $(RUN) pytest -q tests/screen/test_snapshots.py
+	cp tests/screen/snapshots/measure-140x40-dark.svg docs/screen-measure.svg
+	cp tests/screen/snapshots/review-140x40-light.svg docs/screen-review.svg
+	rm -rf build/study
+	.venv/bin/hexacell study paper --folder build/study
+	cp build/study/paper.svg docs/study-paper.svg
 
 screenshots:
 	@.ci/screenshots build/screenshots

@@ -1,5 +1,7 @@
 """What other packages may rely on: a cell, its records, the next pose, and runs that are over.
 
+For example::
+
     from pathlib import Path
     from hexacell import api
 

@@ -1,0 +1,128 @@
+"""The site of README and docs: no warning, no link that leads nowhere, nothing fetched from elsewhere."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DRAWN = {
+    "screen-measure.svg": "measure-140x40-dark.svg",
+    "screen-review.svg": "review-140x40-light.svg",
+}
+"""Pictures of docs, and of the screen's tests."""
+
+
+def build(source: Path, site: Path) -> subprocess.CompletedProcess[str]:
+    """What ``make docs`` runs, for a source and into a folder."""
+    options = ["--fail-on-warning", "--keep-going", "--quiet", "-d", str(site / ".doctrees")]
+    command = [sys.executable, "-m", "sphinx", *options, "-c", str(source / "docs"), str(source), str(site)]
+    return subprocess.run(command, cwd=source, capture_output=True, text=True, check=False)
+
+
+class Page(HTMLParser):
+    """What a page links to, what it loads, and the places in it that can be linked to."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.places: set[str] = set()
+        self.formulas = 0
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        stated = {name: value for name, value in attrs if value is not None}
+        self.places |= {stated[name] for name in ("id", "name") if name in stated}
+        self.formulas += tag == "math"
+        match tag:
+            case "a" if "href" in stated:
+                self.links.append(stated["href"])
+            case "link" if stated.get("rel") in {"stylesheet", "icon", "preload"}:
+                self.loaded.append(stated["href"])
+            case "img" | "script" | "iframe" | "source" if "src" in stated:
+                self.loaded.append(stated["src"])
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, made once."""
+    folder = tmp_path_factory.mktemp("site")
+    made = build(ROOT, folder)
+    assert (made.returncode, made.stderr) == (0, "")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def pages(site: Path) -> dict[Path, Page]:
+    """Its pages by their files."""
+    return {path: Page(path) for path in site.rglob("*.html") if "_static" not in path.parts}
+
+
+def broken(pages: dict[Path, Page]) -> Iterator[str]:
+    """Links of pages that lead to no file, or to no place in one."""
+    for path, page in pages.items():
+        for link in page.links:
+            address = urlsplit(link)
+            if address.scheme or address.netloc:
+                continue
+            target = (path.parent / unquote(address.path)).resolve() if address.path else path
+            places = pages[target].places if target in pages else {address.fragment}
+            if not target.is_file() or (address.fragment and unquote(address.fragment) not in places):
+                yield f"{path.name}: {link}"
+
+
+def test_every_page_is_made(pages, site):
+    made = {path.relative_to(site).as_posix() for path in pages}
+    sources = {"README.md", "CHANGELOG.md", *(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))}
+    assert {source.replace(".md", ".html") for source in sources} <= made
+    assert "index.html" in made
+
+
+def test_every_link_within_it_leads_to_a_place(pages):
+    assert sum(len(page.links) for page in pages.values()) > 1000
+    assert list(broken(pages)) == []
+
+
+def test_nothing_is_loaded_from_elsewhere(pages, site):
+    loaded = {address for page in pages.values() for address in page.loaded}
+    assert loaded
+    assert {address for address in loaded if urlsplit(address).scheme or urlsplit(address).netloc} == set()
+    styles = "".join(path.read_text(encoding="utf-8") for path in (site / "_static").glob("*.css"))
+    assert "@import" not in styles
+    assert "url(http" not in styles.replace(" ", "").replace('"', "")
+
+
+def test_formulas_are_drawn_by_the_browser(pages, site):
+    derivations = pages[site / "docs/derivations.html"]
+    assert derivations.formulas > 100
+    assert "$" not in (site / "docs/derivations.html").read_text(encoding="utf-8").partition("<body>")[2]
+
+
+def test_the_interface_for_programs_has_its_docstrings(site):
+    page = (site / "docs/api.html").read_text(encoding="utf-8")
+    for name in ("hexacell.api.fit_measurements", "hexacell.api.Record", "drivers.interfaces.Gauge.read"):
+        assert f'id="{name}"' in page
+
+
+def test_mistakes_in_a_page_are_errors(tmp_path):
+    shutil.copytree(ROOT / "docs/_site", tmp_path / "docs/_site")
+    shutil.copy(ROOT / "docs/conf.py", tmp_path / "docs")
+    mistakes = "[a page](nowhere.md), [a heading](index.md#missing), $\\nosuchcommand$"
+    (tmp_path / "docs/index.md").write_text(f"# A page\n\n{mistakes}\n")
+    made = build(tmp_path, tmp_path / "site")
+    assert made.returncode != 0
+    assert all(told in made.stderr for told in ("nowhere.md", "missing", "nosuchcommand"))
+
+
+@pytest.mark.parametrize(("picture", "snapshot"), DRAWN.items())
+def test_pictures_of_the_screen_are_what_its_tests_draw(picture, snapshot):
+    drawn = ROOT / "tests/screen/snapshots" / snapshot
+    assert (ROOT / "docs" / picture).read_bytes() == drawn.read_bytes()

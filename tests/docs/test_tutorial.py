@@ -1,0 +1,117 @@
+"""The tutorial's commands, typed as written, end as it says and print what it shows."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FENCE = re.compile(r"^```(sh|sh fails|text)\n(.*?)^```$", flags=re.MULTILINE | re.DOTALL)
+OMITTED = "..."
+MARK = "end of block"
+
+
+@dataclass(frozen=True)
+class Block:
+    """Some commands, and what the page shows of their output.
+
+    Attributes:
+        shown: its passages, in order; between them something is left out.
+    """
+
+    commands: tuple[str, ...]
+    fails: bool
+    shown: tuple[str, ...] = ()
+
+
+def blocks_of(page: Path) -> list[Block]:
+    """The blocks of a page in the order in which they are typed."""
+    found: list[Block] = []
+    for kind, text in FENCE.findall(page.read_text(encoding="utf-8")):
+        if kind == "text":
+            passages = re.split(rf"^{re.escape(OMITTED)}$", text, flags=re.MULTILINE)
+            shown = tuple(line for passage in passages for line in passage.strip().splitlines())
+            found[-1] = Block(found[-1].commands, found[-1].fails, shown)
+        else:
+            found.append(Block(tuple(text.splitlines()), kind.endswith("fails")))
+    return found
+
+
+def without_figures(text: str) -> str:
+    """A text in which all figures and gaps are the same: those shown are of another run."""
+    return " ".join(re.sub(r"[0-9][0-9.TZ-]*", "#", text).split())
+
+
+def typed(blocks: list[Block], folder: Path) -> list[tuple[list[int], str]]:
+    """The exit codes of each block's commands and its output, in one shell."""
+    lines = []
+    for block in blocks:
+        lines += [f"{{ {command}\n}} 2>&1; echo '{MARK}' $?" for command in block.commands]
+    ended = subprocess.run(
+        ["bash", "-c", "\n".join(lines)],
+        cwd=folder,
+        env={**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "COLUMNS": "80"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    pieces = iter(re.split(rf"^{MARK} (\d+)\n", ended.stdout, flags=re.MULTILINE))
+    outcomes = []
+    for block in blocks:
+        told = [(next(pieces), int(next(pieces))) for _ in block.commands]
+        outcomes.append(([code for _, code in told], "".join(text for text, _ in told)))
+    return outcomes
+
+
+def missing(shown: tuple[str, ...], printed: str) -> list[str]:
+    """The lines that the page shows, and that were not printed in their order."""
+    rest = iter([without_figures(line) for line in printed.splitlines()])
+    return [line for line in shown if not any(found.startswith(line_of(line)) for found in rest)]
+
+
+def line_of(shown: str) -> str:
+    """A line without figures, and without what the page leaves out of it."""
+    return without_figures(shown).removesuffix(OMITTED).rstrip()
+
+
+def check(blocks: list[Block], folder: Path) -> None:
+    for block, (codes, printed) in zip(blocks, typed(blocks, folder), strict=True):
+        assert codes == [0] * (len(codes) - 1) + [int(block.fails)], printed
+        assert missing(block.shown, printed) == [], printed
+
+
+TUTORIAL = blocks_of(ROOT / "docs/tutorial.md")
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    """The folder of the source, as far as the tutorial uses it."""
+    shutil.copytree(ROOT / "configs", tmp_path / "configs")
+    return tmp_path
+
+
+def test_it_begins_as_written(source):
+    begin, of_cell, *_ = TUTORIAL
+    assert begin.commands == ("hexacell --version",)
+    assert of_cell.shown
+    check([begin, of_cell], source)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_every_command_works_as_written(source):
+    check(TUTORIAL, source)
+
+
+def test_a_line_that_is_not_printed_is_missed():
+    assert missing(("point 1   11 records", "verdict: ..."), "point 2   7 records\nverdict: pass\n") == []
+    assert missing(("verdict: pass",), "verdict: fail\n") == ["verdict: pass"]
+    assert missing(("second", "first"), "first\nsecond\n") == ["first"]

@@ -125,9 +125,8 @@ def pins() -> dict[str, str]:
 
 def test_every_requirement_is_pinned_as_installed_and_nothing_else_is() -> None:
     project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text())
-    compared_with = {
-        Requirement(text).name for text in project["project"]["optional-dependencies"]["bench"]
-    }
+    extras = project["project"]["optional-dependencies"]
+    compared_with = {Requirement(text).name for text in (*extras["bench"], *extras["peers"])}
     installed = {name: exact for name, exact in pins().items() if name not in compared_with}
     assert installed == {name: version(name) for name in everything_installed()}
     assert compared_with <= set(pins())

@@ -43,7 +43,7 @@ def results_of(
         losses = losses + 1 if len(left) == count else 0
         if losses == MOST_LOSSES:
             raise WorkersLost(
-                f"{losses} sets of workers ended without a result", action="Give the computer more memory"
+                f"{losses} sets of workers ended without a result", action="Give them more memory"
             )
 
 

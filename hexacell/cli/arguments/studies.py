@@ -50,8 +50,12 @@ def _add_study(studies: Any, study: _StudyArguments) -> None:  # noqa: ANN401
         metavar="N",
         help=f"{study.drawn} (default: %(default)s)",
     )
-    parser.add_argument(
+    workers = parser.add_mutually_exclusive_group()
+    workers.add_argument(
         "--processes", type=positive, metavar="N", help="at a time (default: one for each processor)"
+    )
+    workers.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT, instead of processes"
     )
     parser.add_argument(
         "--folder",

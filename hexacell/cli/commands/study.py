@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import argparse
 
-from hexacell.application.studies import processes, run_study
+from hexacell.application.studies import NewExecutor, processes, run_study
 from hexacell.cli.console import Console
 from hexacell.cli.progress import task_bar
-from hexacell.errors import ExitCode
+from hexacell.errors import ExitCode, UsageError
 from hexacell.presentation.studies import STUDIES
 from hexacell.storage import atomic_files
 
 
 def main(options: argparse.Namespace) -> ExitCode:
     """One of the studies; its picture goes into the folder of its results."""
-    console, shown = Console(options.json), STUDIES[options.study]
+    console, shown, new_executor = Console(options.json), STUDIES[options.study], _executors(options)
     with task_bar(shown.study.unit) as told:
-        found = run_study(shown.study, options.folder, options.draws, processes(options.processes), told)
+        found = run_study(shown.study, options.folder, options.draws, new_executor, told)
     for line in shown.lines(found):
         console.print(line)
     picture = options.folder / f"{shown.study.name}.svg"
@@ -24,3 +24,13 @@ def main(options: argparse.Namespace) -> ExitCode:
     console.print(f"\nThe same as a picture: {picture}")
     console.document(shown.document(found))
     return ExitCode.DONE
+
+
+def _executors(options: argparse.Namespace) -> NewExecutor:
+    if options.scheduler is None:
+        return processes(options.processes)
+    try:
+        from hexacell.application.dask_cluster import dask_cluster  # noqa: PLC0415 - an extra
+    except ImportError as error:
+        raise UsageError("Dask is not installed", action="Install hexacell[dask]") from error
+    return dask_cluster(options.scheduler)

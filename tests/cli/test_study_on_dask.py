@@ -1,0 +1,89 @@
+"""``hexacell study ... --scheduler``: the same results from a cluster as from processes."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hexacell.errors import ExitCode
+from tests.dask_processes import DaskProcesses, dask_processes
+from tests.waiting import wait_until
+
+PAPER = ("study", "paper", "--draws", "1")
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[DaskProcesses]:
+    """Three workers, which run from the start."""
+    (tmp_path / "cluster").mkdir()
+    with dask_processes(tmp_path / "cluster", 3) as processes:
+        wait_until(lambda: all("Registered to" in processes.said_by_worker(number) for number in range(3)))
+        yield processes
+
+
+def results(folder: Path) -> list[str]:
+    path = folder / "paper.jsonl"
+    return path.read_text().splitlines() if path.exists() else []
+
+
+@pytest.mark.slow
+def test_results_are_those_of_any_number_of_processes_though_a_worker_is_killed(
+    start, typed, cluster, tmp_path: Path
+) -> None:
+    one = typed(*PAPER, "--processes", "1", "--folder", "one", "--json")
+    two = typed(*PAPER, "--processes", "2", "--folder", "two", "--json")
+    study = start(*PAPER, "--scheduler", cluster.address, "--folder", "dask", "--json")
+    study.wait_until(lambda: len(results(tmp_path / "dask")) >= 3, "results")
+    cluster.workers[0].kill()
+    on_dask = study.ended()
+    assert (one.code, two.code, on_dask.code) == (0, 0, 0)
+    assert one.document == two.document == on_dask.document
+    kept = [sorted(results(tmp_path / folder)) for folder in ("one", "two", "dask")]
+    assert kept[0] == kept[1] == kept[2]
+    assert len(kept[0]) == len({json.loads(line)["key"] for line in kept[0]}) == 21
+
+
+def test_an_interrupted_study_on_a_cluster_goes_on_by_processes(start, cluster, tmp_path: Path) -> None:
+    study = start(*PAPER, "--scheduler", cluster.address, "--folder", "kept")
+    study.wait_until(lambda: len(results(tmp_path / "kept")) >= 2, "results")
+    ended = study.stopped(signal.SIGINT)
+    assert ended.code == ExitCode.INTERRUPTED
+    kept = results(tmp_path / "kept")
+    study = start(*PAPER, "--processes", "1", "--folder", "kept")
+    study.wait_until(lambda: len(results(tmp_path / "kept")) > len(kept), "more results")
+    study.stopped(signal.SIGINT)
+    assert results(tmp_path / "kept")[: len(kept)] == kept
+
+
+def test_a_lost_scheduler_ends_the_command_with_what_to_do(start, cluster, tmp_path: Path) -> None:
+    study = start(*PAPER, "--scheduler", cluster.address, "--folder", "kept")
+    study.wait_until(lambda: len(results(tmp_path / "kept")) >= 1, "results")
+    cluster.scheduler.kill()
+    ended = study.ended()
+    assert ended.code == ExitCode.HARDWARE
+    assert f"{cluster.address}: no Dask scheduler answers. Start one there" in " ".join(ended.err.split())
+    assert results(tmp_path / "kept")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--scheduler", "here"), "'here' is no address of a Dask scheduler. Try tcp://HOST:8786"),
+        (("--scheduler", "tcp://h:1", "--processes", "2"), "not allowed with argument --scheduler"),
+    ],
+)
+def test_what_cannot_be_is_refused(typed_here, arguments, words: str) -> None:
+    refused = typed_here(*PAPER, *arguments)
+    assert (refused.code, words in refused.err) == (ExitCode.USAGE, True), refused.err
+
+
+def test_dask_may_be_absent(typed_here, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "hexacell.application.dask_cluster", None)
+    refused = typed_here(*PAPER, "--scheduler", "tcp://127.0.0.1:1")
+    assert refused.code == ExitCode.USAGE
+    assert "Dask is not installed. Install hexacell[dask]" in refused.err

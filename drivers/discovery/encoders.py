@@ -37,7 +37,9 @@ FIRST_RESPONSE_S = 2.0
 LISTEN_S = 1.0
 
 SLCAN_LINE = {"baudrate": 115200}
-SLCAN_VERSION = re.compile(rb"V[0-9A-Fa-f]{4}\r")
+SLCAN_QUESTION = b"\rV\r"
+"""Its version; the first line end ends whatever was asked before in another protocol."""
+SLCAN_VERSION = re.compile(rb"\a*V[0-9A-Fa-f]{4}\r")
 NETWORK_DEVICES = Path("/sys/class/net")
 ARPHRD_CAN = "280"
 """The type of a CAN interface (linux/if_arp.h)."""
@@ -79,7 +81,7 @@ def speaks_slcan(port: str) -> bool:
     line = SerialPort(port, SLCAN_LINE, threading.Event())
     with closing(line), suppress(HexacellError, NoAnswer):
         line.open()
-        return SLCAN_VERSION.fullmatch(line.exchange(b"V\r", b"\r", FIRST_RESPONSE_S)) is not None
+        return SLCAN_VERSION.fullmatch(line.exchange(SLCAN_QUESTION, b"\r", FIRST_RESPONSE_S)) is not None
     return False
 
 

@@ -12,7 +12,7 @@ from drivers.discovery.encoders import BusFindings, FoundNode
 from drivers.discovery.frames import FoundFrame
 from drivers.discovery.gauges import FoundGauge, PortFindings
 from drivers.serial.adapters import SerialPortFound
-from hexacell.application.device_search import SearchFindings
+from hexacell.application.device_search import UNTRIED, SearchFindings
 from hexacell.application.found_cell import (
     LEGS,
     encoder_keys,
@@ -44,6 +44,9 @@ def search_lines(found: SearchFindings) -> Iterator[str]:
         yield "No serial port: plug a gauge's cable or adapter in, or name a port."
     for port, on_it in zip(found.ports, found.gauges, strict=True):
         yield from _port_lines(port, on_it, found.buses)
+    if any(_is_silent(on_it, found.buses) for on_it in found.gauges):
+        others = ", ".join(sorted(UNTRIED - {"stream"}))
+        yield f"Not tried where nothing answers: {others}, which the cell file describes (docs/drivers.md)."
     if not found.buses:
         yield "No CAN adapter: plug it in, or name a bus with --can."
     for bus in found.buses:
@@ -74,7 +77,7 @@ def _port_lines(
     adapter = f", {port.adapter}" if port.adapter else ""
     if on_it.problem:
         yield f"{name}{adapter}: {on_it.problem}"
-    elif any(bus.bus.get("channel") == port.port for bus in buses):
+    elif _is_can_adapter(on_it, buses):
         yield f"{name}{adapter}: a CAN adapter"
     elif not on_it.gauges:
         yield f"{name}{adapter}: nothing answers; is the gauge on, and is its cable a duplex one?"
@@ -82,6 +85,14 @@ def _port_lines(
         where = "" if gauge.channel is None else f", channel {gauge.channel}"
         what = f"{gauge.description}, shows {gauge.shown}" if gauge.shown else gauge.problem
         yield f"{name}{adapter}{where}: {gauge.protocol}: {what}"
+
+
+def _is_can_adapter(on_it: PortFindings, buses: tuple[BusFindings, ...]) -> bool:
+    return any(bus.bus.get("channel") == on_it.port for bus in buses)
+
+
+def _is_silent(on_it: PortFindings, buses: tuple[BusFindings, ...]) -> bool:
+    return not on_it.gauges and not on_it.problem and not _is_can_adapter(on_it, buses)
 
 
 def _bus_lines(bus: BusFindings) -> Iterator[str]:

@@ -92,6 +92,22 @@ def test_every_protocol_is_found_and_the_text_is_that_of_a_cell_file(typed_here,
     assert f"{told['controller']['host']}:{told['controller']['port']}" == controller
 
 
+@pytest.mark.usefixtures("no_ports")
+def test_an_instrument_of_each_protocol_that_is_tried_is_found(typed_here) -> None:
+    """Also after it was asked in the others, whose questions may not end for it."""
+    protocols = ["cdi", "digimatic-usb", "heidenhain-nd", "mitutoyo-id-h", "mux10", "sylvac", "uwave"]
+    gauges = [GaugeSettings(name=name, axis="x", protocol=name, channel=1) for name in protocols]
+    plungers = {name: lambda: 1.25 for name in protocols}
+    with SimulatedGaugeBank(gauges, plungers, SimulatedGauges(), CellClock(1.0)) as bank:
+        outcome = typed_here(
+            "devices", *[gauge.port for gauge in bank.gauges], "--controller", NOBODY, "--json"
+        )
+    assert outcome.code == 0, outcome.err
+    found = [[one["protocol"] for one in port["gauges"]] for port in outcome.document["gauges"]]
+    assert found == [[protocol] for protocol in protocols]
+    assert "Not tried" not in outcome.err
+
+
 @pytest.fixture
 def streams() -> Iterator[SimulatedGaugeBank]:
     """Two U-WAVE transmitters behind one receiver, and a gauge that the cell file would describe."""
@@ -162,6 +178,7 @@ def test_ports_of_nothing_and_of_nobody_are_told(typed_here, tmp_path) -> None:
     said = " ".join(outcome.out.split())
     assert f"{name}: nothing answers; is the gauge on, and is its cable a duplex one?" in said
     assert f"{tmp_path / 'gone'}: port {tmp_path / 'gone'} is absent" in said
+    assert "Not tried where nothing answers: keyence-dl-rs1a, modbus, request, visa, which" in said
 
 
 @pytest.mark.usefixtures("no_ports")

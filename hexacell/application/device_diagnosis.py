@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections import defaultdict
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 
@@ -24,6 +25,23 @@ from procedures.run.cancellation import shielded
 
 ENCODERS = "encoders"
 FEWEST_FOR_SCATTER = 3
+
+
+class Failure(StrEnum):
+    """What came instead of a reading, in words."""
+
+    DAMAGED = "damaged or foreign"
+    MISSING = "missing"
+    AT_END = "at an end of the travel"
+    INVALID = "invalid"
+
+
+FAILURES: Mapping[type[HexacellError], Failure] = {
+    WrongAnswer: Failure.DAMAGED,
+    GaugeSilent: Failure.MISSING,
+    GaugeAtEnd: Failure.AT_END,
+    InvalidSampleError: Failure.INVALID,
+}
 
 Read = Callable[[], Awaitable[tuple[float, ...]]]
 """One reading of all numbers of a device."""
@@ -45,11 +63,20 @@ class SeriesFigures:
 
 
 @dataclass(frozen=True)
+class FailureFigures:
+    """How often something came instead of a reading, and what was said of it the last time."""
+
+    kind: Failure
+    count: int
+    latest: str
+
+
+@dataclass(frozen=True)
 class DeviceDiagnosis:
     """What was seen of a device.
 
     Attributes:
-        failures: how often each problem occurred instead of a reading.
+        failures: what came instead of a reading.
         problem: why it was not watched to the end, or what its settings are wrong by; empty if neither.
     """
 
@@ -58,7 +85,7 @@ class DeviceDiagnosis:
     seconds: float
     readings: int
     series: tuple[SeriesFigures, ...]
-    failures: dict[str, int] = field(default_factory=dict)
+    failures: tuple[FailureFigures, ...] = ()
     problem: str = ""
     stated_noise: float = 0.0
 
@@ -115,7 +142,7 @@ async def _watch_gauge(gauge: Gauge, stated_mm: float, seconds: float) -> Device
         watched.seconds,
         len(watched.values),
         figures,
-        dict(watched.failures),
+        watched.failure_figures(),
         problem,
         stated_mm,
     )
@@ -137,7 +164,7 @@ async def _watch_encoders(devices: Devices, settings: CellSettings, seconds: flo
         watched.seconds,
         len(watched.values),
         _figures(watched.values, names, str(settings.encoders.unit)),
-        dict(watched.failures),
+        watched.failure_figures(),
         watched.problem,
         settings.noise.encoder,
     )
@@ -149,8 +176,12 @@ class _Watched:
 
     seconds: float = 0.0
     values: list[tuple[float, ...]] = field(default_factory=list)
-    failures: Counter[str] = field(default_factory=Counter)
+    failures: defaultdict[Failure, list[str]] = field(default_factory=lambda: defaultdict(list))
     problem: str = ""
+
+    def failure_figures(self) -> tuple[FailureFigures, ...]:
+        """The same by kind: each damaged answer is damaged in its own way."""
+        return tuple(FailureFigures(kind, len(told), told[-1]) for kind, told in self.failures.items())
 
 
 async def _watched(read: Read, seconds: float) -> _Watched:
@@ -159,8 +190,9 @@ async def _watched(read: Read, seconds: float) -> _Watched:
     while not watched.problem and (not watched.seconds or watched.seconds < seconds):
         try:
             watched.values.append(await read())
-        except (WrongAnswer, GaugeAtEnd, GaugeSilent, InvalidSampleError) as error:
-            watched.failures[error.problem] += 1
+        except tuple(FAILURES) as error:
+            kind = next(kind for base, kind in FAILURES.items() if isinstance(error, base))
+            watched.failures[kind].append(error.problem)
         except HexacellError as error:
             watched.problem = str(error)
         watched.seconds = time.monotonic() - begun

@@ -6,9 +6,15 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from hexacell.application.device_diagnosis import DeviceDiagnosis, SeriesFigures
+from hexacell.application.device_diagnosis import DeviceDiagnosis, Failure, SeriesFigures
 from hexacell.presentation.planning import device_line
 
+MEANING = {
+    Failure.DAMAGED: "Answers are damaged: check its cable, its shield and its serial settings.",
+    Failure.MISSING: "Answers are missing: check its cable and its supply.",
+    Failure.AT_END: "Its plunger is at an end of its travel: move the gauge or the ball.",
+    Failure.INVALID: "The device itself says that positions are invalid: look at its magnet or scale.",
+}
 NOISY = 3.0
 """A scatter of so many times what the cell file states is told."""
 
@@ -26,8 +32,10 @@ def diagnosis_lines(found: DeviceDiagnosis) -> Iterator[str]:
     yield f"{found.readings} readings in {found.seconds:.1f} s, {rate:.1f} a second"
     for series in found.series:
         yield _series_line(series)
-    for problem, count in found.failures.items():
-        yield f"{count} times instead of a reading: {problem}"
+    if not found.failures:
+        yield "No answer was damaged or missing."
+    for failure in found.failures:
+        yield f"{failure.count} answers were {failure.kind}, at last: {failure.latest}"
     yield from _meaning(found)
 
 
@@ -40,8 +48,8 @@ def _series_line(series: SeriesFigures) -> str:
 def _meaning(found: DeviceDiagnosis) -> Iterator[str]:
     if found.problem:
         yield f"It cannot be used like this: {found.problem}"
-    if found.failures:
-        yield "Answers are missing or damaged: check its cable and its serial settings."
+    for failure in found.failures:
+        yield MEANING[failure.kind]
     for series in found.series:
         if series.distinct == 1 and found.readings > 1:
             yield f"{series.name} showed one value only: move it by hand to see that it follows."

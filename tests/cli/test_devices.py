@@ -204,7 +204,8 @@ def test_one_device_is_watched(typed_here, served, device, rows) -> None:
     assert found["readings"] > 0
     assert len(found["series"]) == rows
     assert all(series["lowest"] <= series["highest"] for series in found["series"])
-    assert found["failures"] == {}
+    assert found["failures"] == []
+    assert "No answer was damaged or missing." in outcome.err
     assert "It can be used." in outcome.err
 
 
@@ -220,6 +221,28 @@ def test_a_gauge_in_inches_is_watched_and_named(typed_here, cell_folder) -> None
     outcome = typed_here("devices", "--diagnose", "x", "--cell", cell_folder.cell, "--seconds", "0.1")
     assert outcome.code == 3
     assert "gauge x: answers in inch" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("fault", "kind", "meaning"),
+    [
+        ("damaged", "damaged or foreign", "Answers are damaged: check its cable"),
+        ("at its end", "at an end of the travel", "Its plunger is at an end of its travel"),
+    ],
+)
+def test_what_comes_instead_of_readings_is_counted_by_kind(
+    typed_here, cell_folder, fault, kind, meaning
+) -> None:
+    with cell_folder.cell.open("a") as cell:
+        cell.write(f'\n[[simulation.faults]]\nkind = "{fault}"\ndevice = "x"\n')
+    outcome = typed_here(
+        "devices", "--diagnose", "x", "--cell", cell_folder.cell, "--seconds", "1", "--json"
+    )
+    [failure] = outcome.document["failures"]
+    assert failure["kind"] == kind
+    said = " ".join(outcome.err.split())
+    assert f"{failure['count']} answers were {kind}, at last: " in said
+    assert meaning in said
 
 
 def test_questions_want_a_terminal_and_a_new_file(typed_here, cell_folder, monkeypatch) -> None:

@@ -30,6 +30,10 @@ class CellClock:
         """Wait for ``seconds`` of the cell."""
         await asyncio.sleep(self.real_seconds(seconds))
 
+    async def sleep_until(self, moment_s: float) -> None:
+        """Wait until ``now()`` is ``moment_s``; where that has passed, only let others go on."""
+        await self.sleep(max(0.0, moment_s - self.now()))
+
     def wait(self, seconds: float, until: threading.Event) -> None:
         """The same for a thread; returns early when ``until`` is set."""
         until.wait(self.real_seconds(seconds))

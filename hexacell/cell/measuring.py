@@ -195,7 +195,7 @@ class TimingSettings(Section):
     """When a reading counts as settled."""
 
     window_s: Positive = Field(0.6, description="span of readings that must agree")
-    interval_s: Positive = Field(0.1, description="time between readings")
+    interval_s: Positive = Field(0.1, description="from the begin of a reading to the next")
     readings: int = Field(5, ge=2, le=1000, description="smallest number of readings in the window")
     spread_gauge_mm: Positive = Field(0.06, description="largest range of one gauge in the window")
     spread_encoder: Positive = Field(

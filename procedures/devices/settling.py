@@ -105,13 +105,14 @@ async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> 
     begun, looks = clock.now(), 0
     while True:
         looks += 1
+        look_s = clock.now()
         moving = await _look(devices, timing, clock, window)
         if not moving and _is_full(window, timing):
             return Settled(tuple(window))
         # Counted too, because a slow device or a machine under load must not run out of time unread.
         if looks >= LEAST_WINDOWS * timing.readings and clock.now() - begun > timing.give_up_s:
             raise _never_settled(timing, moving)
-        await clock.sleep(timing.interval_s)
+        await clock.sleep_until(look_s + timing.interval_s)
 
 
 async def read_series(devices: Devices, timing: TimingSettings, clock: CellClock, count: int) -> Settled:
@@ -122,8 +123,10 @@ async def read_series(devices: Devices, timing: TimingSettings, clock: CellClock
     """
     await settle(devices, timing, clock)
     series: list[DeviceSnapshot] = []
+    look_s = clock.now()
     while len(series) < count:
-        await clock.sleep(timing.interval_s)
+        await clock.sleep_until(look_s + timing.interval_s)
+        look_s = clock.now()
         series.append(await read_all(devices, clock))
     return Settled(tuple(series))
 

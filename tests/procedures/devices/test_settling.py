@@ -14,7 +14,7 @@ from drivers.interfaces import EncoderSample, GaugeReading
 from hexacell.cell.measuring import TimingSettings
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, ExitCode, SeveralErrors
-from procedures.devices.settling import LEAST_WINDOWS, read_all, settle, trimmed_mean
+from procedures.devices.settling import LEAST_WINDOWS, read_all, read_series, settle, trimmed_mean
 
 TIMING = TimingSettings(
     window_s=0.6, interval_s=0.1, readings=5, spread_gauge_mm=0.06, spread_encoder_mm=0.05, give_up_s=20.0
@@ -47,6 +47,22 @@ async def test_a_window_lasts_long_enough_however_fast_they_come(bench) -> None:
     timing = TIMING.model_copy(update={"interval_s": 0.01})
     settled = await settle(bench.devices, timing, bench.clock)
     assert settled.window[-1].at_s - settled.window[0].at_s >= timing.window_s
+
+
+@pytest.mark.parametrize("reading_s", [0.0, 0.04, 0.1, 0.25])
+async def test_readings_begin_an_interval_apart_or_as_soon_as_the_devices_are_ready(
+    bench, reading_s: float
+) -> None:
+    def slow() -> float:
+        bench.clock.time_s += reading_s
+        return 0.0
+
+    bench.gauges[0].shown = slow
+    settled = await settle(bench.devices, TIMING, bench.clock)
+    series = await read_series(bench.devices, TIMING, bench.clock, 12)
+    for window in (settled.window, series.window):
+        apart = np.diff([look.at_s for look in window])
+        assert apart == pytest.approx(max(reading_s, TIMING.interval_s))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

@@ -93,7 +93,7 @@ class VirtualRobot:
             ReachError: the controller cannot reach a pose on the line.
         """
         end = self.model.from_commands([command])
-        line = interpolate_line(self._commanded, end, PIECES)
+        line = interpolate_line(self._commanded, end, PIECES, self.model.frames)
         joints = self._joints(line)
         arguments = (line.reshape(-1, 1), joints[:, None], self._actual_pose)
         traced, found = trace_path(self.model.mechanism, self.truth, *arguments)

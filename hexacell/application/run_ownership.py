@@ -20,8 +20,8 @@ from hexacell.controller_config.interface import ControllerGeometry, ControllerL
 from hexacell.controller_config.receipt import BEFORE, RECEIPT, Receipt, kept_paths
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import SAME_FRAMES
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.limits.limits import SAME_FRAMES
 from hexacell.robot_model import Robot, controller_geometry
 from hexacell.runs.run_folder import RunFolder
 from hexacell.stated_limits import stated_limits

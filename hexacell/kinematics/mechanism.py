@@ -153,6 +153,11 @@ class FrameTransform:
             self.base @ poses.rotations @ self.platform.T,
         )
 
+    @property
+    def turns_nothing(self) -> bool:
+        """Whether poses have the same orientations in both frames."""
+        return np.array_equal(self.base, np.eye(3)) and np.array_equal(self.platform, np.eye(3))
+
     def deviations(self, deviations: Array) -> Array:
         """The same differences of positions (n, 3), mm, in the new base frame."""
         return deviations @ self.base.T
@@ -160,6 +165,9 @@ class FrameTransform:
     def inverse(self) -> FrameTransform:
         """The opposite change."""
         return FrameTransform(self.base.T, -self.base @ self.origin, self.platform.T)
+
+
+SAME_FRAMES = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

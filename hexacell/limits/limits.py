@@ -7,14 +7,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.mechanism import FrameTransform, Mechanism
+from hexacell.kinematics.mechanism import SAME_FRAMES, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.limits.gauge_travel import GaugeRoom, GaugeTravel
 from hexacell.limits.joint_ranges import ZeroedRanges
 from hexacell.limits.leg_limits import ROUNDING, LegLimits
-
-SAME_FRAMES = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +51,7 @@ class Limits:
         gauges: travels and plungers; without them the ball may go as far to all sides.
         zeroed: the room of the gauges as they were zeroed; none where that is not known yet.
         told_joints: what joint_min and joint_max follow from, where they depend on the encoders' zeros.
+        stands_at: tilt and turn of a robot that stands beyond those limits, which commands still keep.
     """
 
     gauge_travel_mm: float
@@ -67,6 +66,7 @@ class Limits:
     gauges: GaugeTravel | None = None
     zeroed: GaugeRoom | None = None
     told_joints: ZeroedRanges | None = None
+    stands_at: tuple[float, float] = (0.0, 0.0)
 
     def with_zeros(self, zeros: Array) -> Limits:
         """The same where the controller's geometry has these zeros (6,) of the encoders."""
@@ -128,7 +128,7 @@ class Limits:
     def allow_commands(self, poses: PoseBatch) -> Mask:
         """Which of n commands in the convention's frames keep tilt, turn and axes."""
         commands = self.frames.inverse().poses(poses)
-        return self._allow_orientations(commands) & self.axes.allow(commands)
+        return self.axes.allow(commands) & _are_within(commands, self.tilt, self.turn)
 
     def allow_joints(self, joints: Array) -> Mask:
         """Which joint variables (..., 6), mm, are in their ranges; NaN is not."""
@@ -136,8 +136,10 @@ class Limits:
         return np.asarray(in_range.all(axis=-1))
 
     def allow_poses(self, poses: PoseBatch, joints: Array) -> Mask:
-        """Which of n poses in the convention's frames keep tilt, turn and joint ranges."""
-        return self.allow_joints(joints) & self._allow_orientations(self.frames.inverse().poses(poses))
+        """Which of n poses of the robot itself keep tilt, turn and joint ranges."""
+        at = self.frames.inverse().poses(poses)
+        largest = max(self.tilt, self.stands_at[0]), max(self.turn, self.stands_at[1])
+        return self.allow_joints(joints) & _are_within(at, *largest)
 
     def allow_legs(
         self,
@@ -182,22 +184,24 @@ class Limits:
             joints: its joint variables there (1, 6), mm.
             wanted: margins (m,) of passive joints and legs; see :meth:`leg_margins`.
         """
-        given = [self.frames.inverse().poses(poses) for poses in (command, actual)]
+        commanded, stands = (self.frames.inverse().poses(poses) for poses in (command, actual))
         widened = replace(
             self,
-            tilt=max(self.tilt, *(float(pose.tilts()[0]) for pose in given)),
-            turn=max(self.turn, *(float(np.abs(pose.turns()[0])) for pose in given)),
+            tilt=max(self.tilt, float(commanded.tilts()[0])),
+            turn=max(self.turn, float(np.abs(commanded.turns()[0]))),
             joint_min=np.minimum(self.joint_min, joints[0]),
             joint_max=np.maximum(self.joint_max, joints[0]),
-            axes=self.axes.including(given[0]),
+            axes=self.axes.including(commanded),
+            stands_at=(float(stands.tilts()[0]), float(np.abs(stands.turns()[0]))),
         )
         if self.legs is None:
             return widened
         return replace(widened, legs=self.legs.including(mechanism.legs(geometry, actual, joints), wanted))
 
-    def _allow_orientations(self, poses: PoseBatch) -> Mask:
-        """Which of n poses in the controller's frames keep tilt and turn."""
-        kept: Mask = np.asarray(poses.tilts() <= self.tilt + ROUNDING)
-        if self.turn < np.pi:
-            kept = kept & (np.abs(poses.turns()) <= self.turn + ROUNDING)
-        return kept
+
+def _are_within(poses: PoseBatch, tilt: float, turn: float) -> Mask:
+    """Which of n poses in the controller's frames keep a tilt and a turn, rad."""
+    kept: Mask = np.asarray(poses.tilts() <= tilt + ROUNDING)
+    if turn < np.pi:
+        kept = kept & (np.abs(poses.turns()) <= turn + ROUNDING)
+    return kept

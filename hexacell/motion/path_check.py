@@ -100,7 +100,7 @@ class LinesFrom:
         """
         belief = self._belief
         limits = belief.limits
-        fine = interpolate_lines((self.start, *waypoints, ends), JOINT_REFINEMENT)
+        fine = interpolate_lines((self.start, *waypoints, ends), JOINT_REFINEMENT, limits.frames)
         fine_joints = belief.commanded.joints(fine.reshape(-1)).reshape(-1, len(ends), 6)
         allowed = limits.allow_commands(fine.reshape(-1)).reshape(-1, len(ends))
         rows = np.flatnonzero((allowed & limits.allow_joints(fine_joints)).all(axis=0))

@@ -21,7 +21,7 @@ import numpy as np
 from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import assembly_mode, forward_kinematics
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.mechanism import SAME_FRAMES, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_jacobian
@@ -39,12 +39,18 @@ JUMP_ANGLE = np.radians(10.0)
 A larger one may be a jump to another solution."""
 
 
-def interpolate_line(start: PoseBatch, end: PoseBatch, pieces: int = PIECES) -> PoseBatch:
+def interpolate_line(
+    start: PoseBatch, end: PoseBatch, pieces: int = PIECES, frames: FrameTransform = SAME_FRAMES
+) -> PoseBatch:
     """The poses on a controller's straight lines, ``pieces + 1`` a line.
 
     Controllers interpolate all six numbers x, y, z, a, b, c linearly, angles included (LinuxCNC's G0).
     ``end`` has n poses and ``start`` one or n. The poses of n lines are ordered by piece, then by line.
+    ``frames`` lead from the controller's, in whose angles it interpolates, to those of the poses.
     """
+    if not frames.turns_nothing:
+        start, end = (frames.inverse().poses(poses) for poses in (start, end))
+        return frames.poses(interpolate_line(start, end, pieces))
     fraction = np.linspace(0.0, 1.0, pieces + 1)[:, None, None]
     start_angles, end_angles = (rotations.to_angles(poses.rotations) for poses in (start, end))
     positions = (1.0 - fraction) * start.positions + fraction * end.positions
@@ -52,14 +58,16 @@ def interpolate_line(start: PoseBatch, end: PoseBatch, pieces: int = PIECES) -> 
     return PoseBatch(positions.reshape(-1, 3), rotations.from_angles(angles.reshape(-1, 3)))
 
 
-def interpolate_lines(waypoints: Sequence[PoseBatch], refinement: int = 1) -> PoseBatch:
-    """The poses (pieces + 1, n) on straight lines from waypoint to waypoint.
+def interpolate_lines(
+    waypoints: Sequence[PoseBatch], refinement: int = 1, frames: FrameTransform = SAME_FRAMES
+) -> PoseBatch:
+    """The poses (pieces + 1, n) on straight lines from waypoint to waypoint, as ``interpolate_line``.
 
     Waypoints have one or n poses each, n at the end. ``refinement`` multiplies the usual number of pieces.
     """
     pieces = refinement * (PIECES if len(waypoints) == 2 else PIECES_BETWEEN_WAYPOINTS)
     parts = [
-        interpolate_line(start, end, pieces).reshape(-1, len(waypoints[-1]))
+        interpolate_line(start, end, pieces, frames).reshape(-1, len(waypoints[-1]))
         for start, end in pairwise(waypoints)
     ]
     return PoseBatch.concatenate([parts[0][:1], *(part[1:] for part in parts)])

@@ -73,6 +73,18 @@ def test_a_robot_beyond_a_limit_may_come_back_and_not_go_farther(paper):
     np.testing.assert_array_equal(LIMITS.allow_commands(commands), [False] * 4)
 
 
+@pytest.mark.parametrize(("beyond", "allowed"), [((50.0,), (44.0,)), ((0, 0, 65.0), (0, 0, 59.0))])
+def test_a_robot_that_stands_beyond_a_limit_is_commanded_within_it(paper, beyond, allowed):
+    """Its errors turn it from where it is sent; that is no reason to send it beyond the limit."""
+    stands, commands = of(beyond), of(allowed, beyond)
+    joints = Hexaglide().inverse(paper.nominal, paper.branch, stands)
+    widened = LIMITS.including(Hexaglide(), paper.nominal, commands[[0]], stands, joints)
+    np.testing.assert_array_equal(widened.allow_commands(commands), [True, False])
+    np.testing.assert_array_equal(widened.allow_poses(stands, joints), [True])
+    farther = of(tuple(1.01 * angle for angle in beyond))
+    np.testing.assert_array_equal(widened.allow_poses(farther, joints), [False])
+
+
 @pytest.mark.parametrize("tilt", [10.0, 44.0])
 def test_limits_stay_as_they_are_for_a_robot_within_them(paper, tilt):
     here = of((tilt,))

@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.limits.leg_limits import LegLimits
 from hexacell.limits.limits import AxisLimits
-from hexacell.motion.path_check import is_clear, stands_clear
+from hexacell.motion.path_check import LinesFrom, is_clear, stands_clear
 from hexacell.motion.trajectory import PIECES, interpolate_line
 
 
@@ -40,6 +42,32 @@ def test_all_six_numbers_are_interpolated_linearly():
 def test_angles_are_interpolated_as_numbers_even_over_the_longer_arc():
     way = interpolate_line(at(0, 0, 550, 0, 0, 170), at(0, 0, 550, 0, 0, -170), pieces=2)
     assert way.pose(1).c == pytest.approx(0.0, abs=1e-9)
+
+
+TURNED = FrameTransform(
+    Rotation.from_rotvec([0.0, 0.0, 0.2]).as_matrix(),
+    np.array([40.0, -15.0, 5.0]),
+    Rotation.from_rotvec([0.1, -0.2, 0.8]).as_matrix(),
+)
+"""As the frames of a drawing may be to those of the convention."""
+
+
+def test_angles_are_those_of_the_frames_in_which_the_controller_commands():
+    start, end = at(0, 0, 500, -10, 0, 40), at(12, -24, 560, 14, 6, -8)
+    lines = interpolate_line(TURNED.poses(start), TURNED.poses(end), 4, TURNED)
+    way = TURNED.inverse().poses(lines)
+    for share, row in zip(np.linspace(0.0, 1.0, 5), way.numbers(), strict=True):
+        expected = (1.0 - share) * start.numbers()[0] + share * end.numbers()[0]
+        np.testing.assert_allclose(row, expected, atol=1e-9)
+
+
+def test_lines_are_checked_where_the_controller_moves(exactly):
+    """The robot's frames are another choice than the controller's, whose line is what is moved on."""
+    start, end = at(0, 0, 550, -20, 15, 30), at(10, -20, 540, 15, -20, 10)
+    belief = exactly(frames=TURNED)
+    checked = LinesFrom(belief, TURNED.poses(start)).check(TURNED.poses(end))
+    moved = TURNED.inverse().poses(checked.commands.reshape(-1))
+    np.testing.assert_allclose(moved.numbers(), interpolate_line(start, end).numbers(), atol=1e-9)
 
 
 def test_an_open_line_is_clear(exactly):

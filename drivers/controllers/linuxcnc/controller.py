@@ -112,12 +112,13 @@ class LinuxcncrshController:
         """
         stops = self._session.stop_count
         block = self._timed_move(pose, duration_s)
+        limit_s = 2.0 * duration_s + self._timeouts.beyond_move
         async with self._order:
             commands = await self._session.synchronized()
             if self._was_stopped_since(stops):
                 raise self._stopped_before_moving()
-            await self._execute(commands, block, pose, stops, 2.0 * duration_s + self._timeouts.beyond_move)
-            await self._verify_arrival(commands, pose, stops)
+            await self._execute(commands, block, pose, stops, limit_s)
+            await self._verify_arrival(commands, pose, stops, limit_s)
             await self._restore_modes_unless_stopped(commands, stops)
 
     async def position(self) -> ReportedPosition | None:
@@ -266,11 +267,17 @@ class LinuxcncrshController:
     def _stopped_before_moving(self) -> MotionInterrupted:
         return MotionInterrupted("was stopped before it moved", subject=self._name)
 
-    async def _verify_arrival(self, commands: ControllerCommands, target: Pose, stops: int) -> None:
-        deadline = loop_time() + self._timeouts.arrival
+    async def _verify_arrival(
+        self, commands: ControllerCommands, target: Pose, stops: int, limit_s: float
+    ) -> None:
+        """Wait until it is there; on a computer under load the move is acknowledged before its end."""
+        here, still_s = None, loop_time()
+        last_s = still_s + limit_s
         while not self._agree(there := await commands.pose(), target):
+            if here is None or not self._agree(there, here):
+                here, still_s = there, loop_time()
             was_stopped = self._was_stopped_since(stops)
-            if was_stopped or loop_time() > deadline:
+            if was_stopped or loop_time() > min(still_s + self._timeouts.arrival, last_s):
                 reason = "it was stopped on request" if was_stopped else await commands.reason()
                 if not was_stopped and parse_pose_refusal(reason):  # acknowledged all the same
                     raise self._move_refusal(target, reason, None)

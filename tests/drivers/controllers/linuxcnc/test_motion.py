@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused, PoseRefused
@@ -33,6 +34,18 @@ async def test_a_move_returns_when_the_position_is_within_tolerance(play):
     driver = await play.opened(
         [(MDI, ACK), *[("get abs_act_pos", nearly)] * 2, ("get abs_act_pos", within), RESTORED]
     )
+    await driver.move(TARGET, MOVE_S)
+
+
+async def test_a_move_that_is_acknowledged_before_its_end_is_waited_for(play):
+    """As LinuxCNC does on a computer under load; it moves far longer than a stop is waited for."""
+    play.patience = play.IMPATIENT
+    polls = 3 * int(play.IMPATIENT.arrival / play.IMPATIENT.poll)
+    heights = np.linspace(500.0, 560.0, polls, endpoint=False)
+    on_the_way = [
+        ("get abs_act_pos", b"ABS_ACT_POS 10.0 20.0 %.6f 5.0 -4.0 3.0\r\n" % height) for height in heights
+    ]
+    driver = await play.opened([(MDI, ACK), *on_the_way, ("get abs_act_pos", ARRIVED), RESTORED])
     await driver.move(TARGET, MOVE_S)
 
 

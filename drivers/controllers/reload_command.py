@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import sys
 import tempfile
+from pathlib import Path
 from typing import IO
 
 from hexacell.errors import DeviceError
@@ -14,6 +17,7 @@ _SHOWN_CHARACTERS = 400
 async def run(command: tuple[str, ...], subject: str, timeout_s: float) -> None:
     """Run ``command`` to its end; kill it on cancellation.
 
+    Programs that were installed together with this one are found wherever it was started from.
     Its output goes to a file, not to a pipe: a daemon that it starts would hold a pipe open for ever.
 
     Raises:
@@ -37,11 +41,16 @@ async def run(command: tuple[str, ...], subject: str, timeout_s: float) -> None:
 async def _start(command: tuple[str, ...], subject: str, output: IO[bytes]) -> asyncio.subprocess.Process:
     try:
         return await asyncio.create_subprocess_exec(
-            *command, stdin=asyncio.subprocess.DEVNULL, stdout=output, stderr=output
+            *command, stdin=asyncio.subprocess.DEVNULL, stdout=output, stderr=output, env=_environment()
         )
     except OSError as error:
         problem = f"cannot be run: {error.strerror or error}"
         raise _failure(problem, command, subject) from error
+
+
+def _environment() -> dict[str, str]:
+    beside_this = str(Path(sys.executable).parent)
+    return os.environ | {"PATH": os.pathsep.join((os.environ.get("PATH", os.defpath), beside_this))}
 
 
 def _failure(problem: str, command: tuple[str, ...], subject: str) -> DeviceError:

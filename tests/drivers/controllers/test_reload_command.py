@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import shutil
 import signal
 import sys
 
@@ -22,6 +23,12 @@ async def test_a_reload_command_that_cannot_be_run_is_reported(tmp_path):
     absent = str(tmp_path / "absent")
     with pytest.raises(DeviceError, match="absent' cannot be run: No such file or directory"):
         await reload_command.run((absent,), "controller", 5.0)
+
+
+async def test_a_program_installed_beside_this_one_is_found_without_a_path_to_it(monkeypatch):
+    monkeypatch.setenv("PATH", os.defpath)
+    assert shutil.which("hexacell-set-pins") is None
+    await reload_command.run(("hexacell-set-pins", "--help"), "controller", 60.0)
 
 
 async def test_a_reload_command_that_exceeds_its_timeout_is_killed(tmp_path):

@@ -8,6 +8,7 @@ from shutil import which
 
 from drivers.simulated.following_physics import FollowingPhysics
 from drivers.simulated.joint_source import JointSource
+from drivers.simulated.kept_gauges import KeptGauges
 from drivers.simulated.sensors import SimulatedSensors
 from drivers.simulated.served_device import Closeable
 from hexacell.cell.model import CellSettings
@@ -44,7 +45,10 @@ class FollowedController(Closeable):
         commanding, fixture = layout.read(*config), settings.length_check
         with ExitStack() as served:
             source = served.enter_context(JointSource(simulation.joints_command))
-            self.physics = FollowingPhysics(source, mechanism, simulation, clock, commanding, home, fixture)
+            kept = KeptGauges(config)
+            self.physics = FollowingPhysics(
+                source, kept, mechanism, simulation, clock, commanding, home, fixture
+            )
             self.sensors = served.enter_context(
                 SimulatedSensors(settings, simulation, self.physics, clock, other_processes=other_processes)
             )

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from drivers.simulated.joint_source import JointSource
+from drivers.simulated.kept_gauges import KeptGauges
 from drivers.simulated.physics import Motion, RobotPhysics
 from hexacell.kinematics.rotations import Array
 
@@ -19,15 +20,21 @@ MOVED_MM = 1e-4
 class FollowingPhysics(RobotPhysics):
     """Where the joints are is what ``source`` says; before it says anything, at the first point."""
 
-    def __init__(self, source: JointSource, *arguments: Any) -> None:  # noqa: ANN401 - those of its base
+    def __init__(self, source: JointSource, kept: KeptGauges, *arguments: Any) -> None:  # noqa: ANN401 - those of its base
         super().__init__(*arguments)
         self._source = source
+        self._kept: KeptGauges | None = kept
         self._draw_noise()
 
     def _update(self) -> float:
         now = self._clock.now()
         for shown in self._source.passed():
             self._follow(shown / self._shown_per_mm, now)
+            if (
+                self._kept is not None
+            ):  # before, the ball was at the first point for want of anything better
+                self._kept.restore(self.gauges)
+                self._kept = None
         return now
 
     def encoder_positions(self) -> Array:

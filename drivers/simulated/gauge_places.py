@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hexacell.cell.length_check import LengthCheckSettings
@@ -20,6 +22,7 @@ class GaugePlaces:
     Attributes:
         station: (3,), mm, where the ball is in the middle of the gauges' travel.
         triad: (3, 3), rows: their measuring directions.
+        on_placed: called with both when they were brought somewhere.
     """
 
     def __init__(
@@ -33,7 +36,13 @@ class GaugePlaces:
         self._fixture = fixture
         self._random = random
         self._seat: int | None = None
+        self.on_placed: Callable[[Array, Array], None] = lambda _station, _triad: None
         self._place_by_hand(ball)
+
+    def stand(self, station: Array, triad: Array) -> None:
+        """They stand here already."""
+        self.station, self.triad = self._first = station, triad
+        self._seat = FIRST if self._seat_at(station) == FIRST else None
 
     def follow(self, ball: Array) -> None:
         """Move the gauges to the ball, where that is at rest, if it is no longer at them."""
@@ -45,6 +54,7 @@ class GaugePlaces:
         else:
             self._seat = seat
             self._mount(self._fixture, seat)
+        self.on_placed(self.station, self.triad)
 
     def _place_by_hand(self, ball: Array) -> None:
         """The fixture is put where the gauges are in its first seat."""

@@ -27,8 +27,8 @@ async def test_a_reload_command_that_cannot_be_run_is_reported(tmp_path):
 
 async def test_a_program_installed_beside_this_one_is_found_without_a_path_to_it(monkeypatch):
     monkeypatch.setenv("PATH", os.defpath)
-    assert shutil.which("hexacell-set-pins") is None
-    await reload_command.run(("hexacell-set-pins", "--help"), "controller", 60.0)
+    assert shutil.which("hexacell") is None
+    await reload_command.run(("hexacell", "--version"), "controller", 60.0)
 
 
 async def test_a_reload_command_that_exceeds_its_timeout_is_killed(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 
 import numpy as np
@@ -55,9 +56,12 @@ def printing(places: np.ndarray, each_s: float) -> tuple[str, ...]:
 
 
 @pytest.fixture
-def followed():
+def followed(tmp_path):
     """A cell whose joints go through the given poses of its controller."""
-    cell = load_cell(bundled_config("simulated-hexaglide"))
+    source = bundled_config("simulated-hexaglide")
+    for file in source.parent.glob(f"{source.stem}*.toml"):
+        shutil.copy(file, tmp_path)
+    cell = load_cell(tmp_path / source.name)
     form = config_layout(cell.settings)
     opened: list[FollowedController] = []
 
@@ -91,6 +95,42 @@ def test_encoders_and_gauges_are_those_of_the_hidden_geometry(followed) -> None:
     assert np.abs(error).max() < 1e-6
     assert np.linalg.norm(cell.physics._pose.positions[0] - [2, 1, 551]) > 0.5, "another geometry"
     assert started == [1]
+
+
+STANDS = [Pose(0, -200, 550, 0, 0, 0)] * 2
+TURNED = Pose(0, -200, 550, 15, -10, 20)
+"""There the ball is elsewhere by what the geometry is wrong, millimetres."""
+
+
+def shown_at_last(cell: FollowedController, joints: np.ndarray) -> list[float]:
+    """What the gauges show once the joints are where they end."""
+    wait_until(lambda: np.abs(cell.physics.encoder_positions() - joints[-1]).max() < 0.1)
+    return [cell.physics.gauge_displacement(axis) for axis in "xyz"]
+
+
+def test_gauges_stand_where_they_were_when_the_program_is_started_again(followed) -> None:
+    """As real ones do: the robot is where it was stopped, beside the middle of their travel."""
+    first, joints = followed([*STANDS, TURNED])
+    shown_at_last(first, joints)
+    second, joints = followed([TURNED])
+    shown_at_last(second, joints)
+    np.testing.assert_array_equal(second.physics.gauges.station, first.physics.gauges.station)
+
+
+def test_gauges_are_placed_anew_where_the_config_is_another(followed, tmp_path) -> None:
+    first, joints = followed([*STANDS, TURNED])
+    shown_at_last(first, joints)
+    with (tmp_path / "simulated-hexaglide.controller.toml").open("a") as config:
+        config.write("\n# edited\n")
+    second, joints = followed([TURNED])
+    shown_at_last(second, joints)
+    assert np.abs(second.physics.gauges.station - first.physics.gauges.station).max() > 0.01
+
+
+@pytest.mark.parametrize("damaged", [b"", b"\xff", b"[]", b'{"config": 1}'])
+def test_a_damaged_file_of_the_gauges_places_is_none(followed, tmp_path, damaged) -> None:
+    (tmp_path / ".simulated-hexaglide.controller.toml.simulated-gauges").write_bytes(damaged)
+    assert np.abs(shown_at_last(*followed(STANDS))).max() < 3.0
 
 
 def test_a_program_that_ends_is_started_again(tmp_path) -> None:

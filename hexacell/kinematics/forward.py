@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.leg_closure import LegClosure, closure_to_compile
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -181,6 +182,10 @@ def forward_kinematics(
     default that of ``start``; ``tolerance_mm`` is the largest constraint of a solution. Poses whose second
     step is more than ``largest_contraction`` of the first one are not found.
     """
+    if closure := closure_to_compile(mechanism, geometry, joints):
+        compiled = _compiled(closure, start, mode, tolerance_mm, max_steps, largest_contraction)
+        if compiled is not None:
+            return compiled
     iteration = _NewtonIteration(mechanism, geometry, joints, start, mode, largest_contraction)
     for _ in range(max_steps):
         errors = iteration.errors()
@@ -192,6 +197,43 @@ def forward_kinematics(
     else:
         iteration.finish(np.ones(len(iteration.rows), dtype=bool), iteration.errors() < tolerance_mm)
     return ForwardResult(PoseBatch(iteration.positions, iteration.rotations), iteration.found)
+
+
+def _compiled(
+    closure: LegClosure,
+    start: PoseBatch,
+    mode: Array | None,
+    tolerance_mm: float,
+    max_steps: int,
+    largest_contraction: float,
+) -> ForwardResult | None:
+    """The same, compiled; none if a pose came to a singularity exactly."""
+    from hexacell.kinematics.compiled.newton import newton  # noqa: PLC0415 - where numba is installed
+
+    positions, orientations = np.array(start.positions), np.array(start.rotations)
+    found = np.zeros(len(start), dtype=bool)
+    modes = (
+        np.zeros(len(start)) if mode is None else np.array(np.broadcast_to(mode, len(start)), dtype=float)
+    )
+    base, platform, lengths, is_quadratic = closure.arrays()
+    is_complete = newton(
+        base,
+        platform,
+        lengths,
+        is_quadratic,
+        positions,
+        orientations,
+        modes,
+        tolerance_mm,
+        max_steps,
+        largest_contraction,
+        MAX_TRANSLATION_MM,
+        MAX_ROTATION_RAD,
+        found,
+    )
+    if not is_complete:
+        return None
+    return ForwardResult(PoseBatch(positions, orientations), found)
 
 
 def continue_solution(

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.kinematics.legs import Legs, angles_between
+from hexacell.kinematics.compiled.availability import is_compiled
+from hexacell.kinematics.legs import PARALLEL, Legs, angles_between
 from hexacell.kinematics.rotations import Array, Mask
 
 ROUNDING = 1e-9
@@ -60,12 +61,36 @@ class LegLimits:
         where those before it are kept.
         """
         least = np.broadcast_to(wanted, 12 + (self.distance_mm != 0.0))
+        if is_compiled():
+            return self._keeps_compiled(legs, least)
         at_platform = angles_between(legs.directions_in_platform, self.platform_axes)
         kept = np.asarray((self.platform_cones - at_platform >= least[6:12]).all(axis=-1))
         at_base = angles_between(legs[kept].directions_in_carriers, self.base_axes)
         kept[kept] = (self.base_cones - at_base >= least[:6]).all(axis=-1)
         if self.distance_mm != 0.0:
             kept[kept] = legs[kept].smallest_distance() - self.distance_mm >= least[12]
+        return kept
+
+    def _keeps_compiled(self, legs: Legs, least: Array) -> Mask:
+        # Only where numba is installed.
+        from hexacell.kinematics.compiled.leg_margins import keeps  # noqa: PLC0415
+
+        kept = np.empty(len(legs.rotations), dtype=bool)
+        carriers = np.tile(np.eye(3), (1, 6, 1, 1)) if legs.carriers is None else legs.carriers
+        distance = self.distance_mm + least[12] if self.distance_mm != 0.0 else 0.0
+        keeps(
+            _own(legs.base_joints),
+            _own(legs.platform_joints),
+            _own(legs.rotations),
+            _own(carriers),
+            _own(self.base_axes),
+            _own(self.platform_axes),
+            self.base_cones - least[:6],
+            self.platform_cones - least[6:12],
+            float(distance),
+            PARALLEL,
+            kept,
+        )
         return kept
 
     def margins_for(self, turn: float, radius_mm: float) -> Array:
@@ -83,3 +108,8 @@ class LegLimits:
             platform_cones=self.platform_cones + missing[6:12],
             distance_mm=distance if distance or not self.distance_mm else -ROUNDING,
         )
+
+
+def _own(values: Array) -> Array:
+    """A copy in the one layout that compiled loops take."""
+    return np.array(values, dtype=float)

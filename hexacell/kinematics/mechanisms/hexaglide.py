@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.leg_closure import LegClosure
 from hexacell.kinematics.leg_vectors import CLOSEST_JOINTS_MM, axes_through, by_pose
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
@@ -86,6 +87,12 @@ class Hexaglide:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         b, v = _leg_vectors(geometry, poses, joints)
         return _leg_errors(geometry, v), by_pose(b, -v / geometry["l"][..., None])
+
+    def leg_closure(self, geometry: Geometry | GeometryBatch, joints: Array) -> LegClosure | None:
+        """See :class:`~hexacell.kinematics.leg_closure.HasLegClosure`."""
+        at_sliders = np.array(np.broadcast_to(geometry["S"], (*joints.shape, 3)))
+        at_sliders[..., 0] += joints
+        return LegClosure(at_sliders, geometry["B"], geometry["l"], is_quadratic=True)
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""

@@ -31,6 +31,7 @@ from numpy.typing import ArrayLike
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.leg_closure import LegClosure
 from hexacell.kinematics.leg_vectors import axes_through, by_pose
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
@@ -140,6 +141,11 @@ class RotaryCranks:
         length = np.sqrt(np.einsum("nij,nij->ni", v, v))
         return length - geometry["rod"], by_pose(b, -v / length[..., None])
 
+    def leg_closure(self, geometry: Geometry | GeometryBatch, joints: Array) -> LegClosure | None:
+        """See :class:`~hexacell.kinematics.leg_closure.HasLegClosure`."""
+        ends = _ends(geometry, joints)
+        return LegClosure(ends, geometry["platform"], geometry["rod"], is_quadratic=False)
+
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         b, v = _rods(geometry, poses, joints)
@@ -245,10 +251,15 @@ def _platform(geometry: Geometry | GeometryBatch, poses: PoseBatch) -> Array:
 
 def _rods(geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> tuple[Array, Array]:
     """R B_i (n, 6, 3), and the vectors (n, 6, 3) from platform joint to crank's end, mm."""
-    b, axes = _platform(geometry, poses), TurnedAxes.by(geometry["axis"])
-    cosine, sine = _cosine_and_sine(geometry, joints)
-    end = geometry["centre"] + geometry["crank"][..., None] * (axes.u * cosine + axes.w * sine)
-    return b, end - poses.positions[:, None, :] - b
+    b = _platform(geometry, poses)
+    return b, _ends(geometry, joints) - poses.positions[:, None, :] - b
+
+
+def _ends(geometry: Geometry | GeometryBatch, joints: Array) -> Array:
+    """The joints (n, 6, 3) at the ends of the cranks, in the base frame, mm."""
+    axes, (cosine, sine) = TurnedAxes.by(geometry["axis"]), _cosine_and_sine(geometry, joints)
+    ends: Array = geometry["centre"] + geometry["crank"][..., None] * (axes.u * cosine + axes.w * sine)
+    return ends
 
 
 def _in_plane(geometry: Geometry, poses: PoseBatch) -> tuple[Array, Array]:

@@ -1,0 +1,1 @@
+"""Continuous (approximate) designs: the most information that records could have, with a certificate."""

@@ -1,9 +1,9 @@
 """The efficiency of a campaign: its information beside that of the best design under the same limits.
 
-Compared are the records that were taken with the best continuous design (:mod:`.continuous_design`) for the
-same points, references, numbers of records, noise and prior, whose other poses a designer chose who knew the
-robot beforehand. The robot is that of the estimate. What of the gauges' alignment and scale is not known
-lessens the records' information, and not the best design's.
+Compared are the records that were taken with the best continuous design (:mod:`.continuous_design`) for
+the same points, references, numbers of records, noise and prior, whose other poses a designer chose who
+knew the robot beforehand. The robot is that of the estimate. What is not known of the gauges' alignment
+and scale lessens the records' information, and not the best design's.
 """
 
 from __future__ import annotations
@@ -54,6 +54,11 @@ class DesignEfficiency:
     d: Efficiency
     i: Efficiency | None
 
+    @property
+    def certificate(self) -> float:
+        """The smaller of both certificates."""
+        return self.d.certificate if self.i is None else min(self.d.certificate, self.i.certificate)
+
 
 def design_efficiency(
     belief: RobotBelief, found: Identification, predictions: Array | None = None
@@ -77,7 +82,7 @@ def design_efficiency(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CampaignMeasure:
-    """A campaign as a design, the domains of its points, and its information (p, p), the prior's included."""
+    """A campaign as a design, the domains of its points, and its information (p, p), prior included."""
 
     design: DesignMeasure
     domains: tuple[PoseDomain, ...]

@@ -12,6 +12,7 @@ from hexacell.presentation.plan_draft import removed_summary
 from hexacell.presentation.planning import run_forecast_line
 from hexacell.presentation.quick_level import quick_accuracy_text, quick_start_text
 from hexacell.presentation.verification import check_start_text, check_text, verification_text
+from hexacell.reporting.design_statement import design_sentence
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Move, Phase, Probe, Repeat, SetKey, Standstill, Try
@@ -125,8 +126,8 @@ def _finding_text(event: events.Event) -> str | None:
     match event:
         case events.RunStarted() | events.ResultValidated():
             return _basis_or_verdict(event)
-        case events.Identified(quick=quick):
-            return None if quick is None else quick_accuracy_text(quick)
+        case events.Identified():
+            return _identified_text(event)
         case events.RunRecalled():
             return f"the run is to end: {event.reason}; back to the reference"
         case events.NoiseMeasured():
@@ -135,6 +136,16 @@ def _finding_text(event: events.Event) -> str | None:
             return confirmation_text(event)
         case _:
             return None
+
+
+def _identified_text(identified: events.Identified) -> str | None:
+    """How well the quick level knows the robot, and how good the choice of poses was."""
+    quick, design = identified.quick, identified.design
+    parts = (
+        None if quick is None else quick_accuracy_text(quick),
+        None if design is None else wrapped(design_sentence(design), indent=2),
+    )
+    return "\n".join(filter(None, parts)) or None
 
 
 def confirmation_text(planned: events.ConfirmationPlanned) -> str:

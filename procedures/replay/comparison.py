@@ -23,6 +23,9 @@ TOLERANCE = 1e-9
 WORDING_FIELDS = frozenset({"sentence", "line", "reason"})
 """Text fields; a later version may word them differently."""
 
+SEARCHED_FIELDS = frozenset({"design"})
+"""Fields found by a search that rounding may end elsewhere; nothing is decided by them."""
+
 
 class Aspect(StrEnum):
     """The kind of a difference."""
@@ -107,8 +110,9 @@ def changes(recorded: BaseModel, replayed: BaseModel, tolerance: float) -> list[
 
 
 def is_wording(change: Change) -> bool:
-    """Whether only the wording differs."""
-    return change.field.rpartition(".")[2] in WORDING_FIELDS
+    """Whether only the wording differs, or what nothing is decided by."""
+    fields = change.field.split(".")
+    return fields[-1] in WORDING_FIELDS or fields[0] in SEARCHED_FIELDS
 
 
 def counts_mismatch(reading: Reading, encoders: EncoderSettings) -> Change | None:

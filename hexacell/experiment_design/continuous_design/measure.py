@@ -65,7 +65,7 @@ class WhitenedRecords:
 
     def normal(self, weights: Array | None = None) -> Array:
         """Normal matrix (c + p, c + p) of the records, with weights (n,)."""
-        count, coordinates, columns = self.rows.shape
+        coordinates, columns = self.rows.shape[1:]
         flat = self.rows.reshape(-1, columns)
         weighted = flat if weights is None else flat * weights.repeat(coordinates)[:, None]
         normal: Array = flat.T @ weighted
@@ -114,6 +114,8 @@ class PointMeasure:
 
     def supported(self, smallest: float) -> PointMeasure:
         """The same without records of less than a share of its weight, the others taking theirs."""
+        if not self.share:
+            return self
         kept = self.weights >= smallest * self.share
         weights = self.weights[kept]
         return replace(self, records=self.records[kept], weights=weights * self.share / weights.sum())
@@ -121,8 +123,10 @@ class PointMeasure:
     def with_records(self, records: WhitenedRecords, part: float) -> PointMeasure:
         """With more possible records, which take a part of all weight in equal shares.
 
-        Those that it has already are left out.
+        Those that it has already are left out, and all of them if it has fixed records only.
         """
+        if not self.share:
+            return self
         is_known = (records.rows[:, None] == self.records.rows[None]).all(axis=(-2, -1)).any(axis=-1)
         records = records[~is_known]
         added = np.full(len(records), part * self.share / max(1, len(records)))

@@ -4,18 +4,19 @@ Of the information M of a design, the prior's included, with p parameters:
 
 - D: the volume of the confidence ellipsoid. The D-efficiency of M against another N is
   ``(det M / det N)^(1/p)``;
-- I (or V): the mean variance ``tr(L M^-1)`` of predictions with the weight L, here of the ball's position
-  at the task poses. The I-efficiency is ``tr(L N^-1) / tr(L M^-1)``.
+- I (or V): the mean variance ``tr(L M^-1)`` of predictions with the weight L, here of the ball's
+  position at the task poses. The I-efficiency is ``tr(L N^-1) / tr(L M^-1)``.
 
 The same share of the records, taken by the best design, would do as well.
 
 **Certificate.** For D let ``G G^T = M^-1``, for I ``G G^T = M^-1 L M^-1``. A record's sensitivity is the
-derivative by its weight, ``s = |R (J - Z K) G|^2`` (see :mod:`.measure`). If the k records of each point are
-distributed in any other way, giving N, then
+derivative by its weight, ``s = |R (J - Z K) G|^2`` (see :mod:`.measure`). If the k records of each point
+are distributed in any other way, giving N, then
 
     tr(G^T N G) <= tr(G^T F G) + sum over points of k max s =: g,
 
-where F is the information of the prior and of the records that every design has, with those centres; because N is no larger with its own centres than with those of M. With ``t = tr(G^T M G)``, which is p for
+where F is the information of the prior and of the records that every design has, with those centres;
+because N is no larger with its own centres than with those of M. With ``t = tr(G^T M G)``, which is p for
 D and ``tr(L M^-1)`` for I,
 
 - D: ``det(M^-1 N) <= (tr(M^-1 N) / p)^p <= (g / t)^p``, by the means of the eigenvalues of the product;

@@ -2,8 +2,8 @@
 
 Minimized is ``f = -log det M`` or ``f = tr(L M^-1)``, which are convex in the weights w, under w >= 0 and
 a given sum at each point. The derivative by a weight is minus the record's sensitivity. With the whitened
-centred rows ``X_i = R_i (J_i - Z K)``, ``C = M^-1 = H H^T``, and G of :mod:`.optimality`, the second derivative
-by the weights of records i and l is
+centred rows ``X_i = R_i (J_i - Z K)``, ``C = M^-1 = H H^T``, and G of :mod:`.optimality`, the second
+derivative by the weights of records i and l is
 
     k sum of (X_i G)(X_l G)^T * (X_i H)(X_l H)^T, element by element,     k = 1 for D, 2 for I,
 
@@ -91,7 +91,10 @@ class _Step:
 
     def taken(self, weights: Array, multipliers: Array) -> tuple[Array, Array]:
         """Weights and multipliers after as much of the step as leaves all of them above zero."""
-        both, steps = np.concatenate([weights, multipliers]), np.concatenate([self.weights, self.multipliers])
+        both, steps = (
+            np.concatenate([weights, multipliers]),
+            np.concatenate([self.weights, self.multipliers]),
+        )
         falling = steps < 0.0
         length = min(1.0, TO_THE_EDGE * float(np.min(-both[falling] / steps[falling], initial=np.inf)))
         return weights + length * self.weights, multipliers + length * self.multipliers

@@ -11,6 +11,7 @@ from hexacell.campaign.quick_level import QuickAccuracy
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.decision import Verdict
+from hexacell.experiment_design.design_efficiency import DesignEfficiency
 from hexacell.reporting.check_result import CheckResult
 from hexacell.reporting.length_statement import LengthStatement
 from hexacell.reporting.result import ExpectedImprovement, IdentificationResult
@@ -42,6 +43,7 @@ class Identified(Frozen):
     ``held_out`` are measured at each point before and after, ``held_out_after`` only after: the robot
     cannot take them safely before it is calibrated. ``improvement`` is none where the robot can reach none
     of the task poses. ``quick`` is how well the quick level knows the robot; none in other runs.
+    ``design`` is how much the records know beside those of the best design; none in older runs.
     """
 
     kind: Literal["identified"] = "identified"
@@ -50,6 +52,7 @@ class Identified(Frozen):
     held_out_after: tuple[tuple[SixNumbers, ...], ...] = ()
     improvement: ExpectedImprovement | None = None
     quick: QuickAccuracy | None = None
+    design: DesignEfficiency | None = None
 
 
 class Proposed(Frozen):

@@ -1,7 +1,8 @@
-"""The best design measures beside designs that are known in closed form, another solver, and every other design.
+"""The best design measures beside those known in closed form, another solver, and every other design.
 
-Polynomial regression on [-1, 1]: the D-optimal design has equal weights at the ends and at the extremes of a
-Legendre polynomial (Guest 1958, Hoel 1958); the I-optimal one of a parabola has 1/4, 1/2, 1/4 at -1, 0, 1.
+Polynomial regression on [-1, 1]: the D-optimal design has equal weights at the ends and at the extremes
+of a Legendre polynomial (Guest 1958, Hoel 1958); the I-optimal one of a parabola has 1/4, 1/2, 1/4 at
+-1, 0 and 1.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ GAP = 1e-4
 
 
 def polynomial(degree: int, constants: int) -> WhitenedRecords:
-    return WhitenedRecords(np.stack([GRID**power for power in range(degree + 1)], axis=-1)[:, None], constants)
+    return WhitenedRecords(
+        np.stack([GRID**power for power in range(degree + 1)], axis=-1)[:, None], constants
+    )
 
 
 def evenly(records: WhitenedRecords, share: float = 1.0) -> PointMeasure:
@@ -51,7 +54,7 @@ EXTREMES = {2: [0.0], 3: [-np.sqrt(0.2), np.sqrt(0.2)], 4: [-np.sqrt(3 / 7), 0.0
 @pytest.mark.parametrize("degree", EXTREMES)
 @pytest.mark.parametrize("constants", [0, 1], ids=["all parameters", "the constant eliminated"])
 def test_d_optimal_designs_of_polynomials_are_the_known_ones(degree, constants):
-    """With equal noise the constant may be eliminated: that divides the determinant by the number of records."""
+    """With equal noise the constant may be eliminated: the determinant is divided by the records."""
     records = polynomial(degree, constants)
     free = degree + 1 - constants
     start = DesignMeasure((evenly(records),), np.zeros((free, free)))

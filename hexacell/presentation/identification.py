@@ -19,6 +19,7 @@ from hexacell.presentation.layout import wrapped
 from hexacell.presentation.measured_noise import measured_noise_text
 from hexacell.presentation.uncertainty import budget_table
 from hexacell.reporting.assessment import Assessment
+from hexacell.reporting.design_statement import design_sentence
 from hexacell.reporting.findings import findings, noise_sentence, pair_sentences, residual_sentence
 
 
@@ -30,6 +31,7 @@ def identification_report(assessed: Assessment) -> str:
         verdict_line(assessed),
         accuracy_table(assessed),
         budget_table(assessed.budget),
+        "" if assessed.design is None else wrapped(design_sentence(assessed.design)),
         _data_and_termination(found),
         _identified(assessed),
         parameter_table(assessed.zeros or found, assessed.drawing),

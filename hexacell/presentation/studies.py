@@ -6,10 +6,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from hexacell.presentation.design_study import design_document, design_lines, design_picture
 from hexacell.presentation.experiment_study import experiment_document, experiment_lines, experiment_picture
 from hexacell.presentation.paper_figures import study_picture
 from hexacell.presentation.paper_study import study_document, study_lines
 from hexacell.study.definition import Study
+from hexacell.study.design_summary import DESIGN
 from hexacell.study.experiment_summary import EXPERIMENT
 from hexacell.study.paper_summary import PAPER
 
@@ -29,6 +31,7 @@ class ShownStudy(Generic[SummaryType]):
 _ROWS: tuple[ShownStudy[Any], ...] = (
     ShownStudy(PAPER, study_lines, study_document, study_picture),
     ShownStudy(EXPERIMENT, experiment_lines, experiment_document, experiment_picture),
+    ShownStudy(DESIGN, design_lines, design_document, design_picture),
 )
 
 STUDIES: Mapping[str, ShownStudy[Any]] = {row.study.name: row for row in _ROWS}

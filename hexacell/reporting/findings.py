@@ -11,7 +11,6 @@ from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVe
 from hexacell.kinematics.mechanism import FrameConvention
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.reporting.assessment import SEPARATED_PAIRS, Assessment
-from hexacell.reporting.design_statement import design_sentence
 
 POOR_REPEATABILITY = 2.0
 """Scatter of repeated poses over that of the stated noise from which it is a finding."""
@@ -32,7 +31,6 @@ def findings(assessed: Assessment) -> tuple[str, ...]:
         _poor_repeatability(assessed),
         _noise(assessed),
         _unreachable(assessed),
-        "" if assessed.design is None else design_sentence(assessed.design),
         *map(str, assessed.found.data_faults),
     )
     return tuple(sentence for sentence in sentences if sentence)

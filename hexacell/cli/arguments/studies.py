@@ -28,6 +28,12 @@ STUDIES = (
         20,
         "of orientations and noise, for each case",
     ),
+    _StudyArguments(
+        "design",
+        "accuracy by records, choice of orientations, travel, tilt, noise and points",
+        20,
+        "robots, each measured in every way",
+    ),
 )
 """Each a row of ``hexacell.presentation.studies``, which would take long to import here."""
 

@@ -1,0 +1,114 @@
+"""The study of designs as text, as a document and as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from math import isfinite
+from typing import Any
+
+from hexacell.presentation.layout import wrapped
+from hexacell.presentation.svg_drawing import AFTER, BEFORE, INK, as_svg, new_figure
+from hexacell.study.design_records import PAPER_DEG, RANDOM_DEG, Choice
+from hexacell.study.design_summary import ChoiceCurve, DesignStudy, EfficiencySummary, Spread
+
+WAYS = (
+    "adaptive: this program's, through the controller's own wrong geometry at first. best fixed: selected "
+    "by a designer who knows the robot, and commanded with its geometry. sifted random: angles within "
+    f"+-{RANDOM_DEG[0]:g} deg, of which those are kept that stay inside the travel. random: angles as "
+    f"large as all of them stay inside. paper: angles within +-{PAPER_DEG:g} deg and any deviation."
+)
+GREY = "#777777"
+STYLES = {
+    Choice.ADAPTIVE: (AFTER, "s", "-"),
+    Choice.FIXED: (INK, "^", "--"),
+    Choice.SIFTED: (BEFORE, "v", ":"),
+    Choice.RANDOM: (BEFORE, "o", "-"),
+    Choice.PAPER: (GREY, "D", "-."),
+}
+
+
+def design_lines(study: DesignStudy) -> Iterator[str]:
+    """The whole of it, in lines of at most 80 columns."""
+    yield wrapped(
+        "Largest error of a parameter, mm: the median of the robots, in brackets what 90 % stay within; "
+        "the noise on the parameters (rms), the error at the worst task pose (one sigma), the largest "
+        "deviation; how many robots of how many."
+    )
+    yield wrapped(WAYS)
+    yield ""
+    head = f"{'error':<16} {'noise':<8} {'task':<8} {'gauges':<9} robots"
+    yield f"  {'orientations':<15} {'records':<8} {head}"
+    for name, curve in study.choices.items():
+        yield from _choice_lines(name, curve)
+    if ratios := ", ".join(f"{name} {ratio:.1f}" for name, ratio in study.noise_ratio.items()):
+        yield wrapped(f"Noise on the parameters, times that of adaptive orientations: {ratios}.")
+    if study.efficiency is not None:
+        yield ""
+        yield wrapped(_efficiency_sentence(study.efficiency))
+    for name, rows in study.sweeps.items():
+        yield ""
+        yield f"  {name:<24} {'error':<16} {'noise':<8} {'task':<8} robots"
+        for value, spread in rows.items():
+            yield f"  {value:<24g} {_spread(spread)} {spread.robots}"
+
+
+def _choice_lines(name: str, curve: ChoiceCurve) -> Iterator[str]:
+    if not curve.by_records:
+        yield f"  {name:<15} none of {curve.tried} robots is identified"
+    for count, spread in curve.by_records.items():
+        robots = f"{curve.deviation_mm:<9.3g} {spread.robots}/{curve.tried}"
+        yield f"  {name:<15} {count:<8} {_spread(spread)} {robots}"
+
+
+def _spread(one: Spread) -> str:
+    error = f"{one.largest_mm:.3g} ({one.most_mm:.3g})"
+    return f"{error:<16} {one.sigma_mm:<8.3g} {one.task_mm:<8.3g}"
+
+
+def _efficiency_sentence(found: EfficiencySummary) -> str:
+    return (
+        f"Of the best continuous design for the known robot, adaptive campaigns of {found.robots} robots "
+        f"have a D-efficiency of {found.d:.2f} at the median (a tenth below {found.d_tenth:.2f}), and an "
+        f"I-efficiency at the task poses of {found.i:.2f} ({found.i_tenth:.2f}); certified to "
+        f"{100 * (1 - found.certificate):.0f} %."
+    )
+
+
+def design_document(study: DesignStudy) -> dict[str, Any]:
+    """All figures as a JSON document; what is not finite is null."""
+    document: dict[str, Any] = _finite(asdict(study))
+    return document
+
+
+def _finite(value: Any) -> Any:  # noqa: ANN401 - any part of a document
+    match value:
+        case Mapping():
+            return {str(key): _finite(one) for key, one in value.items()}
+        case float() if not isfinite(value):
+            return None
+        case _:
+            return value
+
+
+def design_picture(study: DesignStudy) -> str:
+    """The largest error by the number of records, and adaptive campaigns by what limits them."""
+    small = [(0.09 + 0.235 * place, 0.10, 0.175, 0.26) for place in range(len(study.sweeps))]
+    figure, (large, *others) = new_figure((7.2, 5.2), (0.09, 0.50, 0.88, 0.46), *small)
+    for name, curve in study.choices.items():
+        colour, marker, line = STYLES[Choice(name)]
+        errors = [(count, one.largest_mm) for count, one in curve.by_records.items() if one.robots]
+        x, y = zip(*errors, strict=True) if errors else ((), ())
+        large.semilogy(x, y, marker + line, color=colour, label=name, markersize=4)
+    large.set_xlabel("records")
+    large.set_ylabel("largest error of a parameter, mm")
+    large.legend(frameon=False, fontsize=7)
+    for axes, (name, rows) in zip(others, study.sweeps.items(), strict=True):
+        shown = [(value, one.task_mm) for value, one in rows.items() if isfinite(one.task_mm)]
+        x, y = zip(*shown, strict=True) if shown else ((), ())
+        draw = axes.loglog if name.startswith("noise") else axes.semilogy
+        draw(x, y, "s-", color=AFTER, markersize=4)
+        axes.set_xlabel(name)
+        axes.tick_params(labelsize=7)
+    others[0].set_ylabel("error at the task, mm")
+    return as_svg(figure)

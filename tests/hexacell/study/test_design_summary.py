@@ -1,0 +1,95 @@
+"""What many calibrations say together, of outcomes that are known; and trials of real robots."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from math import isnan
+
+import pytest
+from pydantic import TypeAdapter
+
+from hexacell.experiment_design.design_efficiency import DesignEfficiency, Efficiency
+from hexacell.presentation.design_study import design_document, design_lines, design_picture
+from hexacell.study.design_records import Choice
+from hexacell.study.design_summary import SWEEPS, SWEPT, design_summary, design_trials_of
+from hexacell.study.design_trials import Accuracy, DesignOutcome, DesignTrial, run_design_trial
+
+
+def outcome(trial: DesignTrial) -> DesignOutcome:
+    """Errors that grow with the robot's number, the noise, and the choice's place in the list."""
+    factor = 1 + list(Choice).index(trial.choice)
+    error = factor * (trial.number + 1) * trial.noise_mm
+    rated = DesignEfficiency(Efficiency(0.8, 0.97), Efficiency(0.5, 0.98)) if trial.rates else None
+    accuracies = tuple(Accuracy(11 * points, error, 0.1 * error, 0.01 * error) for points in (2, 3, 4, 5))
+    return DesignOutcome(accuracies, 4.0, 0, rated)
+
+
+def study(robots: int):
+    trials = design_trials_of(robots)
+    return design_summary(trials, {key: outcome(one) for key, one in trials.items()})
+
+
+def test_each_figure_is_of_its_own_trials() -> None:
+    found = study(3)
+    assert [one.tried for one in found.choices.values()] == [3] * len(Choice)
+    adaptive = found.choices["adaptive"].by_records
+    assert list(adaptive) == [22, 33, 44, 55]
+    assert adaptive[55].largest_mm == pytest.approx(0.02)
+    assert found.sweeps["noise, mm"][0.05].largest_mm == pytest.approx(0.1)
+    assert found.noise_ratio == pytest.approx(
+        {"best fixed": 2.0, "sifted random": 3.0, "random": 4.0, "paper": 5.0}
+    )
+    assert found.efficiency is not None
+    assert (found.efficiency.robots, found.efficiency.certificate) == (3, 0.97)
+    assert found.efficiency.d == pytest.approx(0.8 * 0.97)
+
+
+def test_sweeps_have_fewer_robots_and_none_is_calibrated_twice() -> None:
+    trials = design_trials_of(SWEPT + 5)
+    values = sum(len(values) for _, values in SWEEPS.values())
+    assert len(trials) == len(Choice) * (SWEPT + 5) + SWEPT * (values - len(SWEEPS))
+    assert {one.key for one in trials.values()} == set(trials)
+
+
+def test_robots_that_are_not_identified_are_counted() -> None:
+    trials = design_trials_of(2)
+    outcomes = {key: outcome(one) for key, one in trials.items()}
+    outcomes |= {
+        key: DesignOutcome(reason="out of reach")
+        for key, one in trials.items()
+        if one.number == 1 or one.choice is Choice.PAPER
+    }
+    found = design_summary(trials, outcomes)
+    assert (found.choices["random"].tried, found.choices["random"].by_records[55].robots) == (2, 1)
+    assert found.choices["paper"].by_records == {}
+    assert isnan(found.noise_ratio["paper"])
+    text = "\n".join(design_lines(found))
+    assert "none of 2 robots" in text
+    assert json.dumps(design_document(found), allow_nan=False)
+
+
+def test_the_study_is_shown() -> None:
+    found = study(2)
+    assert max(len(line) for part in design_lines(found) for line in part.splitlines()) <= 80
+    assert "D-efficiency of 0.78 at the median" in " ".join(" ".join(design_lines(found)).split())
+    picture = design_picture(found)
+    assert picture.startswith("<svg ")
+    assert picture == design_picture(found)
+
+
+def test_outcomes_are_kept_as_json_and_come_back() -> None:
+    kept = TypeAdapter(DesignOutcome)
+    one = outcome(DesignTrial(0, rates=True))
+    assert kept.validate_json(kept.dump_json(one)) == one
+
+
+def test_chosen_orientations_tell_more_than_random_ones_of_the_same_travel() -> None:
+    """One robot, three points; the trial is the same whenever it is made."""
+    usual = DesignTrial(0, points=3)
+    chosen, random = run_design_trial(usual), run_design_trial(replace(usual, choice=Choice.RANDOM))
+    assert chosen.last is not None
+    assert random.last is not None
+    assert chosen.last.sigma_mm < 0.5 * random.last.sigma_mm
+    assert max(chosen.deviation_mm, random.deviation_mm) <= usual.travel_mm
+    assert run_design_trial(replace(usual, choice=Choice.RANDOM)) == random

@@ -9,18 +9,20 @@ from enum import StrEnum
 import numpy as np
 
 from hexacell.campaign.dry_run import VirtualCampaign
-from hexacell.campaign.forecast import select_sets
 from hexacell.campaign.planner import Plan
 from hexacell.cell.model import CellSettings
 from hexacell.errors import LimitError
-from hexacell.experiment_design.candidates import ReachableTargets, commands_for
-from hexacell.experiment_design.continuous_design.measure import PointMeasure, WhitenedRecords
-from hexacell.experiment_design.criteria import add_information
-from hexacell.experiment_design.predicted_records import position_derivatives
+from hexacell.experiment_design.candidates import ReachableTargets, commands_for, reachable_targets
+from hexacell.experiment_design.continuous_design.pose_domain import PoseDomain
+from hexacell.experiment_design.criteria import D_OPTIMAL, covariance_update
+from hexacell.experiment_design.predicted_records import (
+    GaugeZero,
+    estimate_gauge_zero,
+    predict_records,
+)
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.solver.measurement_model import record_weights
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot_model import Robot
@@ -32,6 +34,7 @@ RANDOM_DEG = (20.0, 14.0, 10.0, 7.0, 5.0, 3.5, 2.5, 1.8, 1.2, 0.9, 0.6, 0.4)
 
 PAPER_DEG = 30.0
 MOST_TRIES = 600
+POSSIBLE = 4096
 
 
 class Choice(StrEnum):
@@ -90,21 +93,40 @@ def _best_fixed(settings: CellSettings, robot: Robot, truth: Geometry) -> list[l
     free, plan = robot.mechanism.convention.free_parameters(truth), settings.identification
     belief, sets = replace(robot.belief(), free=free), []
     for ball in robot.from_commands(Pose(*point) for point in plan.points).positions:
-        [poses] = select_sets(belief, ball[None], plan.orientations, plan.seed)
-        if len(poses) < plan.orientations:
-            raise LimitError("too few poses can be reached at a point")
-        targets = ReachableTargets(poses, robot.mechanism.inverse(truth, robot.branch, poses))
+        targets, belief = _selected(belief, ball, plan.orientations, plan.seed)
         commands, _ = commands_for(belief, targets)
         sets.append([robot.to_command(commands.pose(row)) for row in range(len(commands))])
-        information = _information(belief, targets)
-        belief = replace(belief, covariance=add_information(belief.covariance, information))
     return sets
 
 
-def _information(belief: RobotBelief, targets: ReachableTargets) -> Array:
-    jacobian, by_joints = position_derivatives(belief, targets)
-    records = WhitenedRecords.of(jacobian, record_weights(by_joints, belief.noise))
-    return PointMeasure.of_campaign(records, 1).information()[0]
+def _selected(
+    belief: RobotBelief, ball: Array, count: int, seed: int
+) -> tuple[ReachableTargets, RobotBelief]:
+    """Targets with the ball at a place (3,), mm, the level one first, and what is known after them.
+
+    Each of the others gains most of all that are possible beside those before it.
+    """
+    level = belief.limits.orientations(np.eye(3)[None])
+    chosen = reachable_targets(belief, PoseBatch.at(ball, level))
+    if not len(chosen):
+        raise LimitError("the level pose cannot be reached at a point")
+    possible = PoseDomain(belief, _zero(belief, chosen)).spread(POSSIBLE, seed)
+    possible = possible[commands_for(belief, possible)[1]]
+    while len(chosen) < count:
+        records = predict_records(belief, _zero(belief, chosen), possible)
+        gains = D_OPTIMAL.gain(belief.covariance, records.jacobian, records.covariance)
+        best = int(np.argmax(gains))
+        at_best = belief.covariance, records.jacobian[best], records.covariance[best]
+        belief = replace(belief, covariance=covariance_update(*at_best))
+        chosen = ReachableTargets(
+            PoseBatch.concatenate([chosen.poses, possible.poses[[best]]]),
+            np.concatenate([chosen.joints, possible.joints[[best]]]),
+        )
+    return chosen, belief
+
+
+def _zero(belief: RobotBelief, chosen: ReachableTargets) -> GaugeZero:
+    return estimate_gauge_zero(belief, chosen.poses, chosen.joints, np.zeros((len(chosen), 3)))
 
 
 def _visited(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -124,13 +125,13 @@ def _swept(name: str, robots: int) -> dict[float, list[DesignTrial]]:
     """The trials of a sweep by the value; the usual ones are rated ones of the comparison."""
     field, values = SWEEPS[name]
     usual = DesignTrial(0)
-    return {
-        float(value): [
-            replace(usual, number=number, rates=value == getattr(usual, field), **{field: value})
-            for number in range(min(robots, SWEPT))
-        ]
-        for value in values
-    }
+
+    def trial(number: int, value: float) -> DesignTrial:
+        changed: dict[str, Any] = {field: value, "rates": value == getattr(usual, field)}
+        return replace(usual, number=number, **changed)
+
+    numbers = range(min(robots, SWEPT))
+    return {float(value): [trial(number, value) for number in numbers] for value in values}
 
 
 def design_summary(trials: Mapping[str, DesignTrial], outcomes: Mapping[str, DesignOutcome]) -> DesignStudy:
@@ -201,7 +202,7 @@ def _noise_ratio(adaptive: Mapping[int, DesignOutcome], other: Mapping[int, Desi
 
 
 def _quantile(values: Sequence[float], share: float) -> float:
-    return float(np.quantile(values, share)) if values else float("nan")
+    return float(np.quantile(values, share, method="nearest")) if values else float("nan")
 
 
 DESIGN = Study("design", "calibrations", design_trials_of, run_design_trial, DesignOutcome, design_summary)

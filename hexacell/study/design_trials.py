@@ -26,6 +26,8 @@ from hexacell.virtual_robot import random_robot
 
 RECORDS = 55
 SEED = 18
+ROUNDING = 1e-14
+"""Of the largest eigenvalue of the information: what is smaller is not determined."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +66,8 @@ class Accuracy:
     Attributes:
         records: how many.
         largest_mm: largest error of a parameter.
-        sigma_mm: root mean square of the parameters' standard deviations: the noise on them.
+        sigma_mm: root mean square of the parameters' standard deviations by the records alone, without the
+            drawing: the noise on them; infinite where they do not determine all.
         task_mm: the same error's standard deviation at the worst task pose.
     """
 
@@ -136,9 +139,16 @@ def _accuracy(cell: Cell, robot: Robot, found: Identification, truth: Geometry) 
     return Accuracy(
         found.records,
         found.geometry.largest_difference(truth),
-        float(np.sqrt(np.mean(np.diag(belief.covariance)))),
+        _noise_mm(found),
         float("nan") if error is None else error.worst(belief.covariance),
     )
+
+
+def _noise_mm(found: Identification) -> float:
+    variances, axes = np.linalg.eigh(found.solution.information)
+    if variances[0] <= ROUNDING * variances[-1]:
+        return float("inf")
+    return float(np.sqrt(np.mean(np.sum(axes**2 / variances, axis=-1))))
 
 
 def _efficiency(cell: Cell, robot: Robot, found: Identification) -> DesignEfficiency:

@@ -40,8 +40,9 @@ from hexacell.kinematics.rotations import Array
 class Optimality(Protocol):
     """A criterion of designs."""
 
-    curvature: float
-    """Factor of the second derivatives by weights; see :mod:`.weights`."""
+    @property
+    def curvature(self) -> float:
+        """Factor of the second derivatives by weights; see :mod:`.weights`."""
 
     def factor(self, information: Array) -> Array:
         """G (p, r) at an information (p, p), the prior's included."""

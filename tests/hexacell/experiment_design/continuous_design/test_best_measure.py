@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import minimize
+from scipy.optimize import Bounds, LinearConstraint, minimize
 
 from hexacell.experiment_design.continuous_design.certificate import Linearization
 from hexacell.experiment_design.continuous_design.measure import (
@@ -164,15 +164,15 @@ def test_another_solver_finds_no_better_weights(optimality, seed):
         )
         return DesignMeasure(points, start.prior)
 
+    def objective(weights: np.ndarray) -> float:
+        return value(optimality, with_weights(weights).information()[0])
+
     found = minimize(
-        lambda weights: value(optimality, with_weights(weights).information()[0]),
+        objective,
         np.repeat(np.array(counts) / 12.0, 12),
         method="SLSQP",
-        bounds=[(0.0, None)] * 24,
-        constraints=[
-            {"type": "eq", "fun": lambda weights: weights[:12].sum() - counts[0]},
-            {"type": "eq", "fun": lambda weights: weights[12:].sum() - counts[1]},
-        ],
+        bounds=Bounds(0.0, np.inf),
+        constraints=[LinearConstraint(np.repeat(np.eye(2), 12, axis=1), counts, counts)],
         options={"maxiter": 500, "ftol": 1e-12},
     )
     design, certificate = best_measure(start, possible, optimality, GAP)

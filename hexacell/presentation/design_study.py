@@ -9,7 +9,7 @@ from typing import Any
 
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.svg_drawing import AFTER, BEFORE, INK, as_svg, new_figure
-from hexacell.study.design_records import PAPER_DEG, RANDOM_DEG, Choice
+from hexacell.study.design_records import PAPER_DEG, RANDOM_DEG, OrientationChoice
 from hexacell.study.design_summary import ChoiceCurve, DesignStudy, EfficiencySummary, Spread
 
 WAYS = (
@@ -20,11 +20,11 @@ WAYS = (
 )
 GREY = "#777777"
 STYLES = {
-    Choice.ADAPTIVE: (AFTER, "s", "-"),
-    Choice.FIXED: (INK, "^", "--"),
-    Choice.SIFTED: (BEFORE, "v", ":"),
-    Choice.RANDOM: (BEFORE, "o", "-"),
-    Choice.PAPER: (GREY, "D", "-."),
+    OrientationChoice.ADAPTIVE: (AFTER, "s", "-"),
+    OrientationChoice.FIXED: (INK, "^", "--"),
+    OrientationChoice.SIFTED: (BEFORE, "v", ":"),
+    OrientationChoice.RANDOM: (BEFORE, "o", "-"),
+    OrientationChoice.PAPER: (GREY, "D", "-."),
 }
 
 
@@ -96,7 +96,7 @@ def design_picture(study: DesignStudy) -> str:
     small = [(0.09 + 0.235 * place, 0.10, 0.175, 0.26) for place in range(len(study.sweeps))]
     figure, (large, *others) = new_figure((7.2, 5.2), (0.09, 0.50, 0.88, 0.46), *small)
     for name, curve in study.choices.items():
-        colour, marker, line = STYLES[Choice(name)]
+        colour, marker, line = STYLES[OrientationChoice(name)]
         errors = [(count, one.largest_mm) for count, one in curve.by_records.items() if one.robots]
         x, y = zip(*errors, strict=True) if errors else ((), ())
         large.semilogy(x, y, marker + line, color=colour, label=name, markersize=4)

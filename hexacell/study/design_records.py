@@ -37,7 +37,7 @@ MOST_TRIES = 600
 POSSIBLE = 4096
 
 
-class Choice(StrEnum):
+class OrientationChoice(StrEnum):
     """How orientations are chosen."""
 
     ADAPTIVE = "adaptive"
@@ -57,7 +57,11 @@ class ChosenRecords:
 
 
 def chosen_records(
-    choice: Choice, settings: CellSettings, robot: Robot, truth: Geometry, random: np.random.Generator
+    choice: OrientationChoice,
+    settings: CellSettings,
+    robot: Robot,
+    truth: Geometry,
+    random: np.random.Generator,
 ) -> ChosenRecords:
     """The records of a robot at all points of a cell.
 
@@ -65,20 +69,20 @@ def chosen_records(
         HexacellError: it cannot be measured like this.
     """
     match choice:
-        case Choice.ADAPTIVE:
+        case OrientationChoice.ADAPTIVE:
             plan = Plan(settings, robot, with_forecast=False)
             campaign = VirtualCampaign(plan, VirtualRobot(robot, truth, random))
             campaign.carry_out()
             return ChosenRecords(campaign.plan.robot, campaign.measurements, campaign.outside)
-        case Choice.FIXED:
+        case OrientationChoice.FIXED:
             return ChosenRecords(robot, _visited(robot, truth, _best_fixed(settings, robot, truth), random))
-        case Choice.SIFTED:
+        case OrientationChoice.SIFTED:
             sifted = _random(settings, robot, truth, random, RANDOM_DEG[:1], MOST_TRIES)
             return ChosenRecords(robot, sifted)
-        case Choice.RANDOM:
+        case OrientationChoice.RANDOM:
             wanted = settings.identification.orientations - 1
             return ChosenRecords(robot, _random(settings, robot, truth, random, RANDOM_DEG, wanted))
-        case Choice.PAPER:
+        case OrientationChoice.PAPER:
             amplitude, count = float(np.radians(PAPER_DEG)), settings.identification.orientations
             drawn = unlimited_travel(robot, truth, _points(settings), count, amplitude, random)
             return ChosenRecords(robot, drawn.measured(robot.noise.gauge_mm, random))

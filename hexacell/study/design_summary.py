@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from hexacell.study.definition import Study
-from hexacell.study.design_records import Choice
-from hexacell.study.design_trials import Accuracy, DesignOutcome, DesignTrial, run_design_trial
+from hexacell.study.design_records import OrientationChoice
+from hexacell.study.design_trials import DesignOutcome, DesignTrial, RecordsAccuracy, run_design_trial
 
 RATED = 100
 """Robots of which the efficiency of the design is computed."""
@@ -48,7 +48,7 @@ class Spread:
     task_mm: float
 
     @classmethod
-    def of(cls, found: Sequence[Accuracy]) -> Spread:
+    def of(cls, found: Sequence[RecordsAccuracy]) -> Spread:
         """Of accuracies."""
         errors = [one.largest_mm for one in found]
         return cls(
@@ -113,9 +113,9 @@ class DesignStudy:
 def design_trials_of(robots: int) -> dict[str, DesignTrial]:
     """All trials by their keys."""
     trials = [
-        DesignTrial(number, choice, rates=choice is Choice.ADAPTIVE and number < RATED)
+        DesignTrial(number, choice, rates=choice is OrientationChoice.ADAPTIVE and number < RATED)
         for number in range(robots)
-        for choice in Choice
+        for choice in OrientationChoice
     ]
     trials += [trial for name in SWEEPS for trials in _swept(name, robots).values() for trial in trials]
     return {trial.key: trial for trial in trials}
@@ -142,9 +142,9 @@ def design_summary(trials: Mapping[str, DesignTrial], outcomes: Mapping[str, Des
             for key, one in trials.items()
             if one == replace(DesignTrial(one.number, choice), rates=one.rates)
         }
-        for choice in Choice
+        for choice in OrientationChoice
     }
-    robots = len(compared[Choice.ADAPTIVE])
+    robots = len(compared[OrientationChoice.ADAPTIVE])
     sweeps = {
         name: {
             value: Spread.of(_last(outcomes[one.key] for one in swept))
@@ -152,7 +152,7 @@ def design_summary(trials: Mapping[str, DesignTrial], outcomes: Mapping[str, Des
         }
         for name in SWEEPS
     }
-    adaptive = compared[Choice.ADAPTIVE]
+    adaptive = compared[OrientationChoice.ADAPTIVE]
     return DesignStudy(
         {choice.value: _curve(list(found.values())) for choice, found in compared.items()},
         sweeps,
@@ -160,12 +160,12 @@ def design_summary(trials: Mapping[str, DesignTrial], outcomes: Mapping[str, Des
         {
             choice.value: _noise_ratio(adaptive, found)
             for choice, found in compared.items()
-            if choice is not Choice.ADAPTIVE
+            if choice is not OrientationChoice.ADAPTIVE
         },
     )
 
 
-def _last(outcomes: Iterable[DesignOutcome]) -> list[Accuracy]:
+def _last(outcomes: Iterable[DesignOutcome]) -> list[RecordsAccuracy]:
     return [one.last for one in outcomes if one.last is not None]
 
 

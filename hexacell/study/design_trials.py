@@ -21,7 +21,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot, robot_of
-from hexacell.study.design_records import Choice, ChosenRecords, chosen_records
+from hexacell.study.design_records import ChosenRecords, OrientationChoice, chosen_records
 from hexacell.virtual_robot import random_robot
 
 RECORDS = 55
@@ -45,7 +45,7 @@ class DesignTrial:
     """
 
     number: int
-    choice: Choice = Choice.ADAPTIVE
+    choice: OrientationChoice = OrientationChoice.ADAPTIVE
     travel_mm: float = 5.0
     tilt_deg: float = 45.0
     noise_mm: float = 0.01
@@ -60,7 +60,7 @@ class DesignTrial:
 
 
 @dataclass(frozen=True, slots=True)
-class Accuracy:
+class RecordsAccuracy:
     """What some records tell of the robot.
 
     Attributes:
@@ -88,14 +88,14 @@ class DesignOutcome:
         efficiency: of the design, where it was wanted.
     """
 
-    accuracies: tuple[Accuracy, ...] = ()
+    accuracies: tuple[RecordsAccuracy, ...] = ()
     deviation_mm: float = 0.0
     outside: int = 0
     efficiency: DesignEfficiency | None = None
     reason: str = ""
 
     @property
-    def last(self) -> Accuracy | None:
+    def last(self) -> RecordsAccuracy | None:
         """With all records; none where there are none."""
         return self.accuracies[-1] if self.accuracies else None
 
@@ -133,10 +133,10 @@ def _identified(chosen: ChosenRecords, count: int) -> Identification | None:
         return None
 
 
-def _accuracy(cell: Cell, robot: Robot, found: Identification, truth: Geometry) -> Accuracy:
+def _accuracy(cell: Cell, robot: Robot, found: Identification, truth: Geometry) -> RecordsAccuracy:
     belief = robot.belief(found)
     error = Task.of(cell.settings, robot, belief).error(belief)
-    return Accuracy(
+    return RecordsAccuracy(
         found.records,
         found.geometry.largest_difference(truth),
         _noise_mm(found),

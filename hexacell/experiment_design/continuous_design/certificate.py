@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.experiment_design.continuous_design.measure import DesignMeasure, WhitenedRecords
+from hexacell.experiment_design.continuous_design.measure import DesignMeasure, PossibleRecords
 from hexacell.experiment_design.continuous_design.optimality import Optimality
 from hexacell.kinematics.rotations import Array
 
@@ -43,7 +43,7 @@ class Linearization:
         shares = tuple(point.share for point in design.points)
         return cls(information, factor, centres, total, fixed, shares)
 
-    def sensitivities(self, point: int, records: WhitenedRecords) -> Array:
+    def sensitivities(self, point: int, records: PossibleRecords) -> Array:
         """Of some records (n,) at a point, counted from 0."""
         return records.sensitivities(self.centres[point], self.factor)
 

@@ -29,7 +29,7 @@ from hexacell.kinematics.rotations import Array, Mask
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WhitenedRecords:
+class PossibleRecords:
     """Records (n) of a coordinates each.
 
     Attributes:
@@ -41,7 +41,7 @@ class WhitenedRecords:
     constants: int
 
     @classmethod
-    def of(cls, jacobian: Array, weights: Array) -> WhitenedRecords:
+    def of(cls, jacobian: Array, weights: Array) -> PossibleRecords:
         """Records of positions, each but for its point's constant.
 
         Args:
@@ -52,7 +52,7 @@ class WhitenedRecords:
         return cls(np.concatenate([factor, factor @ jacobian], axis=-1), jacobian.shape[1])
 
     @classmethod
-    def concatenate(cls, parts: Iterable[WhitenedRecords]) -> WhitenedRecords:
+    def concatenate(cls, parts: Iterable[PossibleRecords]) -> PossibleRecords:
         """All of them, of one point."""
         parts = list(parts)
         return cls(np.concatenate([part.rows for part in parts]), parts[0].constants)
@@ -60,8 +60,8 @@ class WhitenedRecords:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def __getitem__(self, rows: slice | Mask | NDArray[np.intp]) -> WhitenedRecords:
-        return WhitenedRecords(self.rows[rows], self.constants)
+    def __getitem__(self, rows: slice | Mask | NDArray[np.intp]) -> PossibleRecords:
+        return PossibleRecords(self.rows[rows], self.constants)
 
     def normal(self, weights: Array | None = None) -> Array:
         """Normal matrix (c + p, c + p) of the records, with weights (n,)."""
@@ -98,12 +98,12 @@ class PointMeasure:
         weights: how much it has of these (n,).
     """
 
-    fixed: WhitenedRecords
-    records: WhitenedRecords
+    fixed: PossibleRecords
+    records: PossibleRecords
     weights: Array
 
     @classmethod
-    def of_campaign(cls, records: WhitenedRecords, fixed: int) -> PointMeasure:
+    def of_campaign(cls, records: PossibleRecords, fixed: int) -> PointMeasure:
         """Of records as they were taken, of which the first ones are fixed."""
         return cls(records[:fixed], records[fixed:], np.ones(len(records) - fixed))
 
@@ -120,7 +120,7 @@ class PointMeasure:
         weights = self.weights[kept]
         return replace(self, records=self.records[kept], weights=weights * self.share / weights.sum())
 
-    def with_records(self, records: WhitenedRecords, part: float) -> PointMeasure:
+    def with_records(self, records: PossibleRecords, part: float) -> PointMeasure:
         """With more possible records, which take a part of all weight in equal shares.
 
         Those that it has already are left out, and all of them if it has fixed records only.
@@ -131,7 +131,7 @@ class PointMeasure:
         records = records[~is_known]
         added = np.full(len(records), part * self.share / max(1, len(records)))
         weights = np.concatenate([(1.0 - part) * self.weights, added]) if len(records) else self.weights
-        return replace(self, records=WhitenedRecords.concatenate([self.records, records]), weights=weights)
+        return replace(self, records=PossibleRecords.concatenate([self.records, records]), weights=weights)
 
     def information(self) -> tuple[Array, Array]:
         """The information M (p, p) on the parameters, and the centre K (c, p)."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.experiment_design.candidates import ReachableTargets, reachable_targets
-from hexacell.experiment_design.continuous_design.measure import WhitenedRecords
+from hexacell.experiment_design.continuous_design.measure import PossibleRecords
 from hexacell.experiment_design.predicted_records import GaugeZero, position_derivatives
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_weights
@@ -57,10 +57,10 @@ class PoseDomain:
         matches = (orientations[:, None] == found.poses.rotations[None]).all(axis=(-2, -1))
         return found, np.argmax(matches, axis=0)
 
-    def records(self, targets: ReachableTargets) -> WhitenedRecords:
+    def records(self, targets: ReachableTargets) -> PossibleRecords:
         """The records of some targets."""
         jacobian, by_joints = position_derivatives(self.belief, targets)
-        return WhitenedRecords.of(jacobian, record_weights(by_joints, self.belief.noise))
+        return PossibleRecords.of(jacobian, record_weights(by_joints, self.belief.noise))
 
     def _possible(self, orientations: Array) -> ReachableTargets:
         poses = PoseBatch.at(self.zero.reference, orientations)

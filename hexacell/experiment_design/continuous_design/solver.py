@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from hexacell.experiment_design.continuous_design.certificate import Linearization
-from hexacell.experiment_design.continuous_design.measure import DesignMeasure, WhitenedRecords
+from hexacell.experiment_design.continuous_design.measure import DesignMeasure, PossibleRecords
 from hexacell.experiment_design.continuous_design.optimality import Optimality
 from hexacell.experiment_design.continuous_design.weights import best_weights
 from hexacell.kinematics.rotations import Array
@@ -33,7 +33,7 @@ SHARE_OF_GAP = 0.3
 
 
 def best_measure(
-    start: DesignMeasure, possible: Sequence[WhitenedRecords], optimality: Optimality, gap: float
+    start: DesignMeasure, possible: Sequence[PossibleRecords], optimality: Optimality, gap: float
 ) -> tuple[DesignMeasure, float]:
     """The best measure on the start's records and each point's possible ones, and its certificate.
 
@@ -62,7 +62,7 @@ def weighted(design: DesignMeasure, optimality: Optimality, gap: float) -> Desig
     return replace(design, points=tuple(one.supported(SMALLEST_WEIGHT * gap) for one in design.points))
 
 
-def with_more(design: DesignMeasure, more: Sequence[WhitenedRecords]) -> DesignMeasure:
+def with_more(design: DesignMeasure, more: Sequence[PossibleRecords]) -> DesignMeasure:
     """The design with more records at each point, which have some of its weight."""
     both = zip(design.points, more, strict=True)
     return replace(design, points=tuple(one.with_records(records, ADDED_PART) for one, records in both))

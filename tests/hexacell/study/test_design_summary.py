@@ -11,17 +11,19 @@ from pydantic import TypeAdapter
 
 from hexacell.experiment_design.design_efficiency import DesignEfficiency, Efficiency
 from hexacell.presentation.design_study import design_document, design_lines, design_picture
-from hexacell.study.design_records import Choice
+from hexacell.study.design_records import OrientationChoice
 from hexacell.study.design_summary import SWEEPS, SWEPT, design_summary, design_trials_of
-from hexacell.study.design_trials import Accuracy, DesignOutcome, DesignTrial, run_design_trial
+from hexacell.study.design_trials import DesignOutcome, DesignTrial, RecordsAccuracy, run_design_trial
 
 
 def outcome(trial: DesignTrial) -> DesignOutcome:
     """Errors that grow with the robot's number, the noise, and the choice's place in the list."""
-    factor = 1 + list(Choice).index(trial.choice)
+    factor = 1 + list(OrientationChoice).index(trial.choice)
     error = factor * (trial.number + 1) * trial.noise_mm
     rated = DesignEfficiency(Efficiency(0.8, 0.97), Efficiency(0.5, 0.98)) if trial.rates else None
-    accuracies = tuple(Accuracy(11 * points, error, 0.1 * error, 0.01 * error) for points in (2, 3, 4, 5))
+    accuracies = tuple(
+        RecordsAccuracy(11 * points, error, 0.1 * error, 0.01 * error) for points in (2, 3, 4, 5)
+    )
     return DesignOutcome(accuracies, 4.0, 0, rated)
 
 
@@ -32,7 +34,7 @@ def study(robots: int):
 
 def test_each_figure_is_of_its_own_trials() -> None:
     found = study(3)
-    assert [one.tried for one in found.choices.values()] == [3] * len(Choice)
+    assert [one.tried for one in found.choices.values()] == [3] * len(OrientationChoice)
     adaptive = found.choices["adaptive"].by_records
     assert list(adaptive) == [22, 33, 44, 55]
     assert adaptive[55].largest_mm == pytest.approx(0.02)
@@ -48,7 +50,7 @@ def test_each_figure_is_of_its_own_trials() -> None:
 def test_sweeps_have_fewer_robots_and_none_is_calibrated_twice() -> None:
     trials = design_trials_of(SWEPT + 5)
     values = sum(len(values) for _, values in SWEEPS.values())
-    assert len(trials) == len(Choice) * (SWEPT + 5) + SWEPT * (values - len(SWEEPS))
+    assert len(trials) == len(OrientationChoice) * (SWEPT + 5) + SWEPT * (values - len(SWEEPS))
     assert {one.key for one in trials.values()} == set(trials)
 
 
@@ -58,7 +60,7 @@ def test_robots_that_are_not_identified_are_counted() -> None:
     outcomes |= {
         key: DesignOutcome(reason="out of reach")
         for key, one in trials.items()
-        if one.number == 1 or one.choice is Choice.PAPER
+        if one.number == 1 or one.choice is OrientationChoice.PAPER
     }
     found = design_summary(trials, outcomes)
     assert (found.choices["random"].tried, found.choices["random"].by_records[55].robots) == (2, 1)
@@ -87,9 +89,12 @@ def test_outcomes_are_kept_as_json_and_come_back() -> None:
 def test_chosen_orientations_tell_more_than_random_ones_of_the_same_travel() -> None:
     """One robot, three points; the trial is the same whenever it is made."""
     usual = DesignTrial(0, points=3)
-    chosen, random = run_design_trial(usual), run_design_trial(replace(usual, choice=Choice.RANDOM))
+    chosen, random = (
+        run_design_trial(usual),
+        run_design_trial(replace(usual, choice=OrientationChoice.RANDOM)),
+    )
     assert chosen.last is not None
     assert random.last is not None
     assert chosen.last.sigma_mm < 0.5 * random.last.sigma_mm
     assert max(chosen.deviation_mm, random.deviation_mm) <= usual.travel_mm
-    assert run_design_trial(replace(usual, choice=Choice.RANDOM)) == random
+    assert run_design_trial(replace(usual, choice=OrientationChoice.RANDOM)) == random

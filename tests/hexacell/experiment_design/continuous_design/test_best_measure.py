@@ -17,7 +17,7 @@ from hexacell.experiment_design.continuous_design.certificate import Linearizati
 from hexacell.experiment_design.continuous_design.measure import (
     DesignMeasure,
     PointMeasure,
-    WhitenedRecords,
+    PossibleRecords,
 )
 from hexacell.experiment_design.continuous_design.optimality import DOptimality, IOptimality
 from hexacell.experiment_design.continuous_design.solver import best_measure
@@ -26,13 +26,13 @@ GRID = np.unique(np.concatenate([np.linspace(-1.0, 1.0, 201), [-np.sqrt(0.2), np
 GAP = 1e-4
 
 
-def polynomial(degree: int, constants: int) -> WhitenedRecords:
-    return WhitenedRecords(
+def polynomial(degree: int, constants: int) -> PossibleRecords:
+    return PossibleRecords(
         np.stack([GRID**power for power in range(degree + 1)], axis=-1)[:, None], constants
     )
 
 
-def evenly(records: WhitenedRecords, share: float = 1.0) -> PointMeasure:
+def evenly(records: PossibleRecords, share: float = 1.0) -> PointMeasure:
     """On every tenth record."""
     some = records[::10]
     return PointMeasure(records[:0], some, np.full(len(some), share / len(some)))
@@ -77,13 +77,13 @@ def test_the_i_optimal_design_of_a_parabola_is_the_known_one():
     assert list(found.values()) == pytest.approx([0.25, 0.5, 0.25], abs=0.01)
 
 
-def cases(seed: int) -> tuple[DesignMeasure, list[WhitenedRecords], list[int]]:
+def cases(seed: int) -> tuple[DesignMeasure, list[PossibleRecords], list[int]]:
     """Two points of records with unequal noise, three coordinates and four parameters."""
     random = np.random.default_rng(seed)
     jacobians = [random.standard_normal((12, 3, 4)) for _ in range(2)]
     factors = [np.eye(3) + 0.4 * random.standard_normal((12, 3, 3)) for _ in range(2)]
     possible = [
-        WhitenedRecords.of(jacobian, np.swapaxes(factor, -1, -2) @ factor)
+        PossibleRecords.of(jacobian, np.swapaxes(factor, -1, -2) @ factor)
         for jacobian, factor in zip(jacobians, factors, strict=True)
     ]
     counts = [3, 5]
@@ -117,7 +117,7 @@ def test_information_is_that_with_the_constants_as_unknowns():
 def test_information_of_equal_weights_is_that_of_all_pairs():
     """Eq. 5-8 of Abtahi et al. 2010, each pair with 1/k of the weight."""
     jacobian = np.random.default_rng(4).standard_normal((6, 3, 4))
-    records = WhitenedRecords.of(jacobian, np.broadcast_to(np.eye(3), (6, 3, 3)))
+    records = PossibleRecords.of(jacobian, np.broadcast_to(np.eye(3), (6, 3, 3)))
     found = PointMeasure.of_campaign(records, 1).information()[0]
     pairs = [jacobian[first] - jacobian[second] for first in range(6) for second in range(first)]
     np.testing.assert_allclose(found, sum(pair.T @ pair for pair in pairs) / 6.0, rtol=1e-9)

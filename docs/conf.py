@@ -30,6 +30,7 @@ myst_enable_extensions = ["dollarmath"]
 myst_fence_as_directive = ["math"]  # as GitHub has them
 myst_heading_anchors = 4
 
+napoleon_use_ivar = True
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 python_use_unqualified_type_names = True
@@ -43,7 +44,7 @@ nitpick_ignore_regex = [  # only what a page documents can be linked to
 html_theme = "alabaster"
 html_theme_options = {
     "description": "A 6-DOF parallel robot made accurate with three dial gauges and a ball",
-    "page_width": "76rem",
+    "page_width": "74rem",
     "body_max_width": "none",
     "sidebar_width": "17rem",
     "fixed_sidebar": True,

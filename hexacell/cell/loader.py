@@ -53,7 +53,7 @@ class Cell:
 
     @property
     def text_without_secrets(self) -> str:
-        """The same with every password masked: what is kept with a run."""
+        """The same with every password masked, as it is kept with a run."""
         return without_secrets(self.text)
 
     @property

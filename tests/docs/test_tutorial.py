@@ -1,4 +1,4 @@
-"""The tutorial's commands, typed as written, end as it says and print what it shows."""
+"""The commands of tutorial and how-tos, typed as written, end as these say and print what they show."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -38,7 +38,7 @@ def blocks_of(page: Path) -> list[Block]:
         if kind == "text":
             passages = re.split(rf"^{re.escape(OMITTED)}$", text, flags=re.MULTILINE)
             shown = tuple(line for passage in passages for line in passage.strip().splitlines())
-            found[-1] = Block(found[-1].commands, found[-1].fails, shown)
+            found[-1] = replace(found[-1], shown=shown)
         else:
             found.append(Block(tuple(text.splitlines()), kind.endswith("fails")))
     return found
@@ -107,8 +107,9 @@ def test_it_begins_as_written(source):
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-def test_every_command_works_as_written(source):
-    check(TUTORIAL, source)
+@pytest.mark.parametrize("page", ["tutorial.md", "howto-mock-cell.md"])
+def test_every_command_works_as_written(source, page):
+    check(blocks_of(ROOT / "docs" / page), source)
 
 
 def test_a_line_that_is_not_printed_is_missed():

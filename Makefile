@@ -36,6 +36,11 @@ bench:
 	@.ci/venv "$(PYTHON)" bench
 	$(RUN) pytest tests/benchmarks -s --timeout=0 $(ARGS)
 
+# Other methods and libraries on the same robots: a table, and build/peers.json. ARGS="--robots 100" for more.
+bench-peers:
+	@.ci/venv "$(PYTHON)" peers
+	$(RUN) tests.benchmarks.peers $(ARGS)
+
 # One LinuxCNC a machine, in real time; ARGS="-m linuxcnc" for all faults, an hour. docs/linuxcnc.md says how
 # it is installed.
 test-linuxcnc: venv

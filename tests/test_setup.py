@@ -98,11 +98,14 @@ def settled(newcomer: Newcomer) -> Newcomer:
     return newcomer
 
 
-def test_the_bench_target_installs_its_requirements_once(settled: Newcomer) -> None:
-    settled.make("bench")
-    peers = "-m pip install --quiet --constraint constraints.txt --no-build-isolation --editable .[bench]"
-    assert settled.installations() == [peers]
-    settled.make("bench")
+@pytest.mark.parametrize(("target", "extra"), [("bench", "bench"), ("bench-peers", "peers")])
+def test_a_bench_target_installs_its_requirements_once(settled: Newcomer, target: str, extra: str) -> None:
+    settled.make(target)
+    added = (
+        f"-m pip install --quiet --constraint constraints.txt --no-build-isolation --editable .[{extra}]"
+    )
+    assert settled.installations() == [added]
+    settled.make(target)
     assert settled.installations() == []
 
 

@@ -33,8 +33,8 @@ did not count, the minutes of a forecast knew no durations of moves, and command
 controller got a provisional geometry too. In version 10 a pass kept U from its limit where the cell file
 said nothing else, and now keeps 1.5 U. So a run of them was decided by other rules.
 Up to 12 a record was the plain mean of its readings; neither limits of the controller's files nor settings
-and ports of devices were kept. Up to 13 the encoders were read after the gauges, and no skew was kept. Up to
-14 lines were checked in the convention's frames, and candidates were examined in other batches."""
+and ports of devices were kept. Up to 13 the encoders were read after the gauges, and no skew was kept. Up
+to 14 lines were checked in the convention's frames, and candidates were examined in other batches."""
 
 RULES_SINCE = 15
 """The version since which runs are decided by the present rules; older ones are not resumed."""

@@ -15,6 +15,7 @@ from hexacell.campaign import feasibility
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
+from hexacell.experiment_design.continuous_design import pose_bound
 from procedures.calibration import measuring, workflow
 from procedures.run import events
 
@@ -57,10 +58,16 @@ def changed(section: Any, changes: dict[str, Any]) -> Any:
 
 
 def choose_among_few(patch: pytest.MonkeyPatch) -> None:
-    """Choose among few poses, and move there in few pieces: what is chosen is not under test."""
+    """Choose among few poses, and move there in few pieces: what is chosen is not under test.
+
+    Nor is how near to the best it is: its bound is one of a rough search.
+    """
     patch.setattr(workflow, "CANDIDATES", 64)
     patch.setattr(measuring, "HELD_OUT_CANDIDATES", 128)
     patch.setattr(robot, "LINE_STEPS", 8)
+    patch.setattr(pose_bound, "SPREAD", 64)
+    patch.setattr(pose_bound, "CLIMBING", 4)
+    patch.setattr(pose_bound, "MOST_CLIMBS", 2)
 
 
 @contextmanager

@@ -33,8 +33,12 @@ from procedures.run.commands import Command
 READY = b"ready\n"
 """What a host writes to its stdout when it listens; else it writes why it does not, as a message."""
 
-LEAVE_S = 0.4
-"""How long leaving waits for a run that is to be stopped, s."""
+STOP_S = 0.4
+"""How long leaving waits for the end of a run that is to be stopped, s."""
+
+LET_GO_S = 5.0
+"""How long leaving waits until the run has heard that it is to go on, s. Whoever hangs up before may be
+taken for lost, because what is still unread goes with the connection, and the run pauses."""
 
 LOST = HostFailed(
     problem="the connection to the run is lost: its process was killed, or let this terminal go",
@@ -80,13 +84,11 @@ class HostConnection:
         await self._send(TakeControl())
 
     async def leave(self, *, keep_running: bool) -> None:
-        """See :meth:`RunConnection.leave`; of a run that ends, its end is awaited for a moment."""
+        """See :meth:`RunConnection.leave`; the run hangs up when it has heard, or when it has ended."""
         self._is_left = True
-        with suppress(HexacellError):
+        with suppress(HexacellError, TimeoutError):
             await self._send(Leave(keep_running=keep_running))
-            if not keep_running:
-                with suppress(TimeoutError):
-                    await asyncio.wait_for(self._until_gone(), LEAVE_S)
+            await asyncio.wait_for(self._until_gone(), LET_GO_S if keep_running else STOP_S)
         self._writer.close()
 
     async def _send(self, message: ClientMessage) -> None:

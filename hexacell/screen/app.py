@@ -37,8 +37,8 @@ from hexacell.screen.themes import SCREEN_THEMES
 from hexacell.screen.widgets.key_line import KeyLine
 
 DRAWN_EVERY_S = 0.1
-LEAVING_TAKES_S = 0.4
-"""The host is told that one leaves; it is not waited for longer."""
+LEAVING_TAKES_S = 6.0
+"""The host is told that one leaves, and answers; nothing is waited for longer."""
 
 SCREENS: tuple[type[TabScreen], ...] = (
     CellScreen,

@@ -37,8 +37,8 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Record, deviation_of, joints_of
-from hexacell.motion.path_check import stands_clear
 from hexacell.motion.paths import find_route
+from hexacell.motion.standing import stands_within_limits
 from hexacell.robot_model import Robot
 
 CANDIDATES = 1024
@@ -224,7 +224,7 @@ class Plan:
     def _between_points(self, state: CampaignState) -> Decision:
         if reason := self._stopping.end_of_campaign(state):
             return Finished(reason)
-        safe = [point for point in self.points if point not in state.done and self._is_safe(state, point)]
+        safe = self._safe(state, [point for point in self.points if point not in state.done])
         if not safe:
             return Finished("none of the remaining points can be reached safely")
         worthwhile = self._worthwhile(state, self._reachable(state, safe) or safe)
@@ -280,31 +280,27 @@ class Plan:
         return last[0][1]
 
     def _find_out_of_reach(self, state: CampaignState) -> frozenset[int]:
-        others = {point for point in self.points if point not in state.done and point != state.point}
-        unsafe = {point for point in others if not self._is_safe(state, point)}
+        others = [point for point in self.points if point not in state.done and point != state.point]
+        safe = self._safe(state, others)
+        unsafe = [point for point in others if point not in safe]
         if unsafe == others:
             return frozenset(unsafe)
-        return frozenset(point for point in unsafe if not self._is_safe(state, point, certainly=False))
+        return frozenset(unsafe) - frozenset(self._safe(state, unsafe, certainly=False))
 
-    def _is_safe(self, state: CampaignState, point: int, *, certainly: bool = True) -> bool:
-        """Whether the robot, as it is known by now, takes a point's reference within the limits.
+    def _safe(self, state: CampaignState, points: list[int], *, certainly: bool = True) -> list[int]:
+        """Those of some points whose reference the robot, as it is known by now, takes within the limits.
 
         ``certainly``: or only as the estimate has it.
         """
-        if not len(state.measurements):
-            return True  # by the drawing it does, as preflight has checked
-        reference = self.robot.from_commands([self.reference_pose(point)])
+        if not points or not len(state.measurements):
+            return points  # by the drawing it does, as preflight has checked
         try:
             belief = self.estimate(state).belief
         except IdentifiabilityError:
-            return True  # the identification reports what is wrong with the records
-        actual = belief.commanded.actual_poses(reference)
-        if not actual.found[0]:
-            return False
-        wanted = belief.margins_at(actual) if certainly else None
-        if not belief.keeps_limits(actual.poses, actual.joints, wanted)[0]:
-            return False
-        return stands_clear(belief, reference, actual)
+            return points  # the identification reports what is wrong with the records
+        references = self.robot.from_commands(map(self.reference_pose, points))
+        stands = stands_within_limits(belief, references, certainly=certainly)
+        return [point for point, is_safe in zip(points, stands, strict=True) if is_safe]
 
     def _reachable(self, state: CampaignState, points: list[int]) -> list[int]:
         """Those of some points to which clear lines lead from the present pose; all where that is unknown.

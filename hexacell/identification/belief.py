@@ -82,8 +82,7 @@ class RobotBelief:
 
     def orientation_sigma_from(self, sensitivity: Sensitivity) -> float:
         """The same from the sensitivity there."""
-        rotation = sensitivity.parameters[0, 3:] @ self.basis
-        return float(np.sqrt(np.einsum("ip,pq,iq->i", rotation, self.covariance, rotation).max()))
+        return float(self._orientation_sigmas(sensitivity.parameters[:1])[0])
 
     @cached_property
     def least_margins(self) -> Array:
@@ -97,24 +96,42 @@ class RobotBelief:
         return self.limits.legs.margins_for(turn, float(self.mechanism.platform_radius(self.estimate)))
 
     def margins_at(self, at: ActualPoses) -> Array:
-        """What they are to have left (m,) where the robot goes without a record, from the first of n poses.
+        """What they are to have left (n, m) where the robot goes without a record, from each of n poses.
 
         ``SPARE_SIGMAS`` of what is not known of them there. While the orientation is uncertain nothing of
         use would be left; the robot then goes only where robots drawn within the tolerances were tried.
         """
-        poses, joints = at.poses[:1], at.joints[:1]
-        sensitivity = pose_sensitivity(self.mechanism, self.estimate, poses, joints)
-        if self.orientation_sigma_from(sensitivity) > UNCERTAIN_SIGMA:
-            return self.least_margins
-        changes = np.vstack([np.zeros(len(self.basis)), self._principal_changes])
-        rows = np.zeros(len(changes), dtype=int)
-        robots = GeometryBatch(self.mechanism.parameters, self.estimate.vector + changes)
-        moved = apply_twist(poses[rows], changes @ sensitivity.parameters[0].T)
-        margins = self.limits.leg_margins(self.mechanism, robots, moved, joints[rows])
-        sigma: Array = np.linalg.norm(margins[1:] - margins[0], axis=0)
-        return self.least_margins + SPARE_SIGMAS * sigma
+        if self.limits.legs is None:
+            return np.zeros((len(at.joints), 0))
+        sensitivity = pose_sensitivity(self.mechanism, self.estimate, at.poses, at.joints)
+        margins = np.tile(self.least_margins, (len(at.joints), 1))
+        known = np.flatnonzero(self._orientation_sigmas(sensitivity.parameters) <= UNCERTAIN_SIGMA)
+        if len(known):
+            margins[known] += SPARE_SIGMAS * self._margin_sigmas(at.at(known), sensitivity[known])
+        return margins
 
-    @property
+    def _margin_sigmas(self, at: ActualPoses, sensitivity: Sensitivity) -> Array:
+        """Standard deviations (n, m) of the margins of passive joints and legs at n poses."""
+        changes = np.vstack([np.zeros(len(self.basis)), self._principal_changes])
+        count, every = len(at.joints), len(changes)
+        rows = np.arange(count).repeat(every)
+        robots = GeometryBatch(
+            self.mechanism.parameters, np.tile(self.estimate.vector + changes, (count, 1))
+        )
+        steps = changes @ np.swapaxes(sensitivity.parameters, -1, -2)
+        moved = apply_twist(at.poses[rows], steps.reshape(-1, 6))
+        margins = self.limits.leg_margins(self.mechanism, robots, moved, at.joints[rows])
+        margins = margins.reshape(count, every, -1)
+        sigmas: Array = np.linalg.norm(margins[:, 1:] - margins[:, :1], axis=1)
+        return sigmas
+
+    def _orientation_sigmas(self, by_parameters: Array) -> Array:
+        """:meth:`orientation_sigma` at n poses with the derivatives (n, 6, P)."""
+        rotation = by_parameters[:, 3:] @ self.basis
+        sigmas: Array = np.sqrt(((rotation @ self.covariance) * rotation).sum(axis=-1).max(axis=-1))
+        return sigmas
+
+    @cached_property
     def _principal_changes(self) -> Array:
         """(p, P): one standard deviation along each principal axis of the parameters' distribution, mm."""
         variances, axes = np.linalg.eigh(self.covariance)

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexacell.kinematics.forward import ForwardResult, continue_solution
 from hexacell.kinematics.geometry import Geometry
@@ -45,6 +46,10 @@ class ActualPoses:
     poses: PoseBatch
     joints: Array
     found: Mask
+
+    def at(self, rows: NDArray[np.intp]) -> ActualPoses:
+        """Some of them."""
+        return ActualPoses(self.poses[rows], self.joints[rows], self.found[rows])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

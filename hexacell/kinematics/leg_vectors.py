@@ -29,6 +29,12 @@ def by_pose(b: Array, n: Array) -> Array:
     return jacobian
 
 
+def mean_radius(platform_joints: Array) -> Array:
+    """Mean distance (...,), mm, of the platform joints (..., 6, 3) from the ball."""
+    radius: Array = np.sqrt(np.einsum("...i,...i->...", platform_joints, platform_joints)).mean(axis=-1)
+    return radius
+
+
 def axes_through(first: Array, second: Array, third: Array, part: str) -> Array:
     """The axes (3, 3), in rows, that three joints of a ``part`` fix.
 

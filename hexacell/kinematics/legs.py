@@ -46,7 +46,7 @@ class Legs:
     def directions(self) -> Array:
         """Unit vectors (n, 6, 3) from the platform to the base, in the base frame."""
         vectors = self.base_joints - self.platform_joints
-        directions: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+        directions: Array = vectors / np.sqrt(_dot(vectors, vectors))[..., None]
         return directions
 
     @property

@@ -23,13 +23,20 @@ _IDENTITY = np.eye(3)
 def from_angles(angles: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) of the angles a, b, c (..., 3), rad."""
     angles = np.asarray(angles, dtype=float)
-    (ca, cb, cc), (sa, sb, sc) = np.moveaxis(np.cos(angles), -1, 0), np.moveaxis(np.sin(angles), -1, 0)
-    rows = [
-        [cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa],
-        [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa],
-        [-sb, cb * sa, cb * ca],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    cosines, sines = np.cos(angles), np.sin(angles)
+    ca, cb, cc = cosines[..., 0], cosines[..., 1], cosines[..., 2]
+    sa, sb, sc = sines[..., 0], sines[..., 1], sines[..., 2]
+    rotation = np.empty((*angles.shape, 3))
+    rotation[..., 0, 0] = cc * cb
+    rotation[..., 0, 1] = cc * sb * sa - sc * ca
+    rotation[..., 0, 2] = cc * sb * ca + sc * sa
+    rotation[..., 1, 0] = sc * cb
+    rotation[..., 1, 1] = sc * sb * sa + cc * ca
+    rotation[..., 1, 2] = sc * sb * ca - cc * sa
+    rotation[..., 2, 0] = -sb
+    rotation[..., 2, 1] = cb * sa
+    rotation[..., 2, 2] = cb * ca
+    return rotation
 
 
 def to_angles(rotation: ArrayLike) -> Array:
@@ -41,7 +48,9 @@ def to_angles(rotation: ArrayLike) -> Array:
     # The rotation c is removed first: near b = +-pi/2 it is ill determined, and its error must not enter a.
     sine, cosine = np.sin(c), np.cos(c)
     a = np.arctan2(sine * r[..., 0, 2] - cosine * r[..., 1, 2], cosine * r[..., 1, 1] - sine * r[..., 0, 1])
-    return np.stack([a, b, c], axis=-1)
+    angles = np.empty(r.shape[:-1])
+    angles[..., 0], angles[..., 1], angles[..., 2] = a, b, c
+    return angles
 
 
 def skew(vector: ArrayLike) -> Array:

@@ -17,6 +17,9 @@ from hexacell.kinematics.rotations import Array, Mask
 ROUNDING = 1e-9
 """Of an angle, rad, or a length, mm: a pose at a limit is within it."""
 
+_NO_TURNS = np.tile(np.eye(3), (1, 6, 1, 1))
+"""Carriers that do not turn."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LegLimits:
@@ -42,7 +45,9 @@ class LegLimits:
         """Angles (n, 2, 6), rad, that passive joints have left, at the base and at the platform."""
         at_base = self.base_cones - angles_between(legs.directions_in_carriers, self.base_axes)
         at_platform = self.platform_cones - angles_between(legs.directions_in_platform, self.platform_axes)
-        return np.stack([at_base, at_platform], axis=-2)
+        spare = np.empty((len(at_base), 2, 6))
+        spare[:, 0], spare[:, 1] = at_base, at_platform
+        return spare
 
     def margins(self, legs: Legs) -> Array:
         """By how much n poses keep these limits, (n, m), negative beyond them.
@@ -76,7 +81,7 @@ class LegLimits:
         from hexacell.kinematics.compiled.leg_margins import keeps  # noqa: PLC0415
 
         kept = np.empty(len(legs.rotations), dtype=bool)
-        carriers = np.tile(np.eye(3), (1, 6, 1, 1)) if legs.carriers is None else legs.carriers
+        carriers = _NO_TURNS if legs.carriers is None else legs.carriers
         distance = self.distance_mm + least[12] if self.distance_mm != 0.0 else 0.0
         keeps(
             _own(legs.base_joints),

@@ -20,7 +20,7 @@ from hexacell.kinematics.commanded_motion import ActualPoses
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import has_singularity_margin, margin_and_mode
+from hexacell.kinematics.sensitivity import margin_and_mode
 from hexacell.motion.trajectory import interpolate_lines, trace_path
 
 MARGIN_SHARE = 0.7
@@ -39,19 +39,6 @@ def ball_position(belief: RobotBelief, command: PoseBatch) -> Array | None:
 def is_clear(belief: RobotBelief, start: PoseBatch, end: PoseBatch, reference: Array | None = None) -> bool:
     """Whether the line between two commands (1 each) keeps the limits; see :class:`LinesFrom`."""
     return bool(LinesFrom(belief, start, reference).check(end).is_clear[0])
-
-
-def stands_clear(belief: RobotBelief, command: PoseBatch, actual: ActualPoses) -> bool:
-    """Whether a robot that stands at a command (1), there ``actual``, is clear of singularities.
-
-    It is what :func:`is_clear` says of the line from a command to itself: other limits it may be beyond.
-    """
-    geometries = (belief.controller, command), (belief.estimate, actual.poses)
-    least = MARGIN_SHARE * belief.limits.singularity_margin
-    return bool(actual.found[0]) and all(
-        has_singularity_margin(belief.mechanism, geometry, poses, actual.joints, least)[0]
-        for geometry, poses in geometries
-    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,7 +155,7 @@ class LinesFrom:
         """Of passive joints and legs. With gauges at the ball whoever chooses a record checks more."""
         if self.reference is not None or not self._actual_start.found[0]:
             return self.belief.least_margins
-        return self.belief.margins_at(self._actual_start)
+        return np.asarray(self.belief.margins_at(self._actual_start)[0])
 
     @cached_property
     def _actual_start(self) -> ActualPoses:

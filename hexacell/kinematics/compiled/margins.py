@@ -29,7 +29,7 @@ def margins_and_modes(
 
     ``radii`` (n,) or (1,) scale rotations; arrays of the closure have n rows, or one for all.
     """
-    error, jacobian, inverse = np.empty(6), np.empty((6, 6)), np.empty((6, 6))
+    error, jacobian, system = np.empty(6), np.empty((6, 6)), np.empty((6, 12))
     for row in range(len(positions)):
         constraints(
             base[row if len(base) > 1 else 0],
@@ -41,13 +41,21 @@ def margins_and_modes(
             error,
             jacobian,
         )
-        jacobian[:, 3:] /= radii[row if len(radii) > 1 else 0]
-        inverse[:] = 0.0
-        for axis in range(6):
-            inverse[axis, axis] = 1.0
-        determinant = eliminate(jacobian, inverse)
+        _beside_identity(jacobian, radii[row if len(radii) > 1 else 0], system)
+        determinant = eliminate(system)
         modes[row] = np.sign(determinant)
-        decided[row] = _decide(inverse, margin) if determinant != 0.0 else UNDECIDED
+        decided[row] = _decide(system[:, 6:], margin) if determinant != 0.0 else UNDECIDED
+
+
+@compiled
+def _beside_identity(jacobian: Array, radius: float, system: Array) -> None:
+    """Fill ``system`` (6, 12): the dimensionless Jacobian, and the identity, which becomes its inverse."""
+    for leg in range(6):
+        for axis in range(3):
+            system[leg, axis] = jacobian[leg, axis]
+            system[leg, 3 + axis] = jacobian[leg, 3 + axis] / radius
+        for axis in range(6):
+            system[leg, 6 + axis] = 1.0 if axis == leg else 0.0
 
 
 @compiled
@@ -62,7 +70,8 @@ def _decide(inverse: Array, margin: float) -> int:
         return ABOVE
     if not bound <= np.sqrt(6.0):
         return BELOW
-    gramian = inverse @ inverse.T
+    own = np.ascontiguousarray(inverse)
+    gramian = own @ own.T
     squared = gramian @ gramian
     bound = np.sum(squared * squared) ** 0.125 * margin
     if bound <= 1.0:

@@ -19,57 +19,56 @@ def compiled(function: FunctionType) -> FunctionType:
 
 
 @compiled
-def exchange(rows: Array, one: int, other: int) -> None:
-    """Exchange two rows of a matrix."""
-    for column in range(rows.shape[1]):
+def _exchange(rows: Array, one: int, other: int, first: int) -> None:
+    """Exchange two rows of a matrix from a column on."""
+    for column in range(first, rows.shape[1]):
         kept = rows[one, column]
         rows[one, column] = rows[other, column]
         rows[other, column] = kept
 
 
 @compiled
-def subtract(rows: Array, factor: float, one: int, other: int) -> None:
-    """Subtract a multiple of one row of a matrix from another."""
-    for column in range(rows.shape[1]):
-        rows[other, column] -= factor * rows[one, column]
-
-
-@compiled
 def _largest_below(matrix: Array, pivot: int) -> int:
     """The row of the largest entry of a column, from its diagonal downward."""
     largest = pivot
-    for row in range(pivot + 1, len(matrix)):
+    for row in range(pivot + 1, 6):
         if abs(matrix[row, pivot]) > abs(matrix[largest, pivot]):
             largest = row
     return largest
 
 
 @compiled
-def eliminate(matrix: Array, right: Array) -> float:
-    """Solve in place ``matrix`` (n, n) for all columns of ``right`` (n, m); returns the determinant.
+def _substitute(system: Array) -> None:
+    """Solve in place where elimination has left an upper triangle."""
+    for row in range(5, -1, -1):
+        for column in range(6, system.shape[1]):
+            rest = system[row, column]
+            for other in range(row + 1, 6):
+                rest -= system[row, other] * system[other, column]
+            system[row, column] = rest / system[row, row]
 
-    Where it is 0 the right side is meaningless.
+
+@compiled
+def eliminate(system: Array) -> float:
+    """Solve in place six equations for m right sides, ``system`` (6, 6 + m); returns the determinant.
+
+    The solutions are where the right sides were; they are meaningless where the determinant is 0.
     """
-    size = len(matrix)
     determinant = 1.0
-    for pivot in range(size):
-        largest = _largest_below(matrix, pivot)
-        if matrix[largest, pivot] == 0.0:
+    for pivot in range(6):
+        largest = _largest_below(system, pivot)
+        if system[largest, pivot] == 0.0:
             return 0.0
         if largest != pivot:
             determinant = -determinant
-            exchange(matrix, pivot, largest)
-            exchange(right, pivot, largest)
-        determinant *= matrix[pivot, pivot]
-        for row in range(pivot + 1, size):
-            factor = matrix[row, pivot] / matrix[pivot, pivot]
-            subtract(matrix, factor, pivot, row)
-            subtract(right, factor, pivot, row)
-    for row in range(size - 1, -1, -1):
-        for other in range(row + 1, size):
-            subtract(right, matrix[row, other], other, row)
-        for column in range(right.shape[1]):
-            right[row, column] /= matrix[row, row]
+            _exchange(system, pivot, largest, pivot)
+        determinant *= system[pivot, pivot]
+        inverse = 1.0 / system[pivot, pivot]
+        for row in range(pivot + 1, 6):
+            factor = system[row, pivot] * inverse
+            for column in range(pivot + 1, system.shape[1]):
+                system[row, column] -= factor * system[pivot, column]
+    _substitute(system)
     return determinant
 
 

@@ -30,8 +30,7 @@ def newton(
     ``modes`` (n,) are those required; 0 for that of the start. Arrays of the closure have n rows, or one
     for all. Returns false if an exactly singular Jacobian was met, where the result is not complete.
     """
-    error, jacobian, factors = np.empty(6), np.empty((6, 6)), np.empty((6, 6))
-    step = np.empty((6, 1))
+    error, jacobian, system, step = np.empty(6), np.empty((6, 6)), np.empty((6, 7)), np.empty(6)
     for row in range(len(positions)):
         own_base = base[row if len(base) > 1 else 0]
         own_platform = platform[row if len(platform) > 1 else 0]
@@ -42,35 +41,48 @@ def newton(
         )
         mode, contracts, first = modes[row], True, np.inf
         if mode == 0.0:
-            mode = _mode(jacobian, factors, step)
+            mode = _mode(jacobian, system)
         for taken in range(max_steps):
             if not largest >= tolerance:
                 break
-            factors[:] = jacobian
-            for leg in range(6):
-                step[leg, 0] = -error[leg]
-            if eliminate(factors, step) == 0.0:
+            if _solve(jacobian, error, system, step) == 0.0:
                 return False
-            size = _shorten(step[:, 0], largest_translation, largest_rotation)
+            size = _shorten(step, largest_translation, largest_rotation)
             if largest_contraction < np.inf and taken < 2:
                 contracts = contracts and size <= (1.0 if taken == 0 else largest_contraction * first)
                 first = size
             for axis in range(3):
-                position[axis] += step[axis, 0]
-            turn(rotation, step[3:, 0])
+                position[axis] += step[axis]
+            turn(rotation, step[3:])
             largest = constraints(
                 own_base, own_platform, own_lengths, is_quadratic, position, rotation, error, jacobian
             )
         if largest < tolerance:
-            found[row] = contracts and _mode(jacobian, factors, step) == mode
+            found[row] = contracts and _mode(jacobian, system) == mode
     return True
 
 
 @compiled
-def _mode(jacobian: Array, factors: Array, right: Array) -> float:
-    """The sign of the determinant; overwrites ``factors`` (6, 6) and ``right`` (6, m)."""
-    factors[:] = jacobian
-    return float(np.sign(eliminate(factors, right)))
+def _solve(jacobian: Array, error: Array, system: Array, step: Array) -> float:
+    """Fill the Newton ``step`` (6,); returns the determinant. Overwrites ``system`` (6, 7)."""
+    for leg in range(6):
+        for axis in range(6):
+            system[leg, axis] = jacobian[leg, axis]
+        system[leg, 6] = -error[leg]
+    determinant = eliminate(system)
+    for axis in range(6):
+        step[axis] = system[axis, 6]
+    return float(determinant)
+
+
+@compiled
+def _mode(jacobian: Array, system: Array) -> float:
+    """The sign of the determinant; overwrites ``system`` (6, 7)."""
+    for leg in range(6):
+        for axis in range(6):
+            system[leg, axis] = jacobian[leg, axis]
+        system[leg, 6] = 0.0
+    return float(np.sign(eliminate(system)))
 
 
 @compiled

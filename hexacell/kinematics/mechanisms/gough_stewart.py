@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.leg_closure import LegClosure
-from hexacell.kinematics.leg_vectors import axes_through, by_pose
+from hexacell.kinematics.leg_vectors import axes_through, by_pose, mean_radius
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
     Branch,
@@ -153,8 +153,7 @@ class GoughStewart:
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        radius: Array = np.mean(np.linalg.norm(geometry["platform"], axis=-1), axis=-1)
-        return radius
+        return mean_radius(geometry["platform"])
 
 
 def gough_stewart_geometry(base: ArrayLike, platform: ArrayLike, offset: ArrayLike) -> Geometry:

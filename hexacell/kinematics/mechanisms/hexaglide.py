@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.leg_closure import LegClosure
-from hexacell.kinematics.leg_vectors import CLOSEST_JOINTS_MM, axes_through, by_pose
+from hexacell.kinematics.leg_vectors import CLOSEST_JOINTS_MM, axes_through, by_pose, mean_radius
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
     Branch,
@@ -90,7 +90,8 @@ class Hexaglide:
 
     def leg_closure(self, geometry: Geometry | GeometryBatch, joints: Array) -> LegClosure | None:
         """See :class:`~hexacell.kinematics.leg_closure.HasLegClosure`."""
-        at_sliders = np.array(np.broadcast_to(geometry["S"], (*joints.shape, 3)))
+        at_sliders = np.empty((*joints.shape, 3))
+        at_sliders[:] = geometry["S"]
         at_sliders[..., 0] += joints
         return LegClosure(at_sliders, geometry["B"], geometry["l"], is_quadratic=True)
 
@@ -157,8 +158,7 @@ class Hexaglide:
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        radius: Array = np.mean(np.linalg.norm(geometry["B"], axis=-1), axis=-1)
-        return radius
+        return mean_radius(geometry["B"])
 
 
 def hexaglide_geometry(S: ArrayLike, B: ArrayLike, l: ArrayLike) -> Geometry:  # noqa: E741

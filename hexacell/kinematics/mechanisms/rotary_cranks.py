@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.leg_closure import LegClosure
-from hexacell.kinematics.leg_vectors import axes_through, by_pose
+from hexacell.kinematics.leg_vectors import axes_through, by_pose, mean_radius
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
     Branch,
@@ -233,8 +233,7 @@ class RotaryCranks:
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        radius: Array = np.mean(np.linalg.norm(geometry["platform"], axis=-1), axis=-1)
-        return radius
+        return mean_radius(geometry["platform"])
 
 
 def _cosine_and_sine(geometry: Geometry | GeometryBatch, joints: Array) -> tuple[Array, Array]:

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.leg_closure import LegClosure
-from hexacell.kinematics.leg_vectors import CLOSEST_JOINTS_MM, axes_through, by_pose
+from hexacell.kinematics.leg_vectors import CLOSEST_JOINTS_MM, axes_through, by_pose, mean_radius
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
     Branch,
@@ -194,8 +194,7 @@ class SixRails:
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        radius: Array = np.mean(np.linalg.norm(geometry["B"], axis=-1), axis=-1)
-        return radius
+        return mean_radius(geometry["B"])
 
 
 def six_rails_geometry(S: ArrayLike, rail: ArrayLike, B: ArrayLike, l: ArrayLike) -> Geometry:  # noqa: E741

@@ -13,7 +13,7 @@ from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.limits.leg_limits import LegLimits
 from hexacell.limits.limits import AxisLimits
-from hexacell.motion.path_check import LinesFrom, is_clear, stands_clear
+from hexacell.motion.path_check import LinesFrom, is_clear
 from hexacell.motion.trajectory import PIECES, interpolate_line
 
 
@@ -202,7 +202,7 @@ def test_margins_wanted_are_four_sigma_of_what_robots_drawn_show(know, limits, p
         actual = robot.commanded.actual_poses(at(0, -30, 560, 5))
         drawn.append(limited.leg_margins(robot.mechanism, robot.estimate, actual.poses, actual.joints)[0])
     expected = belief.least_margins + 4.0 * np.std(drawn, axis=0)
-    np.testing.assert_allclose(belief.margins_at(at_start), expected, rtol=0.15)
+    np.testing.assert_allclose(belief.margins_at(at_start)[0], expected, rtol=0.15)
 
 
 def test_legs_stay_apart_along_the_line(exactly, paper):
@@ -222,16 +222,3 @@ def test_a_robot_beyond_the_tilt_may_come_back_and_not_go_farther(exactly):
     limited = exactly(tilt=np.radians(20.0))
     assert is_clear(limited, at(0, 0, 550, 26), at(0, 0, 550))
     assert not is_clear(limited, at(0, 0, 550, 26), at(0, 0, 550, 28))
-
-
-@pytest.mark.parametrize("margin", [0.05, 0.4, 5.0])
-def test_a_robot_stands_clear_where_the_line_from_there_to_there_is(exactly, margin):
-    known = exactly(singularity_margin=margin, tilt=np.radians(10.0))
-    for command in (
-        at(0, 0, 550),
-        at(40, -50, 560, 25, 10, 5),
-        at(0, 0, 899),
-        at(100, 80, 480, -20, 0, 90),
-    ):
-        actual = known.commanded.actual_poses(command)
-        assert stands_clear(known, command, actual) == is_clear(known, command, command)

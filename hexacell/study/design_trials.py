@@ -116,6 +116,8 @@ def run_design_trial(trial: DesignTrial) -> DesignOutcome:
 def _outcome(trial: DesignTrial, cell: Cell, chosen: ChosenRecords, truth: Geometry) -> DesignOutcome:
     points = chosen.measurements.points
     counts = [int(np.count_nonzero(points <= point)) for point in range(2, int(points.max()) + 1)]
+    if not counts:
+        return DesignOutcome(reason="the robot could be measured at no second point")
     found = [_identified(chosen, count) for count in counts]
     accuracies = tuple(_accuracy(cell, chosen.robot, one, truth) for one in found if one is not None)
     deviations = [np.abs(record.deviation).max() for record in chosen.measurements.records]

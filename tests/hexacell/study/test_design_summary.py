@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from math import isnan
+from typing import Any
 
 import pytest
 from pydantic import TypeAdapter
 
 from hexacell.experiment_design.design_efficiency import DesignEfficiency, Efficiency
+from hexacell.measurements.records import MeasurementSet
 from hexacell.presentation.design_study import design_document, design_lines, design_picture
-from hexacell.study.design_records import OrientationChoice
+from hexacell.study import design_trials
+from hexacell.study.design_records import ChosenRecords, OrientationChoice, chosen_records
 from hexacell.study.design_summary import SWEEPS, SWEPT, design_summary, design_trials_of
 from hexacell.study.design_trials import DesignOutcome, DesignTrial, RecordsAccuracy, run_design_trial
 
@@ -84,6 +87,18 @@ def test_outcomes_are_kept_as_json_and_come_back() -> None:
     kept = TypeAdapter(DesignOutcome)
     one = outcome(DesignTrial(0, rates=True))
     assert kept.validate_json(kept.dump_json(one)) == one
+
+
+def test_a_robot_that_is_measured_at_one_point_only_is_not_identified(monkeypatch) -> None:
+    def at_one_point(*arguments: Any) -> ChosenRecords:
+        chosen = chosen_records(*arguments)
+        some = MeasurementSet(chosen.measurements.records[:2])
+        return replace(chosen, measurements=some)
+
+    monkeypatch.setattr(design_trials, "chosen_records", at_one_point)
+    found = run_design_trial(DesignTrial(0, OrientationChoice.RANDOM, points=2))
+    assert found.last is None
+    assert "no second point" in found.reason
 
 
 def test_chosen_orientations_tell_more_than_random_ones_of_the_same_travel() -> None:

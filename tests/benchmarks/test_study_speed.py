@@ -1,7 +1,7 @@
 """How long a study of many robots takes, each calibrated with orientations that hexacell chooses.
 
-``ROBOTS`` in the environment says how many; the target is for 1,000 on two processors, and fewer are told as
-what 1,000 would take. ``STUDY_COMPILED=no`` goes without ``hexacell[fast]``.
+``ROBOTS`` in the environment says how many; the target is for 1,000 on two processors, fewer are told
+as what 1,000 would take. ``STUDY_COMPILED=no`` goes without ``hexacell[fast]``.
 """
 
 from __future__ import annotations

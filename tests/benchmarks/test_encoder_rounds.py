@@ -2,12 +2,17 @@
 
 In the simulated time of a bus paced by bits; beside it slcan on a pseudo-terminal, in real time, with the
 machine as it is. ``ROUNDS`` in the environment says how many rounds each bus has to take.
+
+The simulated time passes by the processor time of all threads, as if they worked one after the other. On
+one processor they do; on two, what they do at the same time, and what it costs to wake the other processor,
+would count as well.
 """
 
 from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -27,6 +32,15 @@ LEAST_SHARE = 0.9
 HEARTBEAT_MS = 500
 
 
+@pytest.fixture
+def on_one_processor() -> Iterator[None]:
+    usual = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(usual)})
+    yield
+    os.sched_setaffinity(0, usual)
+
+
+@pytest.mark.usefixtures("on_one_processor")
 @pytest.mark.parametrize("bitrate", [125_000, 500_000])
 async def test_rounds_come_as_often_as_the_bus_allows(bitrate: int, say, monkeypatch) -> None:
     """One after the other by the thread of the bus, and each asked for by a coroutine."""

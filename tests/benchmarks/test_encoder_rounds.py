@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -30,14 +29,6 @@ ROUNDS = int(os.environ.get("ROUNDS", "3000"))
 WARM_UP = 200
 LEAST_SHARE = 0.9
 HEARTBEAT_MS = 500
-
-
-@pytest.fixture
-def on_one_processor() -> Iterator[None]:
-    usual = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(usual)})
-    yield
-    os.sched_setaffinity(0, usual)
 
 
 @pytest.mark.usefixtures("on_one_processor")

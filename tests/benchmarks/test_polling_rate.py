@@ -76,6 +76,7 @@ CELLS = {
 }
 
 
+@pytest.mark.usefixtures("on_one_processor")
 @pytest.mark.parametrize("name", CELLS)
 @pytest.mark.parametrize("call", FRAMES_A_CALL)
 async def test_three_gauges_are_polled_as_often_as_their_lines_allow(

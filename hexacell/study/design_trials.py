@@ -123,7 +123,8 @@ def _outcome(trial: DesignTrial, cell: Cell, chosen: ChosenRecords, truth: Geome
     deviations = [np.abs(record.deviation).max() for record in chosen.measurements.records]
     last = found[-1]
     rated = _efficiency(cell, chosen.robot, last) if trial.rates and last is not None else None
-    return DesignOutcome(accuracies, float(max(deviations)), chosen.outside, rated)
+    reason = "" if last is not None else f"its {len(points)} records do not determine the robot"
+    return DesignOutcome(accuracies, float(max(deviations)), chosen.outside, rated, reason)
 
 
 def _identified(chosen: ChosenRecords, count: int) -> Identification | None:

@@ -18,7 +18,7 @@ from hexacell.study.paper_summary import PAPER
 
 pytestmark = pytest.mark.benchmark
 
-DRAWS = int(os.environ.get("DRAWS", "5"))
+DRAWS = int(os.environ.get("DRAWS", "20"))
 PAIRS = int(os.environ.get("PAIRS", "3"))
 LEAST = 0.90
 

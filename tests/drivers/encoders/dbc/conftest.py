@@ -61,7 +61,7 @@ class Simulated:
         self.positions = [10.0 * leg for leg in range(1, 7)]
         assert settings.dbc is not None
         self.bank = SimulatedDbcBank(settings, settings.dbc, lambda: self.positions)
-        bus = {"bus": self.bank.bus_settings, "largest_speed": 100.0}
+        bus = {"bus": self.bank.bus_settings, "largest_speed": 1.0}
         self.driver = DbcBank(settings.model_copy(update=bus))
 
 

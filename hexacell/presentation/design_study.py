@@ -8,7 +8,7 @@ from math import isfinite
 from typing import Any
 
 from hexacell.presentation.layout import wrapped
-from hexacell.presentation.svg_drawing import AFTER, BEFORE, INK, as_svg, new_figure
+from hexacell.presentation.svg_drawing import AFTER, BEFORE, INK, as_svg, new_figure, plain_ticks
 from hexacell.study.design_records import PAPER_DEG, RANDOM_DEG, OrientationChoice
 from hexacell.study.design_summary import ChoiceCurve, DesignStudy, EfficiencySummary, Spread
 
@@ -93,22 +93,39 @@ def _finite(value: Any) -> Any:  # noqa: ANN401 - any part of a document
 
 def design_picture(study: DesignStudy) -> str:
     """The largest error by the number of records, and adaptive campaigns by what limits them."""
-    small = [(0.09 + 0.235 * place, 0.10, 0.175, 0.26) for place in range(len(study.sweeps))]
-    figure, (large, *others) = new_figure((7.2, 5.2), (0.09, 0.50, 0.88, 0.46), *small)
+    small = [(0.11 + 0.23 * place, 0.10, 0.16, 0.26) for place in range(len(study.sweeps))]
+    figure, (large, *others) = new_figure((7.2, 5.2), (0.11, 0.50, 0.86, 0.46), *small)
     for name, curve in study.choices.items():
         colour, marker, line = STYLES[OrientationChoice(name)]
-        errors = [(count, one.largest_mm) for count, one in curve.by_records.items() if one.robots]
+        # A number of records that few robots have says more of these robots than of the number.
+        errors = [
+            (count, one.largest_mm)
+            for count, one in curve.by_records.items()
+            if 2 * one.robots > curve.tried
+        ]
         x, y = zip(*errors, strict=True) if errors else ((), ())
         large.semilogy(x, y, marker + line, color=colour, label=name, markersize=4)
     large.set_xlabel("records")
     large.set_ylabel("largest error of a parameter, mm")
     large.legend(frameon=False, fontsize=7)
+    plain_ticks(large.yaxis)
     for axes, (name, rows) in zip(others, study.sweeps.items(), strict=True):
-        shown = [(value, one.task_mm) for value, one in rows.items() if isfinite(one.task_mm)]
-        x, y = zip(*shown, strict=True) if shown else ((), ())
-        draw = axes.loglog if name.startswith("noise") else axes.semilogy
-        draw(x, y, "s-", color=AFTER, markersize=4)
-        axes.set_xlabel(name)
-        axes.tick_params(labelsize=7)
+        _draw_sweep(axes, name, rows)
     others[0].set_ylabel("error at the task, mm")
     return as_svg(figure)
+
+
+def _draw_sweep(axes: Any, name: str, rows: Mapping[float, Spread]) -> None:  # noqa: ANN401 - matplotlib's
+    shown = [(value, one.task_mm) for value, one in rows.items() if isfinite(one.task_mm)]
+    x, y = zip(*shown, strict=True) if shown else ((), ())
+    axes.plot(x, y, "s-", color=AFTER, markersize=4)
+    axes.set_xlabel(name)
+    if name.startswith("noise"):
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        plain_ticks(axes.yaxis)
+        plain_ticks(axes.xaxis)
+        axes.set_xticks(x[::2])
+    else:
+        axes.set_ylim(bottom=0.0)
+    axes.tick_params(labelsize=7)

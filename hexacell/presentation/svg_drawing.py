@@ -36,6 +36,15 @@ def new_figure(size: tuple[float, float], *places: Place) -> tuple[Any, list[Any
         return figure, [figure.add_axes(place) for place in places]
 
 
+def plain_ticks(axis: Any) -> None:  # noqa: ANN401 - matplotlib is imported where it is used
+    """Numbers as they are read at 1, 2 and 5 of each decade of a logarithmic axis."""
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter  # noqa: PLC0415 - likewise
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
+
+
 def as_svg(figure: Any) -> str:  # noqa: ANN401 - matplotlib is imported where it is used
     """Its text, from the element ``svg`` on."""
     from matplotlib import rc_context  # noqa: PLC0415 - half a second that only figures need

@@ -62,12 +62,15 @@ class HostConnection:
         self._reader = reader
         self._writer = writer
         self._is_left = False
+        self._goes_on_alone = False
 
     async def messages(self) -> AsyncIterator[HostMessage]:
         """See :meth:`RunConnection.messages`; a connection that is lost ends with a failure."""
         is_told = False
         with suppress(ConnectionError):
             while (line := await self._reader.readline()).endswith(b"\n"):
+                if self._goes_on_alone:  # what it still says was on its way
+                    continue
                 message = host_message(line)
                 is_told = is_told or _is_ending(message)
                 yield message
@@ -85,7 +88,7 @@ class HostConnection:
 
     async def leave(self, *, keep_running: bool) -> None:
         """See :meth:`RunConnection.leave`; the run hangs up when it has heard, or when it has ended."""
-        self._is_left = True
+        self._is_left, self._goes_on_alone = True, keep_running
         with suppress(HexacellError, TimeoutError):
             await self._send(Leave(keep_running=keep_running))
             await asyncio.wait_for(self._until_gone(), LET_GO_S if keep_running else STOP_S)

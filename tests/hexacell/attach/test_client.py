@@ -8,7 +8,15 @@ from collections.abc import AsyncIterator
 import pytest
 
 from hexacell.attach.client import HostConnection
-from hexacell.attach.messages import ClientMessage, Leave, client_message
+from hexacell.attach.messages import (
+    ClientMessage,
+    HostMessage,
+    Leave,
+    StatusChanged,
+    client_message,
+    message_line,
+)
+from procedures.engine.command_loop import Status
 
 SOME_TURNS = 20
 """Turns of the loop in which a client that does not wait would be gone."""
@@ -24,7 +32,12 @@ class SlowHost:
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.heard.put_nowait(client_message(await reader.readline()))
         await self.may_hang_up.wait()
+        writer.write(message_line(StatusChanged(status=Status.RUNNING)))  # it was on its way
         writer.close()
+
+
+async def everything(connection: HostConnection) -> list[HostMessage]:
+    return [message async for message in connection.messages()]
 
 
 @pytest.fixture
@@ -37,6 +50,7 @@ async def host(tmp_path) -> AsyncIterator[tuple[SlowHost, HostConnection]]:
 
 async def test_a_client_stays_until_the_run_has_heard_that_it_is_to_go_on(host) -> None:
     slow, connection = host
+    told = asyncio.ensure_future(everything(connection))
     leaving = asyncio.ensure_future(connection.leave(keep_running=True))
     assert await slow.heard.get() == Leave(keep_running=True)
     for _ in range(SOME_TURNS):
@@ -44,4 +58,4 @@ async def test_a_client_stays_until_the_run_has_heard_that_it_is_to_go_on(host) 
     assert not leaving.done()
     slow.may_hang_up.set()
     await leaving
-    assert [message async for message in connection.messages()] == []
+    assert await told == [], "who has left is told nothing more"

@@ -107,7 +107,7 @@ class RobotBelief:
         margins = np.tile(self.least_margins, (len(at.joints), 1))
         known = np.flatnonzero(self._orientation_sigmas(sensitivity.parameters) <= UNCERTAIN_SIGMA)
         if len(known):
-            margins[known] += SPARE_SIGMAS * self._margin_sigmas(at.at(known), sensitivity[known])
+            margins[known] += SPARE_SIGMAS * self._margin_sigmas(at[known], sensitivity[known])
         return margins
 
     def _margin_sigmas(self, at: ActualPoses, sensitivity: Sensitivity) -> Array:

@@ -47,8 +47,7 @@ class ActualPoses:
     joints: Array
     found: Mask
 
-    def at(self, rows: NDArray[np.intp]) -> ActualPoses:
-        """Some of them."""
+    def __getitem__(self, rows: NDArray[np.intp]) -> ActualPoses:
         return ActualPoses(self.poses[rows], self.joints[rows], self.found[rows])
 
 

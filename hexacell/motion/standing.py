@@ -34,7 +34,7 @@ def stands_within_limits(belief: RobotBelief, commands: PoseBatch, *, certainly:
     """
     actual = belief.commanded.actual_poses(commands)
     found = np.flatnonzero(actual.found)
-    at = actual.at(found)
+    at = actual[found]
     margins = belief.limits.leg_margins(belief.mechanism, belief.estimate, at.poses, at.joints)
     wanted = belief.margins_at(at) if certainly else belief.least_margins
     kept = belief.limits.allow_poses(at.poses, at.joints) & (margins >= wanted).all(axis=-1)

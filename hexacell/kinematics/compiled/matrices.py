@@ -1,4 +1,4 @@
-"""Small dense matrices for compiled loops: elimination with partial pivoting; and the compiler itself."""
+"""Six linear equations and rotations for compiled loops; and the compiler itself."""
 
 from __future__ import annotations
 

@@ -44,6 +44,7 @@ class ServerClient:
 
     def close(self) -> None:
         """End the connection."""
+        self._lines.close()  # a socket stays open as long as a file of it is
         self._connection.close()
 
     def _line(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot_model import config_layout
+from tests.linuxcnc.server_client import ServerClient
 from tests.waiting import wait_until
 
 POSES = 1000
@@ -45,9 +47,10 @@ def with_screws(machine) -> None:
     cell.write_text(f"{cell.read_text()}\n[robot.screws]\nlead_mm = 10.0\n{stated}\n")
 
 
-def is_at(shown: list[float], commanded: np.ndarray) -> bool:
+def is_at(client: ServerClient, commanded: np.ndarray) -> bool:
     """Whether the pose that LinuxCNC shows is the commanded one, but for its rounding."""
-    return bool(np.abs(np.array(shown) - commanded).max() <= ARRIVED)
+    shown = np.array(client.get("abs_act_pos"))
+    return bool(np.abs(shown - commanded).max() <= ARRIVED)
 
 
 @pytest.mark.parametrize(
@@ -81,7 +84,7 @@ def test_random_poses_have_the_same_joints(request, name, height, fails, changes
             answer = client.ask(f"set mdi G0 {words}")
             assert answer.endswith("ACK"), (answer, row)
             # On a busy machine the server may acknowledge before the robot is there.
-            wait_until(lambda there=row: is_at(client.get("abs_act_pos"), there))
+            wait_until(partial(is_at, client, row))
             joints.append(client.get("joint_pos"))
             reached.append(client.get("abs_act_pos"))
     own = inverse_kinematics(mechanism, controller.geometry, controller.branch, PoseBatch.of(poses))

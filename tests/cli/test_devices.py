@@ -60,6 +60,13 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("drivers.discovery.encoders.NETWORK_DEVICES", Path("/nowhere"))
 
 
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Simulated instruments share a busy machine with other tests; real ones answer at once."""
+    monkeypatch.setattr("drivers.discovery.gauges.TIMEOUT_S", 2.0)
+    monkeypatch.setattr("drivers.discovery.controllers.TIMEOUT_S", 10.0)
+
+
 @pytest.mark.usefixtures("no_ports")
 def test_a_machine_without_devices_is_told_what_to_plug_in(typed_here) -> None:
     outcome = typed_here("devices", "--controller", NOBODY)
@@ -70,7 +77,7 @@ def test_a_machine_without_devices_is_told_what_to_plug_in(typed_here) -> None:
     assert "For your cell file" not in outcome.out
 
 
-@pytest.mark.usefixtures("no_ports")
+@pytest.mark.usefixtures("no_ports", "patient")
 def test_every_protocol_is_found_and_the_text_is_that_of_a_cell_file(typed_here, served, addresses) -> None:
     gauges, adapter, controller = addresses
     outcome = typed_here("devices", *gauges, adapter, "--controller", controller, "--json")
@@ -92,7 +99,7 @@ def test_every_protocol_is_found_and_the_text_is_that_of_a_cell_file(typed_here,
     assert f"{told['controller']['host']}:{told['controller']['port']}" == controller
 
 
-@pytest.mark.usefixtures("no_ports")
+@pytest.mark.usefixtures("no_ports", "patient")
 def test_an_instrument_of_each_protocol_that_is_tried_is_found(typed_here) -> None:
     """Also after it was asked in the others, whose questions may not end for it."""
     protocols = ["cdi", "digimatic-usb", "heidenhain-nd", "mitutoyo-id-h", "mux10", "sylvac", "uwave"]
@@ -122,7 +129,7 @@ def streams() -> Iterator[SimulatedGaugeBank]:
         yield bank
 
 
-@pytest.mark.usefixtures("no_ports")
+@pytest.mark.usefixtures("no_ports", "patient")
 def test_gauges_that_send_unasked_are_heard(typed_here, streams) -> None:
     ports = [streams.gauges[0].port, streams.gauges[2].port]
     outcome = typed_here("devices", *ports, "--controller", NOBODY, "--json")

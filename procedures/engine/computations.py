@@ -10,18 +10,20 @@ from hexacell.acceptance import gates
 from hexacell.campaign.noise_assessment import assess_noise
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
-from hexacell.errors import HexacellError
+from hexacell.errors import HexacellError, LimitError
 from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.reporting.assessment import assess
+from hexacell.reporting.assessment import Assessment, assess
 from hexacell.reporting.check_result import check_line, check_result
 from hexacell.reporting.documents import fit_document
+from hexacell.reporting.findings import findings
 from hexacell.reporting.length_result import LengthMeasurements
 from hexacell.reporting.length_statement import length_line, length_statement
 from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.verification import HeldOut, outcome_line, reason_of, verify
 from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.held_out_poses import PosesByPoint
 from procedures.calibration.noise_steps import noise_readings
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.config_transactions import ConfigTransactions
@@ -58,7 +60,7 @@ class Computations:
         assessed = assess(settings, robot, measurements, identified, noise)
         self.folder.write_result(fit_document(assessed))
         result = IdentificationResult.of(identified, assessed.zeros)
-        held_out = calibration.held_out_poses(identified)
+        held_out = _held_out_poses(calibration, assessed)
         return events.Identified(
             result=result,
             held_out=held_out,
@@ -142,6 +144,18 @@ class Computations:
             self.cell.settings, calibration.robot_checked, calibration.accepted, measured
         )
         return events.ResultValidated(verdict=stated.verdict, line=length_line(stated), length=stated)
+
+
+def _held_out_poses(calibration: Calibration, assessed: Assessment) -> PosesByPoint:
+    """Those of an identification; the error states its verdict, as a wrong geometry may be the cause."""
+    try:
+        return calibration.held_out_poses(assessed.found)
+    except LimitError as error:
+        verdict, *_ = findings(assessed)
+        raise LimitError(
+            f"{verdict} With this geometry no held-out pose can be measured: {error.problem}",
+            action=error.action,
+        ) from error
 
 
 def _expired(settings: CellSettings, state: RunState) -> tuple[str, ...] | None:

@@ -24,6 +24,7 @@ from tests.native_config import NATIVE
 from tests.small_cell import SMALL, few_candidates, history_until, write_small_cell
 
 SERVED: dict[str, Any] = {
+    "identification.orientations": 12,
     "timing.clock_factor": 500.0,
     "speed.joint": 1000.0,
     "speed.edge_mm_s": 1000.0,
@@ -33,7 +34,11 @@ SERVED: dict[str, Any] = {
     "encoders.heartbeat_ms": 10_000,
     "simulation.motion.ringing_mm": 0.05,
 }
-"""Real drivers are patient with simulated devices on a fast clock."""
+"""Real drivers are patient with simulated devices on a fast clock.
+
+Their noise depends on how many readings a machine takes, so that no run repeats another: there are more
+poses than the fewest, from which one in twenty is identified too badly to end.
+"""
 
 
 MakeCell = Callable[..., Cell]

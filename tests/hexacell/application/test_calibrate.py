@@ -30,7 +30,7 @@ from procedures.run.steps import Phase
 
 def test_a_calibration_passes(finished) -> None:
     assert finished.ended.exit_code == ExitCode.DONE
-    assert "35 parameters, 18 records at 2 points; mean deviation at held-out poses" in finished.ended.line
+    assert "35 parameters, 24 records at 2 points; mean deviation at held-out poses" in finished.ended.line
     judged = fold(finished.history).judged
     assert judged
     assert judged.verdict is Verdict.PASS

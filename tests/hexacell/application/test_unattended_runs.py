@@ -176,7 +176,7 @@ async def test_it_ends_at_its_reference_and_can_be_resumed(make_site, finished, 
     assert site.config == before
     ended = await site.calibrate(resume=True)
     assert ended.exit_code == ExitCode.DONE
-    assert len(read_measurements(site.folder.measurements)) == 18
+    assert len(read_measurements(site.folder.measurements)) == 24
 
 
 async def test_after_the_write_back_an_unverified_geometry_does_not_stay(make_site) -> None:

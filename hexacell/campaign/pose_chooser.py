@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -54,38 +55,49 @@ class PoseChooser:
 
         The pose is in the mechanism's frame convention, the path in the controller's frames. The pose
         can be reached from the pose of the last record, or else from the reference, wherever the robot
-        is now: an interrupted run measures the same poses as an undisturbed one. Where that is not
-        known, there is no path.
+        is now: an interrupted run measures the same poses as an undisturbed one, unless no straight line
+        leads onto the path. Where it is not known where the robot is, there is no path.
 
         Raises:
             LimitError: there is no pose, or no path to it, within the limits.
         """
-        selected, start = self._choose(belief, zero, state)
+        for selected, start in self._selections(belief, zero, state):
+            path = self._path(belief, zero, state, selected, start)
+            if path is not None:
+                return selected, path
+        raise LimitError("no safe straight line starts here")
+
+    def _path(
+        self, belief: RobotBelief, zero: GaugeZero, state: CampaignState, selected: SelectedPose, start: int
+    ) -> tuple[Pose, ...] | None:
+        """The poses between the present one and the selected one, whose path starts from a row of records.
+
+        None where no straight line leads onto that path, as from the reference to which an interrupted run
+        returned by another way than it came.
+        """
         if state.present is None:
-            return selected, ()
+            return ()
         visited = _visited(state)
         waypoints = [_as_visited(visited[:1], self.robot.to_command(pose)) for pose in selected.waypoints]
         path = [*visited[start : start + 1], *waypoints]
         if state.present in path:  # the usual case; the path was checked when the pose was selected
-            return selected, tuple(path[path.index(state.present) + 1 :])
+            return tuple(path[path.index(state.present) + 1 :])
         via = [*waypoints, *visited]
         commands = [self.robot.from_commands([pose]) for pose in via]
         present, end = self.robot.from_commands([state.present]), PoseBatch.of([selected.command])
         route = find_route(belief, present, end, commands, zero.reference)
-        if route is None:
-            raise LimitError("no safe straight line starts here")
-        return selected, tuple(via[row] for row in route)
+        return None if route is None else tuple(via[row] for row in route)
 
-    def _choose(
+    def _selections(
         self, belief: RobotBelief, zero: GaugeZero, state: CampaignState
-    ) -> tuple[SelectedPose, int]:
-        """The selected pose, and the row of the point's record that its path starts from."""
+    ) -> Iterator[tuple[SelectedPose, int]]:
+        """Poses to measure, the best first, and the row of the point's record that the path starts from."""
         last = max(0, len(_visited(state)) - 1)
         for row in dict.fromkeys([last, 0]):
             with suppress(LimitError):
-                return self._select(belief, zero, state, row), row
+                yield self._select(belief, zero, state, row), row
         # So little may be known that nearly all candidates of full size are too large.
-        return self._select(belief, zero, state, 0, SMALL_TILT_SHARE), 0
+        yield self._select(belief, zero, state, 0, SMALL_TILT_SHARE), 0
 
     def _select(
         self, belief: RobotBelief, zero: GaugeZero, state: CampaignState, row: int, tilt_share: float = 1.0

@@ -50,8 +50,8 @@ class EventFormatter:
 
     def lines(self, event: events.Event, state: RunState) -> list[str]:
         """Text of an event; ``state`` includes the event. Empty where there is nothing to report."""
-        text = event_text(event, state)
-        return [line for line in (text, self._forecast_line(event)) if line]
+        texts = (event_text(event, state), _why_few_records(event, state), self._forecast_line(event))
+        return [text for text in texts if text]
 
     def _forecast_line(self, event: events.Event) -> str | None:
         """The predicted error, once the set whose last move predicted it is closed."""
@@ -61,6 +61,14 @@ class EventFormatter:
             case events.SetClosed(at=SetKey(phase=Phase.IDENTIFY)) if self._forecast is not None:
                 return run_forecast_line(self._forecast)
         return None
+
+
+def _why_few_records(event: events.Event, state: RunState) -> str | None:
+    """Why a set was closed with fewer records than planned."""
+    if not isinstance(event, events.SetClosed) or not event.reason:
+        return None
+    count = len(state.set(event.at).samples)
+    return wrapped(f"{set_name(event.at)} ends with {count} records: {event.reason}", indent=2)
 
 
 def set_name(key: SetKey) -> str:

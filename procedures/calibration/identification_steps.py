@@ -17,7 +17,7 @@ from procedures.calibration.noise_steps import NoiseSteps
 from procedures.calibration.set_steps import SetSteps, require_zero
 from procedures.calibration.trial_steps import TrialSteps
 from procedures.run.state import RunState, record
-from procedures.run.steps import Compute, Expectation, Locate, Move, Phase, SetKey, Step
+from procedures.run.steps import CloseSet, Compute, Expectation, Locate, Move, Phase, SetKey, Step
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +40,8 @@ class IdentificationSteps:
                 return self._start_point(state, start)
             case MeasurePose() as pose:
                 return _measure_pose(state, pose)
-            case FinishPoint(point=point):
-                return self._finish_point(state, SetKey(phase=Phase.IDENTIFY, point=point))
+            case FinishPoint() as finish:
+                return self._finish_point(state, finish)
             case _:
                 return None
 
@@ -83,9 +83,12 @@ class IdentificationSteps:
             return False
         return self.plan.allows_provisional(campaign_state(state, None))
 
-    def _finish_point(self, state: RunState, key: SetKey) -> Step:
+    def _finish_point(self, state: RunState, finish: FinishPoint) -> Step:
+        key = SetKey(phase=Phase.IDENTIFY, point=finish.point)
         if step := self.sets.at_reference(state, key):
-            return step
+            is_short = len(state.set(key).samples) < self.plan.records_at(finish.point)
+            is_last = isinstance(step, CloseSet) and is_short
+            return step.model_copy(update={"reason": finish.reason}) if is_last else step
         # Also at a waypoint of the path back: a new plan could return to where the robot came from.
         back = self.sets.paths.back(state, key, self._known(state, key))
         return back or self._at_or_to_reference(state, key)

@@ -279,7 +279,9 @@ class StepExecutor:
         await self._check_gauges()
         if drifted := self.guards.drift(str(step.at), deviation_of(drift)):
             raise drifted
-        return events.SetClosed(at=step.at, drift_mm=deviation_of(drift), reading=reading)
+        return events.SetClosed(
+            at=step.at, drift_mm=deviation_of(drift), reading=reading, reason=step.reason
+        )
 
     async def read(self, windows: int = 1) -> events.Reading:
         """The mean of some settled windows of all devices; raises ``HexacellError``."""

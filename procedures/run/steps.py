@@ -140,9 +140,13 @@ class Revisit(StepOfSet):
 
 
 class CloseSet(StepOfSet):
-    """Back at the set's reference pose: read again; the difference is drift."""
+    """Back at the set's reference pose: read again; the difference is drift.
+
+    The ``reason`` is why the set has fewer records than planned; empty where it has all.
+    """
 
     kind: Literal["close"] = "close"
+    reason: str = ""
 
 
 class Standstill(StepOfSet):

@@ -187,12 +187,16 @@ class NoiseMeasured(Frozen):
 
 
 class SetClosed(Frozen):
-    """The reference was read again; ``drift_mm`` is the change since it was zeroed."""
+    """The reference was read again; ``drift_mm`` is the change since it was zeroed.
+
+    The ``reason`` is why the set has fewer records than planned; empty where it has all.
+    """
 
     kind: Literal["closed"] = "closed"
     at: SetKey
     drift_mm: ThreeNumbers
     reading: Reading | None = None
+    reason: str = ""
 
 
 class SetInvalidated(Frozen):

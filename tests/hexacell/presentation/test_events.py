@@ -52,6 +52,13 @@ def test_a_move_has_its_place_and_the_predicted_error():
     assert activity(events.Paused()) is None
 
 
+def test_a_set_with_fewer_records_than_planned_says_why():
+    *before, end = closed(POINT)
+    short = end.model_copy(update={"reason": "no safe straight line starts here"})
+    lines = EventFormatter().lines(short, fold([*before, short]))
+    assert lines[1:] == ["point 2 ends with 2 records: no safe straight line starts here"]
+
+
 @pytest.mark.parametrize("kind", get_args(Compute.model_fields["kind"].annotation))
 def test_every_computation_has_its_text(kind):
     assert activity(events.StepBegun(step=Compute(kind=kind))) == COMPUTATIONS[kind]

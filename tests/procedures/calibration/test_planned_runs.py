@@ -52,7 +52,8 @@ def test_with_the_target_reached_the_set_is_closed_and_the_geometry_identified(
     assert back.orientation < step.orientation
     at_reference = [*before, story(point=2).arrived(1)]
     closing = rig.calibration.next_step(fold(at_reference))
-    assert closing == CloseSet(at=step.at)
+    assert closing == CloseSet(at=step.at, reason=closing.reason)
+    assert closing.reason.startswith("the predicted error at the task poses is")
     assert rig.calibration.next_step(fold([*at_reference, story(point=2).closed()])).key == "identify"
 
 

@@ -75,6 +75,20 @@ def assembly_mode(pose_jacobian: Array) -> Array:
     return signs
 
 
+def modes_of(
+    mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+) -> Array:
+    """:func:`assembly_mode` (n,) of n poses with joint variables (n, 6), mm."""
+    closure = closure_to_compile(mechanism, geometry, joints)
+    if closure is None:
+        return assembly_mode(mechanism.residual_and_jacobian(geometry, poses, joints)[1])
+    from hexacell.kinematics.compiled.newton import modes_at  # noqa: PLC0415 - where numba is installed
+
+    modes = np.empty(len(joints))
+    modes_at(*closure.arrays(), np.array(poses.positions), np.array(poses.rotations), modes)
+    return modes
+
+
 def apply_twist(poses: PoseBatch, step: Array) -> PoseBatch:
     """Poses displaced by twists (n, 6): translations, mm, then rotation vectors in the base frame, rad."""
     return PoseBatch(
@@ -212,9 +226,9 @@ def _compiled(
 
     positions, orientations = np.array(start.positions), np.array(start.rotations)
     found = np.zeros(len(start), dtype=bool)
-    modes = (
-        np.zeros(len(start)) if mode is None else np.array(np.broadcast_to(mode, len(start)), dtype=float)
-    )
+    modes = np.zeros(len(start))
+    if mode is not None:
+        modes[:] = mode
     base, platform, lengths, is_quadratic = closure.arrays()
     is_complete = newton(
         base,
@@ -279,7 +293,7 @@ def _continue_at_once(
         geometries[1],
         joints[1],
         start,
-        mode=assembly_mode(mechanism.residual_and_jacobian(geometries[0], start, joints[0])[1]),
+        mode=modes_of(mechanism, geometries[0], start, joints[0]),
         max_steps=MAX_STAGE_STEPS,
         largest_contraction=LARGEST_CONTRACTION,
     )
@@ -296,7 +310,7 @@ def _continue_in_stages(
     """Continuation from the first to the second of two geometries and joint vectors (n, 6), mm."""
     poses = start
     rows = np.arange(len(start))
-    mode = assembly_mode(mechanism.residual_and_jacobian(geometries[0], start, joints[0])[1])
+    mode = modes_of(mechanism, geometries[0], start, joints[0])
     for stage in range(1, stages + 1):
         fraction = stage / stages
         geometry = _between(geometries[0], _of_rows(geometries[1], rows), fraction)

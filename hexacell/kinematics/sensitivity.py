@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hexacell.kinematics.compiled.availability import is_compiled
 from hexacell.kinematics.forward import assembly_mode
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.leg_closure import LegClosure, closure_to_compile
@@ -62,11 +63,12 @@ def pose_sensitivity(
 ) -> Sensitivity:
     """Implicit derivatives ``-J_pose^-1 J`` at n poses that close the mechanism."""
     linear = mechanism.derivatives(geometry, poses, joints)
-    by_constraints = -np.linalg.inv(linear.pose)
+    inverse, mode = inverse_and_mode(linear.pose)
+    by_constraints = -inverse
     return Sensitivity(
         joints=by_constraints * linear.joints[..., None, :],
         parameters=_by_parameters(mechanism, by_constraints, linear),
-        mode=assembly_mode(linear.pose),
+        mode=mode,
     )
 
 
@@ -75,8 +77,24 @@ def position_sensitivity(
 ) -> tuple[Array, Array]:
     """Derivatives of the ball's position: (n, 3, P) by the parameters, (n, 3, 6) by the joint variables."""
     linear = mechanism.derivatives(geometry, poses, joints)
-    by_constraints = -np.linalg.inv(linear.pose)[:, :3]
+    by_constraints = -inverse_and_mode(linear.pose)[0][:, :3]
     return _by_parameters(mechanism, by_constraints, linear), by_constraints * linear.joints[..., None, :]
+
+
+def inverse_and_mode(pose_jacobian: Array) -> tuple[Array, Array]:
+    """Inverses (n, 6, 6) of pose Jacobians (n, 6, 6), and their assembly modes (n,).
+
+    Raises:
+        LinAlgError: one is exactly singular.
+    """
+    if is_compiled():
+        from hexacell.kinematics.compiled.matrices import invert  # noqa: PLC0415 - where numba is installed
+
+        inverse, determinant = np.empty(pose_jacobian.shape), np.empty(len(pose_jacobian))
+        invert(np.array(pose_jacobian), inverse, determinant)
+        if determinant.all():
+            return inverse, np.sign(determinant)
+    return np.linalg.inv(pose_jacobian), assembly_mode(pose_jacobian)
 
 
 def _by_parameters(mechanism: Mechanism, by_constraints: Array, linear: ConstraintDerivatives) -> Array:

@@ -54,6 +54,8 @@ class LegLimits:
 
         The spare angles of the passive joints, rad, then the legs' spare distance, mm, if it has a limit.
         """
+        if is_compiled():
+            return self._margins_compiled(legs)
         angles = self.spare_angles(legs).reshape(-1, 12)
         if self.distance_mm == 0.0:
             return angles
@@ -65,7 +67,7 @@ class LegLimits:
         Distances take most of the time, and the platform's joints limit most, so that each is computed only
         where those before it are kept.
         """
-        least = np.broadcast_to(wanted, 12 + (self.distance_mm != 0.0))
+        least = np.zeros(12 + (self.distance_mm != 0.0)) + wanted
         if is_compiled():
             return self._keeps_compiled(legs, least)
         at_platform = angles_between(legs.directions_in_platform, self.platform_axes)
@@ -81,22 +83,21 @@ class LegLimits:
         from hexacell.kinematics.compiled.leg_margins import keeps  # noqa: PLC0415
 
         kept = np.empty(len(legs.rotations), dtype=bool)
-        carriers = _NO_TURNS if legs.carriers is None else legs.carriers
-        distance = self.distance_mm + least[12] if self.distance_mm != 0.0 else 0.0
+        distance = float(self.distance_mm + least[12]) if self.distance_mm != 0.0 else 0.0
+        cones = self.base_cones - least[:6], self.platform_cones - least[6:12]
         keeps(
-            _own(legs.base_joints),
-            _own(legs.platform_joints),
-            _own(legs.rotations),
-            _own(carriers),
-            _own(self.base_axes),
-            _own(self.platform_axes),
-            self.base_cones - least[:6],
-            self.platform_cones - least[6:12],
-            float(distance),
-            PARALLEL,
-            kept,
+            *_arrays(legs), _own(self.base_axes), _own(self.platform_axes), *cones, distance, PARALLEL, kept
         )
         return kept
+
+    def _margins_compiled(self, legs: Legs) -> Array:
+        # Only where numba is installed.
+        from hexacell.kinematics.compiled.leg_margins import margins  # noqa: PLC0415
+
+        found = np.empty((len(legs.rotations), 12 + (self.distance_mm != 0.0)))
+        limits = self.base_axes, self.platform_axes, self.base_cones, self.platform_cones
+        margins(*_arrays(legs), *map(_own, limits), float(self.distance_mm), PARALLEL, found)
+        return found
 
     def margins_for(self, turn: float, radius_mm: float) -> Array:
         """Margins (m,) that hold should a platform of some radius turn by an angle, rad."""
@@ -113,6 +114,12 @@ class LegLimits:
             platform_cones=self.platform_cones + missing[6:12],
             distance_mm=distance if distance or not self.distance_mm else -ROUNDING,
         )
+
+
+def _arrays(legs: Legs) -> tuple[Array, Array, Array, Array]:
+    """What compiled loops take of the legs."""
+    carriers = _NO_TURNS if legs.carriers is None else legs.carriers
+    return _own(legs.base_joints), _own(legs.platform_joints), _own(legs.rotations), _own(carriers)
 
 
 def _own(values: Array) -> Array:

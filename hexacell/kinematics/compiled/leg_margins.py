@@ -46,6 +46,39 @@ def keeps(
 
 
 @compiled
+def margins(
+    base_joints: Array,
+    platform_joints: Array,
+    rotations: Array,
+    carriers: Array,
+    base_axes: Array,
+    platform_axes: Array,
+    base_cones: Array,
+    platform_cones: Array,
+    distance: float,
+    parallel: float,
+    margin: Array,
+) -> None:
+    """Fill ``margin`` (n, 12), rad, or (n, 13), the last that of the smallest distance, mm.
+
+    See :func:`keeps`.
+    """
+    for row in range(len(margin)):
+        for leg in range(6):
+            start, end = platform_joints[row, leg], base_joints[row, leg]
+            x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+            length = np.sqrt(x * x + y * y + z * z)
+            x, y, z = x / length, y / length, z / length
+            carrier = carriers[row if len(carriers) > 1 else 0, leg]
+            margin[row, leg] = base_cones[leg] - _angle(carrier, base_axes[leg], x, y, z)
+            at_platform = _angle(rotations[row], platform_axes[leg], x, y, z)
+            margin[row, 6 + leg] = platform_cones[leg] - at_platform
+        if margin.shape[1] > 12:
+            nearest = smallest_distance(base_joints[row], platform_joints[row], parallel)
+            margin[row, 12] = nearest - distance
+
+
+@compiled
 def _angle(rotation: Array, axis: Array, x: float, y: float, z: float) -> float:
     """Between a unit vector x, y, z and a unit ``axis`` (3,) that is rotated, rad."""
     cosine = 0.0

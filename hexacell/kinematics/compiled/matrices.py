@@ -73,6 +73,21 @@ def eliminate(system: Array) -> float:
 
 
 @compiled
+def invert(matrices: Array, inverses: Array, determinants: Array) -> None:
+    """Fill ``inverses`` (n, 6, 6) and ``determinants`` (n,); an inverse is meaningless where that is 0."""
+    system = np.empty((6, 12))
+    for row in range(len(matrices)):
+        for place in range(6):
+            for column in range(6):
+                system[place, column] = matrices[row, place, column]
+                system[place, 6 + column] = 1.0 if column == place else 0.0
+        determinants[row] = eliminate(system)
+        for place in range(6):
+            for column in range(6):
+                inverses[row, place, column] = system[place, 6 + column]
+
+
+@compiled
 def turn(rotation: Array, vector: Array) -> None:
     """Turn ``rotation`` (3, 3) in place by a rotation vector (3,), rad, in the base frame."""
     x, y, z = vector

@@ -63,6 +63,32 @@ def newton(
 
 
 @compiled
+def modes_at(
+    base: Array,
+    platform: Array,
+    lengths: Array,
+    is_quadratic: bool,
+    positions: Array,
+    rotations: Array,
+    modes: Array,
+) -> None:
+    """Fill ``modes`` (n,) of n poses."""
+    error, jacobian, system = np.empty(6), np.empty((6, 6)), np.empty((6, 7))
+    for row in range(len(positions)):
+        constraints(
+            base[row if len(base) > 1 else 0],
+            platform[row if len(platform) > 1 else 0],
+            lengths[row if len(lengths) > 1 else 0],
+            is_quadratic,
+            positions[row],
+            rotations[row],
+            error,
+            jacobian,
+        )
+        modes[row] = _mode(jacobian, system)
+
+
+@compiled
 def _solve(jacobian: Array, error: Array, system: Array, step: Array) -> float:
     """Fill the Newton ``step`` (6,); returns the determinant. Overwrites ``system`` (6, 7)."""
     for leg in range(6):

@@ -90,10 +90,7 @@ class Hexaglide:
 
     def leg_closure(self, geometry: Geometry | GeometryBatch, joints: Array) -> LegClosure | None:
         """See :class:`~hexacell.kinematics.leg_closure.HasLegClosure`."""
-        at_sliders = np.empty((*joints.shape, 3))
-        at_sliders[:] = geometry["S"]
-        at_sliders[..., 0] += joints
-        return LegClosure(at_sliders, geometry["B"], geometry["l"], is_quadratic=True)
+        return LegClosure(_at_sliders(geometry, joints), geometry["B"], geometry["l"], is_quadratic=True)
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
@@ -108,7 +105,7 @@ class Hexaglide:
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        _, v = _leg_vectors(geometry, poses, np.zeros((len(poses), 6)))
+        v = geometry["S"] - poses.positions[:, None, :] - _to_platform(geometry, poses)
         along_rail_squared = geometry["l"] ** 2 - v[..., 1] ** 2 - v[..., 2] ** 2
         reachable = along_rail_squared >= 0.0
         along_rail = np.sqrt(np.where(reachable, along_rail_squared, np.nan))
@@ -152,9 +149,8 @@ class Hexaglide:
 
     def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        b, v = _leg_vectors(geometry, poses, joints)
-        at_platform = poses.positions[:, None, :] + b
-        return Legs(at_platform + v, at_platform, poses.rotations)
+        at_platform = poses.positions[:, None, :] + _to_platform(geometry, poses)
+        return Legs(_at_sliders(geometry, joints), at_platform, poses.rotations)
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
@@ -166,12 +162,26 @@ def hexaglide_geometry(S: ArrayLike, B: ArrayLike, l: ArrayLike) -> Geometry:  #
     return Geometry.of(HEXAGLIDE_PARAMETERS, {"S": S, "B": B, "l": l})
 
 
+def _at_sliders(geometry: Geometry | GeometryBatch, joints: Array) -> Array:
+    """S_i + q_i e (n, 6, 3), mm."""
+    at_sliders = np.empty((*joints.shape, 3))
+    at_sliders[:] = geometry["S"]
+    at_sliders[..., 0] += joints
+    return at_sliders
+
+
+def _to_platform(geometry: Geometry | GeometryBatch, poses: PoseBatch) -> Array:
+    """R B_i (n, 6, 3), mm."""
+    # Products of small matrices are twice as fast in one layout.
+    b: Array = geometry["B"] @ np.ascontiguousarray(np.swapaxes(poses.rotations, -1, -2))
+    return b
+
+
 def _leg_vectors(
     geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
 ) -> tuple[Array, Array]:
     """R B_i (n, 6, 3), and v_i (n, 6, 3) from platform joint to slider joint, mm."""
-    # Products of small matrices are twice as fast in one layout.
-    b = geometry["B"] @ np.ascontiguousarray(np.swapaxes(poses.rotations, -1, -2))
+    b = _to_platform(geometry, poses)
     v = geometry["S"] - poses.positions[:, None, :] - b
     v[..., 0] += joints
     return b, v

@@ -12,11 +12,17 @@ import pytest
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.compiled.availability import VARIABLE
-from hexacell.kinematics.forward import LARGEST_CONTRACTION, continue_solution, forward_kinematics
+from hexacell.kinematics.forward import LARGEST_CONTRACTION, continue_solution, forward_kinematics, modes_of
 from hexacell.kinematics.geometry import GeometryBatch
 from hexacell.kinematics.leg_closure import closure_to_compile
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.sensitivity import margin_and_mode, singularity_margin
+from hexacell.kinematics.sensitivity import (
+    inverse_and_mode,
+    margin_and_mode,
+    pose_sensitivity,
+    position_sensitivity,
+    singularity_margin,
+)
 from hexacell.limits.leg_limits import LegLimits
 from hexacell.robot_model import robot_of
 from hexacell.virtual_robot import random_robot
@@ -117,6 +123,31 @@ def test_margins_are_decided_alike_near_the_limit_too(cell, share):
         np.testing.assert_array_equal(by_numpy[1], by_loops[1])
 
 
+def test_poses_depend_alike_on_joints_and_parameters(cell):
+    robot, nominal, _, poses, joints = cell
+    by_numpy, by_loops = both(lambda: pose_sensitivity(robot.mechanism, nominal, poses, joints))
+    np.testing.assert_array_equal(by_numpy.mode, by_loops.mode)
+    largest = np.abs(by_numpy.parameters).max()
+    np.testing.assert_allclose(by_numpy.parameters, by_loops.parameters, atol=1e-9 * largest)
+    np.testing.assert_allclose(by_numpy.joints, by_loops.joints, atol=1e-9 * largest)
+    by_numpy, by_loops = both(lambda: position_sensitivity(robot.mechanism, nominal, poses, joints)[0])
+    np.testing.assert_allclose(by_numpy, by_loops, atol=1e-9 * largest)
+
+
+def test_an_exact_singularity_is_told_alike():
+    jacobians = np.stack([np.eye(6), np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])])
+    for is_on in (False, True):
+        with compiled(is_on), pytest.raises(np.linalg.LinAlgError):
+            inverse_and_mode(jacobians)
+
+
+def test_assembly_modes_are_the_same(cell):
+    robot, nominal, robots, poses, joints = cell
+    for geometry in (nominal, robots):
+        modes = both(lambda geometry=geometry: modes_of(robot.mechanism, geometry, poses, joints))
+        np.testing.assert_array_equal(*modes)
+
+
 @pytest.mark.parametrize("has_distance", [False, True])
 def test_legs_keep_the_same_limits(cell, has_distance):
     robot, nominal, _, poses, joints = cell
@@ -131,6 +162,8 @@ def test_legs_keep_the_same_limits(cell, has_distance):
     np.testing.assert_array_equal(by_numpy, by_loops)
     assert by_numpy.any()
     assert not by_numpy.all()
+    # Angles near zero are known to the root of the rounding of their cosines.
+    np.testing.assert_allclose(*both(lambda: limits.margins(legs)), atol=1e-7)
 
 
 def test_a_decision_is_the_same_in_a_program_of_its_own():

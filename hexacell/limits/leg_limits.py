@@ -85,9 +85,8 @@ class LegLimits:
         kept = np.empty(len(legs.rotations), dtype=bool)
         distance = float(self.distance_mm + least[12]) if self.distance_mm != 0.0 else 0.0
         cones = self.base_cones - least[:6], self.platform_cones - least[6:12]
-        keeps(
-            *_arrays(legs), _own(self.base_axes), _own(self.platform_axes), *cones, distance, PARALLEL, kept
-        )
+        axes = _own(self.base_axes), _own(self.platform_axes)
+        keeps(*_arrays(legs), *axes, *cones, distance, PARALLEL, kept)
         return kept
 
     def _margins_compiled(self, legs: Legs) -> Array:
@@ -95,8 +94,9 @@ class LegLimits:
         from hexacell.kinematics.compiled.leg_margins import margins  # noqa: PLC0415
 
         found = np.empty((len(legs.rotations), 12 + (self.distance_mm != 0.0)))
-        limits = self.base_axes, self.platform_axes, self.base_cones, self.platform_cones
-        margins(*_arrays(legs), *map(_own, limits), float(self.distance_mm), PARALLEL, found)
+        axes = _own(self.base_axes), _own(self.platform_axes)
+        cones = _own(self.base_cones), _own(self.platform_cones)
+        margins(*_arrays(legs), *axes, *cones, float(self.distance_mm), PARALLEL, found)
         return found
 
     def margins_for(self, turn: float, radius_mm: float) -> Array:

@@ -163,7 +163,8 @@ def test_legs_keep_the_same_limits(cell, has_distance):
     assert by_numpy.any()
     assert not by_numpy.all()
     # Angles near zero are known to the root of the rounding of their cosines.
-    np.testing.assert_allclose(*both(lambda: limits.margins(legs)), atol=1e-7)
+    by_numpy, by_loops = both(lambda: limits.margins(legs))
+    np.testing.assert_allclose(by_numpy, by_loops, atol=1e-7)
 
 
 def test_a_decision_is_the_same_in_a_program_of_its_own():

@@ -140,12 +140,22 @@ class Forecaster:
 
     def predicted_belief(self, belief: RobotBelief, state: CampaignState) -> RobotBelief:
         """What will be known once everything that is still planned is measured."""
-        planned = self.planned(state).items()
-        if not planned:
-            return belief
+        return replace(belief, covariance=self._covariance_after(belief, state, self.planned(state)))
+
+    def known_beside_next(self, belief: RobotBelief, state: CampaignState) -> Array:
+        """The covariance (p, p), mm^2, once all that is planned is measured but the point's next record."""
+        planned = self.planned(state)
+        others = {point: more - (point == state.point) for point, more in planned.items()}
+        return self._covariance_after(belief, state, others)
+
+    def _covariance_after(
+        self, belief: RobotBelief, state: CampaignState, planned: Mapping[int, int]
+    ) -> Array:
+        if not any(planned.values()):
+            return belief.covariance
         information = PlannedInformation.of(self.planned_sets(), belief)
-        added = [information.added(state, point, more) for point, more in planned]
-        return replace(belief, covariance=add_information(belief.covariance, np.sum(added, axis=0)))
+        added = [information.added(state, point, more) for point, more in planned.items()]
+        return add_information(belief.covariance, np.sum(added, axis=0))
 
     def _options(
         self,

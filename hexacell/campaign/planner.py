@@ -169,7 +169,10 @@ class Plan:
     @cached_property
     def chooser(self) -> PoseChooser:
         """Chooses the next pose at a point."""
-        return PoseChooser(self.settings, self.robot, self.pose_list, self.task, self.candidates)
+        known_then = None if self.goal else self.forecaster.known_beside_next
+        return PoseChooser(
+            self.settings, self.robot, self.pose_list, self.task, self.candidates, known_then
+        )
 
     @cached_property
     def budget(self) -> Budget:

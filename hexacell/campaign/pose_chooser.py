@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -21,6 +21,7 @@ from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.identified_zeros import ParameterChoice, zero_columns
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array
 from hexacell.motion.paths import PathPlanner, find_route
 from hexacell.robot_model import Robot
 
@@ -40,6 +41,9 @@ class PoseChooser:
         pose_list: poses to visit; none where they are to be selected.
         task: where the robot has to be accurate.
         candidates: number of candidate orientations.
+        known_then: gives the covariance (p, p) once all that is planned is measured but the next record,
+            which has to gain beside it as soon as the robot is well known; none where the plan may end
+            sooner.
     """
 
     settings: CellSettings
@@ -47,6 +51,7 @@ class PoseChooser:
     pose_list: PoseList | None
     task: Task
     candidates: int
+    known_then: Callable[[RobotBelief, CampaignState], Array] | None = None
 
     def choose(
         self, belief: RobotBelief, zero: GaugeZero, state: CampaignState
@@ -112,11 +117,14 @@ class PoseChooser:
         tilt = tilt_share * belief.limits.tilt
         target = zero.target
         well_known = belief.orientation_sigma(target.poses, target.joints) <= WELL_KNOWN_SIGMA
+        # The best are refined: more candidates are needed only where few of them are safe.
+        count = self.candidates // 2 if well_known else self.candidates
         amplitudes = Amplitudes.MOSTLY_LARGE if well_known else Amplitudes.ALL_SCALES
         orientations = candidates.orientations(
-            self.candidates, tilt, self._seed(state), amplitudes, belief.limits.turn
+            count, tilt, self._seed(state), amplitudes, belief.limits.turn
         )
-        return select_pose(planner, zero, orientations, self._criterion(belief))
+        known_then = self.known_then(belief, state) if well_known and self.known_then else None
+        return select_pose(planner, zero, orientations, self._criterion(belief), known_then)
 
     def _criterion(self, belief: RobotBelief) -> Criterion:
         name = self.settings.identification.criterion

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
@@ -48,6 +49,12 @@ class ReachableTargets:
     poses: PoseBatch
     joints: Array
 
+    @classmethod
+    def concatenate(cls, parts: Sequence[ReachableTargets]) -> ReachableTargets:
+        """The targets of several."""
+        poses = PoseBatch.concatenate(part.poses for part in parts)
+        return cls(poses, np.concatenate([part.joints for part in parts]))
+
     def __len__(self) -> int:
         return len(self.joints)
 
@@ -88,6 +95,19 @@ def _amplitudes(uniform: Array, scale: Array, amplitudes: Amplitudes) -> Array:
     """Shares of the largest amplitude, from values distributed uniformly over 0 to 1."""
     large = np.sqrt(uniform) if amplitudes is Amplitudes.MOSTLY_LARGE else uniform
     return np.where(scale < amplitudes.value, SMALLEST_SHARE ** (1.0 - uniform), large)
+
+
+def rows_apart(rotations: Array, ranking: NDArray[np.intp], most: int, apart: float) -> NDArray[np.intp]:
+    """The first of some ranked orientations (n, 3, 3), none of them within ``apart``, rad, of another."""
+    flat = rotations[ranking].reshape(-1, 9)
+    traces = flat @ flat.T
+    is_near, is_left = traces >= 1.0 + 2.0 * np.cos(apart), np.ones(len(flat), dtype=bool)
+    kept: list[int] = []
+    while len(kept) < most and is_left.any():
+        kept.append(int(np.argmax(is_left)))
+        is_left &= ~is_near[kept[-1]]
+        is_left[kept[-1]] = False  # with ``apart`` 0 rounding decides whether it is near itself
+    return ranking[kept]
 
 
 def reachable_targets(belief: RobotBelief, poses: PoseBatch, mode: Array | None = None) -> ReachableTargets:

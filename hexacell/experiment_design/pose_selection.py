@@ -1,8 +1,9 @@
 """Selection of the pose to measure next: greedy optimal design under limits of travel and motion.
 
-Candidates are scored first, by the gain of a criterion (:mod:`hexacell.experiment_design.criteria`). Those
-that linear propagation puts inside the gauges' travel are ranked by it. The ranking is then walked from
-the best downward, a few candidates at a time, and the first is taken that
+Candidates that linear propagation puts inside the gauges' travel are scored first, by the gain of a
+criterion (:mod:`hexacell.experiment_design.criteria`), and the best of them are refined
+(:mod:`hexacell.experiment_design.candidate_refinement`). Their ranking is then walked from the best
+downward, a few candidates at a time, and the first is taken that
 
 1. the controller can be commanded to,
 2. satisfies the chance constraint on the travel
@@ -21,21 +22,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.errors import LimitError
-from hexacell.experiment_design.candidates import commands_for, outcomes_of, reachable_targets
+from hexacell.experiment_design.candidate_refinement import CandidateSpace
+from hexacell.experiment_design.candidates import commands_for, outcomes_of
 from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion
-from hexacell.experiment_design.predicted_records import (
-    TRAVEL_SHARE,
-    GaugeZero,
-    PredictedRecords,
-    predict_records,
-)
+from hexacell.experiment_design.predicted_records import GaugeZero, PredictedRecords, predict_records
 from hexacell.experiment_design.travel_monte_carlo import TravelConstraint
-from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.motion.paths import Path, PathPlanner, Rows
 
-MOST_CANDIDATES = 240
+MOST_CANDIDATES = 280
 COMMAND_BATCHES = (12, 24, 48)
 PATH_BATCH = 4
 """The best candidates are examined, their commands in batches, of the last size in the end, and their paths
@@ -63,27 +59,43 @@ class SelectedPose:
 
 
 def select_pose(
-    planner: PathPlanner, zero: GaugeZero, orientations: Array, criterion: Criterion = D_OPTIMAL
+    planner: PathPlanner,
+    zero: GaugeZero,
+    orientations: Array,
+    criterion: Criterion = D_OPTIMAL,
+    known_then: Array | None = None,
 ) -> SelectedPose:
     """The best by a criterion of some orientations (n, 3, 3), relative to the platform's at the reference.
 
     They are not relative to the level platform: with millimetres of error in the joints the platform may
     be 20 degrees from where the controller believes it to be.
 
+    Args:
+        planner: of paths from where the robot is.
+        zero: of the point's gauges.
+        orientations: candidates.
+        criterion: what is best.
+        known_then: covariance of the free parameters (p, p), mm^2, beside which a record has to gain; none
+            for that of now.
+
     Raises:
         LimitError: none is reachable within the limits and almost surely inside the travel.
     """
     belief = planner.belief
-    poses = PoseBatch.at(zero.reference, orientations @ zero.orientation)
-    records = predict_records(belief, zero, reachable_targets(belief, poses, zero.mode(belief)))
-    if not len(records):
+    covariance = belief.covariance if known_then is None else known_then
+    space = CandidateSpace(
+        belief, zero, lambda some: criterion.gain(covariance, some.jacobian, some.covariance)
+    )
+    candidates = space.rated(orientations @ zero.orientation)
+    if candidates is None:
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
-    gains = criterion.gain(belief.covariance, records.jacobian, records.covariance)
+    if len(candidates):
+        candidates = space.refined(candidates).best_first(MOST_CANDIDATES)
     search = _PathSearch(TravelConstraint(belief, zero), planner)
-    for ranked in _batches(_ranking(belief, records, gains), *COMMAND_BATCHES):
-        commands, found = commands_for(belief, records.targets[ranked])
+    for ranked in _batches(np.arange(len(candidates)), *COMMAND_BATCHES):
+        commands, found = commands_for(belief, candidates.records.targets[ranked])
         rows = ranked[found]
-        if selected := search.first_safe(records[rows], commands[found], gains[rows]):
+        if selected := search.first_safe(candidates.records[rows], commands[found], candidates.gains[rows]):
             return selected
     raise LimitError("no orientation surely keeps the ball inside the gauges' travel")
 
@@ -102,7 +114,7 @@ def select_from_list(
     belief = planner.belief
     targets, rows = outcomes_of(belief, commands)
     records = predict_records(belief, zero, targets)
-    inside = np.flatnonzero(records.within(belief.limits, TRAVEL_SHARE))[skipped:]
+    inside = np.flatnonzero(records.stay_inside(belief.limits))[skipped:]
     search = _PathSearch(TravelConstraint(belief, zero), planner)
     no_preference = np.full(len(inside), np.inf)
     selected = search.first_of_few(records[inside], commands[rows[inside]], no_preference)
@@ -111,12 +123,6 @@ def select_from_list(
             "none of the poses left in the list surely keeps the ball inside the gauges' travel"
         )
     return selected
-
-
-def _ranking(belief: RobotBelief, records: PredictedRecords, gains: Array) -> Rows:
-    """Rows of the records inside the travel by linear propagation, the best first."""
-    rows = np.flatnonzero(records.within(belief.limits, TRAVEL_SHARE))
-    return rows[np.argsort(-gains[rows], kind="stable")][:MOST_CANDIDATES]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,6 +5,7 @@ Both are propagated linearly with their covariances.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -131,6 +132,21 @@ class PredictedRecords:
             self.deviation[rows],
             self.sigma[rows],
         )
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[PredictedRecords]) -> PredictedRecords:
+        """The records of several."""
+        return cls(
+            ReachableTargets.concatenate([part.targets for part in parts]),
+            np.concatenate([part.jacobian for part in parts]),
+            np.concatenate([part.covariance for part in parts]),
+            np.concatenate([part.deviation for part in parts]),
+            np.concatenate([part.sigma for part in parts]),
+        )
+
+    def stay_inside(self, limits: Limits) -> Mask:
+        """Which deviations surely stay inside the gauges' room, by linear propagation."""
+        return self.within(limits, TRAVEL_SHARE)
 
     def within(self, limits: Limits, share: float) -> Mask:
         """Which deviations stay within a share of the gauges' room, with four sigma."""

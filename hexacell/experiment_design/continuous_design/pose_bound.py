@@ -15,13 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.experiment_design.candidates import ReachableTargets
+from hexacell.experiment_design.candidates import ReachableTargets, rows_apart
 from hexacell.experiment_design.continuous_design.certificate import Linearization
 from hexacell.experiment_design.continuous_design.measure import DesignMeasure
 from hexacell.experiment_design.continuous_design.optimality import Optimality
 from hexacell.experiment_design.continuous_design.pose_domain import PoseDomain
 from hexacell.experiment_design.continuous_design.solver import largest_sensitivities, weighted, with_more
-from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
 SPREAD = 2048
@@ -65,13 +64,15 @@ def design_bound(
 ) -> DesignBound:
     """The bound of all designs with the start's prior, fixed records and numbers of records."""
     random = np.random.default_rng(0)
-    known: list[ReachableTargets | None] = [None] * len(domains)
+    known: list[list[ReachableTargets]] = [[]] * len(domains)
     design, certificate = start, 0.0
     for climb in range(MOST_CLIMBS):
         design = weighted(design, optimality, max(gap, ROUGHLY * (1.0 - certificate)))
         at = Linearization.at(design, optimality)
         climbed = [
-            _Climb(at, point, domain, random).climbed(_joined(known[point], domain.spread(SPREAD, climb)))
+            _Climb(at, point, domain, random).climbed(
+                ReachableTargets.concatenate([*known[point], domain.spread(SPREAD, climb)])
+            )
             for point, domain in enumerate(domains)
         ]
         more = [domain.records(some) for domain, some in zip(domains, climbed, strict=True)]
@@ -81,7 +82,7 @@ def design_bound(
             break
         best = [np.argsort(-one)[:ADDED] for one in found]
         design = with_more(design, [records[rows] for records, rows in zip(more, best, strict=True)])
-        known = list(climbed)
+        known = [[some] for some in climbed]
     return DesignBound(design, design.information()[0], certificate)
 
 
@@ -97,7 +98,7 @@ class _Climb:
     def climbed(self, targets: ReachableTargets) -> ReachableTargets:
         """The most sensitive of some poses, turned to where they are more so."""
         values = self._sensitivities(targets)
-        best = _apart(targets.poses, np.argsort(-values))
+        best = rows_apart(targets.poses.rotations, np.argsort(-values), CLIMBING, APART)
         present, values = targets[best], values[best]
         for angle in ANGLES:
             turned, rows = self.domain.possible_rows(self.domain.around(present, angle, self.random))
@@ -111,26 +112,9 @@ class _Climb:
         return self.at.sensitivities(self.point, self.domain.records(targets))
 
 
-def _apart(poses: PoseBatch, ranking: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The first of some ranked poses, none of them near another one."""
-    kept: list[int] = []
-    left = ranking
-    while len(left) and len(kept) < CLIMBING:
-        kept.append(int(left[0]))
-        left = left[poses[left].angles_to(poses[[kept[-1]]]) > APART]
-    return np.array(kept, dtype=np.intp)
-
-
 def _replaced(
     targets: ReachableTargets, rows: NDArray[np.intp], others: ReachableTargets
 ) -> ReachableTargets:
     joints = targets.joints.copy()
     joints[rows] = others.joints
     return ReachableTargets(targets.poses.with_rows(rows, others.poses), joints)
-
-
-def _joined(first: ReachableTargets | None, second: ReachableTargets) -> ReachableTargets:
-    if first is None:
-        return second
-    poses = PoseBatch.concatenate([first.poses, second.poses])
-    return ReachableTargets(poses, np.concatenate([first.joints, second.joints]))

@@ -58,7 +58,7 @@ def test_an_unchanged_robot_raises_none(check) -> None:
     assert (alarm.records, alarm.is_raised) == (FIRST_RECORDS, False)
 
 
-@pytest.mark.parametrize(("name", "leg"), [("l2", 2), ("l5", 5), ("S4z", 4)])
+@pytest.mark.parametrize(("name", "leg"), [("l2", 2), ("l5", 5), ("S2z", 2)])
 def test_a_part_that_moved_raises_one_that_names_its_leg(check, name, leg) -> None:
     alarm = change_alarm(check, measured(check, name, 0.08))
     assert alarm is not None
@@ -99,7 +99,7 @@ def test_the_result_of_a_check_has_it_and_the_verdict_does_not_heed_it(check) ->
 
 def test_the_expansion_of_the_legs_raises_no_alarm(check) -> None:
     """One leg is warmer than at the calibration, and longer by it; a thermometer on it tells."""
-    kelvin, leg = 8.0, 5
+    kelvin, leg = 7.0, 5
     parameters = check.robot.mechanism.parameters
     length = check.robot.commanding.vector[parameters.names.index(f"l{leg}")]
     longer = 1e-6 * check.settings.uncertainty.expansion_legs_um_m_k * length * kelvin

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from hexacell.experiment_design.criteria import add_information, covariance_upda
 from hexacell.identification.diagnostics.pose_accuracy import predicted_accuracy
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import MeasurementSet
+from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.virtual_robot import VirtualRobot
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
@@ -107,3 +109,18 @@ def test_without_reachable_task_poses_there_is_no_forecast(make_plan, campaign):
     visit = plan.decide(campaign[3].state)
     assert visit.forecast is None
     assert visit.gain > 0.0
+
+
+def test_what_is_known_beside_the_next_record_is_all_that_is_planned_without_it(plan):
+    """At the reference of the first point: six more there beside the next one, and eight at the second."""
+    belief, pose = plan.robot.belief(), plan.reference_pose(1)
+    record = Record(1, 1, pose, (0.0,) * 6, (0.0, 0.0, 0.0))
+    state = CampaignState(MeasurementSet((record,)), point=1, present=pose)
+    seen = PlannedInformation.of(plan.planned_sets, belief)
+    planned = add_information(belief.covariance, seen.information(1, 7) + seen.information(2, 8))
+    known = plan.forecaster.known_beside_next(belief, state)
+    np.testing.assert_allclose(known, planned, rtol=1e-9, atol=1e-12)
+    # The second point's records go to the first, of which one is left.
+    taken = MeasurementSet(tuple(replace(record, orientation=row) for row in range(1, 16)))
+    at_end = replace(state, measurements=taken, done=frozenset({2}))
+    np.testing.assert_array_equal(plan.forecaster.known_beside_next(belief, at_end), belief.covariance)

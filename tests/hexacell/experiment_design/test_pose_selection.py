@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from hexacell.errors import ExitCode, LimitError
 from hexacell.experiment_design import pose_selection
 from hexacell.experiment_design.candidates import orientations
+from hexacell.experiment_design.criteria import covariance_update
 from hexacell.experiment_design.pose_selection import WAYPOINT_GAIN_RATIO, select_pose
 from hexacell.experiment_design.predicted_records import (
     SAFETY_SIGMAS,
@@ -152,6 +153,18 @@ def test_no_other_safe_orientation_gains_more(know, much):
         assert selected(know(much), at, TURNS[rows]).gain <= WAYPOINT_GAIN_RATIO * best.gain
 
 
+def test_a_record_like_one_that_is_planned_is_not_selected(know, much):
+    belief, at = know(much), station_of(know, much, 1)
+    first = selected(belief, at, TURNS)
+    record = first.record
+    then = covariance_update(belief.covariance, record.jacobian[0], record.covariance[0] / 8.0)
+    planner = PathPlanner(belief, at.command(belief), None, at.reference)
+    second = select_pose(planner, at, TURNS, known_then=then)
+    turn = Rotation.from_matrix(second.command.rotation @ first.command.rotation.T)
+    assert np.degrees(turn.magnitude()) > 15.0
+    assert second.gain < first.gain  # beside what is known now
+
+
 def test_rotations_are_larger_when_more_is_known(know, little, much):
     def turned(estimate):
         at = station_of(know, estimate, 1)
@@ -204,6 +217,8 @@ def test_an_orientation_without_a_clear_path_is_not_selected(know, much):
 def test_waypoints_are_taken_only_for_enough_gain(know, much, monkeypatch):
     """From a tilted pose: the selected orientation depends on what waypoints cost."""
     at, start = station_of(know, much, 1), much.problem.commands.poses[[2]]
+    for name, size in (("PATH_BATCH", 64), ("COMMAND_BATCHES", (64,))):
+        monkeypatch.setattr(pose_selection, name, size)  # so many that a straight line leads to one
 
     def chosen(least):
         monkeypatch.setattr(pose_selection, "WAYPOINT_GAIN_RATIO", least)

@@ -11,7 +11,7 @@ complement:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -129,7 +129,7 @@ class Forecaster:
         if error is None:
             return PointRanking(dict.fromkeys(points, math.inf), points[0])
         error = error.of_estimate
-        information = PlannedInformation.of(self.planned_sets(), belief)
+        information = PlannedInformation.of(self._sets_at(points), belief)
         gains: dict[int, float] = {}
         rates: dict[int, float] = {}
         for point in points:
@@ -153,9 +153,14 @@ class Forecaster:
     ) -> Array:
         if not any(planned.values()):
             return belief.covariance
-        information = PlannedInformation.of(self.planned_sets(), belief)
+        information = PlannedInformation.of(self._sets_at(planned), belief)
         added = [information.added(state, point, more) for point, more in planned.items()]
         return add_information(belief.covariance, np.sum(added, axis=0))
+
+    def _sets_at(self, points: Container[int]) -> list[PoseBatch]:
+        """The planned sets of some points, and empty ones of the others, which would only take time."""
+        every = enumerate(self.planned_sets(), start=1)
+        return [poses if point in points else poses[:0] for point, poses in every]
 
     def _options(
         self,

@@ -44,8 +44,9 @@ class TaskError:
         """Mean square distances (n,), mm^2, under a covariance (p, p) of the estimated free parameters."""
         if self.held is not None and self.gain is not None:
             covariance = self.held.covariance(self.gain, covariance)
-        squares: Array = np.einsum("nap,pq,naq->n", self.jacobian, covariance, self.jacobian, optimize=True)
-        return squares
+        flat = self.jacobian.reshape(-1, len(covariance))
+        squares: Array = np.sum((flat @ covariance) * flat, axis=-1).reshape(self.jacobian.shape[:2])
+        return np.asarray(squares.sum(axis=-1))
 
     def weight(self) -> Array:
         """Weight W (p, p) of the parameters' covariance C: ``tr(W C)`` is the mean square error."""

@@ -18,9 +18,10 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import assembly_mode
+from hexacell.kinematics.free_sensitivity import POSITION, free_sensitivity
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import pose_jacobian, position_sensitivity
+from hexacell.kinematics.sensitivity import pose_jacobian
 from hexacell.limits.limits import Limits
 
 SAFETY_SIGMAS = 4.0
@@ -96,10 +97,9 @@ def gauge_zero_at(belief: RobotBelief, found: Identification, point: int) -> Gau
 
 def position_derivatives(belief: RobotBelief, targets: ReachableTargets) -> tuple[Array, Array]:
     """Of the ball's position at n targets: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
-    by_parameters, by_joints = position_sensitivity(
-        belief.mechanism, belief.estimate, targets.poses, targets.joints
-    )
-    return by_parameters @ belief.basis, by_joints
+    at = belief.mechanism, belief.estimate, targets.poses, targets.joints
+    sensitivity = free_sensitivity(*at, POSITION)
+    return sensitivity.free, sensitivity.joints
 
 
 @dataclass(frozen=True, slots=True, eq=False)

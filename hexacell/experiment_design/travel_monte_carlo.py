@@ -30,10 +30,11 @@ from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.experiment_design.predicted_records import GaugeZero, PredictedRecords, predict_records
 from hexacell.identification.belief import SPARE_ANGLE, SPARE_SIGMAS, UNCERTAIN_SIGMA, RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
+from hexacell.kinematics.free_sensitivity import FreeSensitivity, free_sensitivity
 from hexacell.kinematics.geometry import GeometryBatch
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import Sensitivity, has_singularity_margin, pose_sensitivity
+from hexacell.kinematics.sensitivity import has_singularity_margin
 from hexacell.limits.limits import Limits
 from hexacell.motion.paths import Path
 
@@ -108,7 +109,7 @@ class TravelConstraint:
         poses = PoseBatch.concatenate((zero.target.poses, targets.poses))
         # The reference is estimated from its records, so that it closes the legs only approximately.
         poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
-        sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, poses, joints)
+        sensitivity = free_sensitivity(belief.mechanism, belief.estimate, poses, joints)
         sigma = belief.orientation_sigma_from(sensitivity)
         if sigma > UNCERTAIN_SIGMA:
             return _nearly_all_hold(belief, joints, poses, sensitivity)
@@ -162,7 +163,7 @@ class _SampledRobots:
 
 
 def _nearly_all_hold(
-    belief: RobotBelief, joints: Array, poses: PoseBatch, sensitivity: Sensitivity
+    belief: RobotBelief, joints: Array, poses: PoseBatch, sensitivity: FreeSensitivity
 ) -> Mask:
     """At which targets the constraint holds on all of many sampled robots but the worst.
 
@@ -185,19 +186,19 @@ def _nearly_all_hold(
 
 
 def _sample(
-    belief: RobotBelief, variates: Array, joints: Array, poses: PoseBatch, sensitivity: Sensitivity
+    belief: RobotBelief, variates: Array, joints: Array, poses: PoseBatch, sensitivity: FreeSensitivity
 ) -> _SampledRobots:
     """Solve n poses, the reference first, for robots sampled from the belief by normal ``variates`` (r, p).
 
     Samples that cannot take the reference are dropped: the true robot could.
     """
     samples, root = len(variates), np.linalg.cholesky(belief.covariance)
-    errors = variates @ root.T @ belief.basis.T
+    errors = variates @ root.T
     count, margin = len(joints), belief.limits.singularity_margin
     # Newton's method starts where linear propagation puts the pose of each robot.
-    steps = np.einsum("nip,rp->rni", sensitivity.parameters, errors).reshape(-1, 6)
+    steps = (errors @ sensitivity.free.reshape(-1, errors.shape[1]).T).reshape(-1, 6)
     rows = np.tile(np.arange(count), samples)
-    vectors = (belief.estimate.vector + errors).repeat(count, axis=0)
+    vectors = (belief.estimate.vector + errors @ belief.basis.T).repeat(count, axis=0)
     robots = GeometryBatch(belief.mechanism.parameters, vectors)
     start, mode = apply_twist(poses[rows], steps), sensitivity.mode[rows]
     result = forward_kinematics(

@@ -10,12 +10,12 @@ import numpy as np
 from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.commanded_motion import ActualPoses, CommandedRobot
 from hexacell.kinematics.forward import apply_twist
+from hexacell.kinematics.free_sensitivity import FreeSensitivity, free_sensitivity
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import Sensitivity, pose_sensitivity
 from hexacell.limits.limits import Limits
 
 SPARE_ANGLE = float(np.radians(0.5))
@@ -78,11 +78,11 @@ class RobotBelief:
         About the base axis about which it is known least.
         """
         at_first = poses[:1], joints[:1]
-        return self.orientation_sigma_from(pose_sensitivity(self.mechanism, self.estimate, *at_first))
+        return self.orientation_sigma_from(free_sensitivity(self.mechanism, self.estimate, *at_first))
 
-    def orientation_sigma_from(self, sensitivity: Sensitivity) -> float:
+    def orientation_sigma_from(self, sensitivity: FreeSensitivity) -> float:
         """The same from the sensitivity there."""
-        return float(self._orientation_sigmas(sensitivity.parameters[:1])[0])
+        return float(self._orientation_sigmas(sensitivity.free[:1])[0])
 
     @cached_property
     def least_margins(self) -> Array:
@@ -103,39 +103,39 @@ class RobotBelief:
         """
         if self.limits.legs is None:
             return np.zeros((len(at.joints), 0))
-        sensitivity = pose_sensitivity(self.mechanism, self.estimate, at.poses, at.joints)
+        sensitivity = free_sensitivity(self.mechanism, self.estimate, at.poses, at.joints)
         margins = np.tile(self.least_margins, (len(at.joints), 1))
-        known = np.flatnonzero(self._orientation_sigmas(sensitivity.parameters) <= UNCERTAIN_SIGMA)
+        known = np.flatnonzero(self._orientation_sigmas(sensitivity.free) <= UNCERTAIN_SIGMA)
         if len(known):
             margins[known] += SPARE_SIGMAS * self._margin_sigmas(at[known], sensitivity[known])
         return margins
 
-    def _margin_sigmas(self, at: ActualPoses, sensitivity: Sensitivity) -> Array:
+    def _margin_sigmas(self, at: ActualPoses, sensitivity: FreeSensitivity) -> Array:
         """Standard deviations (n, m) of the margins of passive joints and legs at n poses."""
-        changes = np.vstack([np.zeros(len(self.basis)), self._principal_changes])
+        changes = np.vstack([np.zeros(len(self.free)), self._principal_changes])
         count, every = len(at.joints), len(changes)
         rows = np.arange(count).repeat(every)
         robots = GeometryBatch(
-            self.mechanism.parameters, np.tile(self.estimate.vector + changes, (count, 1))
+            self.mechanism.parameters, np.tile(self.estimate.vector + changes @ self.basis.T, (count, 1))
         )
-        steps = changes @ np.swapaxes(sensitivity.parameters, -1, -2)
+        steps = changes @ np.swapaxes(sensitivity.free, -1, -2)
         moved = apply_twist(at.poses[rows], steps.reshape(-1, 6))
         margins = self.limits.leg_margins(self.mechanism, robots, moved, at.joints[rows])
         margins = margins.reshape(count, every, -1)
         sigmas: Array = np.linalg.norm(margins[:, 1:] - margins[:, :1], axis=1)
         return sigmas
 
-    def _orientation_sigmas(self, by_parameters: Array) -> Array:
-        """:meth:`orientation_sigma` at n poses with the derivatives (n, 6, P)."""
-        rotation = by_parameters[:, 3:] @ self.basis
+    def _orientation_sigmas(self, by_free: Array) -> Array:
+        """:meth:`orientation_sigma` at n poses with the derivatives (n, 6, p)."""
+        rotation = by_free[:, 3:]
         sigmas: Array = np.sqrt(((rotation @ self.covariance) * rotation).sum(axis=-1).max(axis=-1))
         return sigmas
 
     @cached_property
     def _principal_changes(self) -> Array:
-        """(p, P): one standard deviation along each principal axis of the parameters' distribution, mm."""
+        """(p, p): one standard deviation along each principal axis of the parameters' distribution, mm."""
         variances, axes = np.linalg.eigh(self.covariance)
-        changes: Array = np.sqrt(np.maximum(variances, 0.0))[:, None] * axes.T @ self.basis.T
+        changes: Array = np.sqrt(np.maximum(variances, 0.0))[:, None] * axes.T
         return changes
 
     def keeps_limits(self, poses: PoseBatch, joints: Array, wanted: Array | None = None) -> Mask:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hexacell.errors import ReachError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.legs import Legs
-from hexacell.kinematics.parameters import GeometricParameter, JointUnit, ParameterSet
+from hexacell.kinematics.parameters import LEGS, GeometricParameter, JointUnit, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -79,6 +79,26 @@ class FrameConvention:
     @cached_property
     def _free_rows(self) -> NDArray[np.intp]:
         return self.parameters.rows(self.free_names())
+
+    @cached_property
+    def dependent(self) -> tuple[tuple[int, int], ...]:
+        """Parameters that are equal to another one, and the free parameter that stands for both."""
+        equal = [name for group in self.equal for name in group[1:]]
+        rows = self.parameters.rows(equal)
+        return tuple(zip(rows.tolist(), self._columns[rows].tolist(), strict=True))
+
+    @cached_property
+    def leg_columns(self) -> NDArray[np.intp]:
+        """Which free parameter each number of each leg is (6, c), in the order of the kinds; -1 if none."""
+        columns = np.empty(len(self.parameters), dtype=np.intp)
+        columns[self.parameters.leg_order] = self._columns
+        return columns.reshape(LEGS, -1)
+
+    @cached_property
+    def _columns(self) -> NDArray[np.intp]:
+        """Which free parameter each parameter is (P,); -1 where it is zero."""
+        basis = self.basis()
+        return np.where(basis.any(axis=1), basis.argmax(axis=1), -1)
 
     def free_parameters(self, geometry: Geometry) -> Array:
         """The free parameters (p,) of a geometry in the convention's frames."""

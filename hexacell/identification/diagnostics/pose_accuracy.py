@@ -21,9 +21,9 @@ import numpy as np
 
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit, pose_errors
+from hexacell.kinematics.free_sensitivity import free_sensitivity
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import pose_sensitivity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,8 +113,9 @@ def error_jacobian(belief: RobotBelief, task: PoseBatch, workspace: PoseBatch) -
 
     The estimated robot reaches all poses, and the frames are fitted over the workspace.
     """
-    fit = teachable_frames(belief, workspace)
-    return fit.remove_frame_motion(task, _derivatives(belief, task), _derivatives(belief, workspace))
+    both = _derivatives(belief, PoseBatch.concatenate([task, workspace]))
+    of_task, of_workspace = both[: len(task)], both[len(task) :]
+    return teachable_frames(belief, workspace).remove_frame_motion(task, of_task, of_workspace)
 
 
 def teachable_frames(belief: RobotBelief, workspace: PoseBatch) -> FrameFit:
@@ -137,8 +138,7 @@ def _reached(belief: RobotBelief, commanded: PoseBatch) -> tuple[PoseBatch, Mask
 def _derivatives(belief: RobotBelief, poses: PoseBatch) -> Array:
     """Derivatives (n, 6, p) of the poses by the free parameters, at the estimate's joint variables."""
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
-    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, poses, joints)
-    return sensitivity.parameters @ belief.basis
+    return free_sensitivity(belief.mechanism, belief.estimate, poses, joints).free
 
 
 def _norms(squares: Array) -> PoseErrors:

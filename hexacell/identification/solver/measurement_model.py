@@ -19,9 +19,9 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Noise, Problem
 from hexacell.kinematics.forward import ForwardResult, apply_twist, forward_kinematics
+from hexacell.kinematics.free_sensitivity import free_sensitivity
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import pose_sensitivity
 
 LARGEST_AMPLIFICATION = 100.0
 """mm of the ball per mm of a slider. Beyond it a record has no information and its linearization fails."""
@@ -73,14 +73,14 @@ def evaluate_step(problem: Problem, present: Prediction, step: Array) -> Forward
 
 def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
     """The linearized measurement model at poses that close the geometry."""
-    sensitivity = pose_sensitivity(problem.mechanism, problem.geometry(free), poses, problem.joints)
+    sensitivity = free_sensitivity(problem.mechanism, problem.geometry(free), poses, problem.joints)
     by_joints = sensitivity.joints[:, :3]
     return Prediction(
         free=free,
         poses=poses,
         residuals=poses.positions - problem.deviations,
         weights=record_weights(by_joints, problem.noise),
-        pose_jacobian=sensitivity.parameters @ problem.basis,
+        pose_jacobian=sensitivity.free,
         by_joints=by_joints,
         mode=sensitivity.mode,
         singular=is_singular(by_joints),

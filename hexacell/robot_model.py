@@ -25,8 +25,9 @@ from hexacell.identification.identified_zeros import (
     ParameterChoice,
     zero_columns,
 )
+from hexacell.identification.problem.build import build_problem
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
-from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
+from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances
 from hexacell.identification.solver.result import GeometryEstimate, Identification
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
@@ -92,11 +93,16 @@ class Robot:
     identifies: ParameterChoice = ParameterChoice.ALL
 
     @cached_property
+    def _commanding_as_written(self) -> CommandingGeometry:
+        """The controller's config, whose frames its commands are in."""
+        return CommandingGeometry.of(self.mechanism, self.controller)
+
+    @cached_property
     def commanding(self) -> Geometry:
         """What the controller commands with now, in the frame convention."""
         if self.uses_provisional:
             return self.provisional[-1]
-        return self.mechanism.normalize_frames(self.controller)[0]
+        return self._commanding_as_written.geometry
 
     @property
     def free_parameters(self) -> Array:
@@ -146,7 +152,7 @@ class Robot:
         return build_problem(
             self.mechanism,
             measurements,
-            controller=self.controller,
+            controller=self._commanding_as_written,
             branch=self.branch,
             prior=self.prior,
             noise=self.noise,
@@ -185,7 +191,7 @@ class Robot:
 
     def with_controller(self, written: Geometry) -> Robot:
         """The robot once its controller has a ``written`` geometry, in frames of that geometry's own."""
-        own = self.mechanism.normalize_frames(self.controller)[0]
+        own = self._commanding_as_written.geometry
         before = (CommandingGeometry(one, self.frames) for one in (own, *self.provisional))
         frames = self.mechanism.normalize_frames(written)[1]
         return replace(

@@ -162,9 +162,10 @@ def _continued(problem: Problem, before: Identification) -> Identification:
 
 def _start_poses(problem: Problem, before: Identification) -> PoseBatch | None:
     """Poses that close the former estimate, to start the search; none if one is not found."""
-    rows = {tuple(label): row for row, label in enumerate(problem.labels.tolist())}
-    old = np.array([rows[tuple(label)] for label in before.problem.labels.tolist()], dtype=np.intp)
-    new = np.setdiff1d(np.arange(problem.records), old)
+    old = problem.rows_of(before.problem.labels)
+    is_new = np.ones(problem.records, dtype=bool)
+    is_new[old] = False
+    new = np.flatnonzero(is_new)
     solved = problem.commands[new].solve_poses(before.geometry, problem.joints[new])
     if not solved.found[problem.has_start_pose[new]].all():
         return None

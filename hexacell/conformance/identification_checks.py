@@ -6,7 +6,9 @@ import numpy as np
 
 from hexacell.conformance.example import MechanismExample
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise, Prior, build_problem
+from hexacell.identification.problem.build import build_problem
+from hexacell.identification.problem.commanded_poses import CommandingGeometry
+from hexacell.identification.problem.problem import Noise, Prior
 from hexacell.identification.solver.regularized_fit import RELEASE_RATIO
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import continue_solution
@@ -28,7 +30,7 @@ def check_identification(example: MechanismExample) -> None:
     problem = build_problem(
         example.mechanism,
         records_without_noise(example, truth),
-        controller=example.drawing,
+        controller=CommandingGeometry.of(example.mechanism, example.drawing),
         branch=example.branch,
         prior=Prior.of(example.mechanism, example.drawing, example.widths),
         noise=NOISE,

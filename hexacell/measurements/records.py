@@ -80,6 +80,10 @@ class MeasurementSet:
     def __len__(self) -> int:
         return len(self.records)
 
+    def subset(self, rows: NDArray[np.intp]) -> MeasurementSet:
+        """Those in some rows."""
+        return MeasurementSet(tuple(self.records[row] for row in rows.tolist()))
+
     @property
     def _ids(self) -> Iterator[RecordId]:
         return (record.id for record in self.records)

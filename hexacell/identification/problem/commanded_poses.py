@@ -8,6 +8,7 @@ there.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -81,6 +82,19 @@ class CommandedPoses:
             np.stack([each.rotations for each in poses])[choice, rows],
         )
         return cls(mechanism, chosen, geometries, choice, computed[choice, rows])
+
+    def are_of(self, candidates: Sequence[CommandingGeometry]) -> bool:
+        """Whether they were attributed to the very same geometries."""
+        own, others = self.candidate_geometries, [one.geometry for one in candidates]
+        return len(own) == len(others) and all(map(operator.is_, own, others))
+
+    def with_others(self, known: NDArray[np.intp], others: CommandedPoses) -> CommandedPoses:
+        """These and others in one order: ``known`` (n,) are rows of these, and -1 where others are."""
+        new = known < 0
+        choice, joints = self.choice[known], self.joints[known]
+        choice[new], joints[new] = others.choice, others.joints
+        poses = self.poses[known].with_rows(new, others.poses)
+        return replace(self, poses=poses, choice=choice, joints=joints)
 
     @property
     def most_frequent_geometry(self) -> Geometry:

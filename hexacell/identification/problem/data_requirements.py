@@ -111,4 +111,4 @@ def _different_poses(problem: Problem) -> int:
     poses = problem.commands.poses
     matrices = poses.rotations.reshape(-1, 9)
     numbers = np.column_stack([problem.labels[:, 0], poses.positions, matrices]).round(9)
-    return len(np.unique(numbers, axis=0))
+    return len(set(map(tuple, numbers.tolist())))

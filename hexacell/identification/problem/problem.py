@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.errors import IdentifiabilityError
-from hexacell.identification.problem.commanded_poses import CommandedPoses, CommandingGeometry
-from hexacell.identification.problem.encoder_consistency import EncoderConsistency
+from hexacell.identification.problem.commanded_poses import CommandedPoses
 from hexacell.identification.problem.systematic_errors import SystematicModel, no_systematic_errors
 from hexacell.kinematics.forward import ForwardResult
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, Mechanism
+from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import LEGS, ParameterSet, ParameterUnit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.measurements.records import MeasurementSet
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,6 +253,11 @@ class Problem:
         """Poses that close the geometry of free parameters (p,), mm, at the records' joint variables."""
         return self.commands.solve_poses(self.geometry(free), self.joints)
 
+    def rows_of(self, labels: NDArray[np.int_]) -> NDArray[np.intp]:
+        """The rows (k,) of records by their labels (k, 2); -1 for one that is not here."""
+        rows = {tuple(label): row for row, label in enumerate(self.labels.tolist())}
+        return np.array([rows.get(tuple(label), -1) for label in labels.tolist()], dtype=np.intp)
+
     def group_sums(self, values: Array) -> Array:
         """Sums over the records of each point: (n, ...) to (m, ...)."""
         return np.add.reduceat(values, self.first_rows, axis=0)
@@ -277,7 +279,7 @@ class Problem:
             self,
             joints=self.joints[kept],
             deviations=self.deviations[kept],
-            first_rows=_first_rows(self.labels[kept, 0]),
+            first_rows=first_rows_of(self.labels[kept, 0]),
             commands=self.commands[kept],
             start=self.start[kept],
             has_start_pose=self.has_start_pose[kept],
@@ -293,7 +295,7 @@ class Problem:
             self,
             joints=np.concatenate([self.joints, other.joints])[order],
             deviations=np.concatenate([self.deviations, other.deviations])[order],
-            first_rows=_first_rows(labels[order, 0]),
+            first_rows=first_rows_of(labels[order, 0]),
             commands=commands[order],
             start=PoseBatch.concatenate([self.start, other.start])[order],
             has_start_pose=np.concatenate([self.has_start_pose, other.has_start_pose])[order],
@@ -301,88 +303,6 @@ class Problem:
         )
 
 
-def build_problem(
-    mechanism: Mechanism,
-    measurements: MeasurementSet,
-    *,
-    controller: Geometry,
-    branch: Branch,
-    prior: Prior,
-    noise: Noise,
-    provisional: Sequence[Geometry] = (),
-    earlier: Sequence[CommandingGeometry] = (),
-    systematic: SystematicModel = no_systematic_errors,
-    unknowns: int = 0,
-    before: Problem | None = None,
-) -> Problem:
-    """The problem of a measurement set.
-
-    The poses were commanded under the ``controller``'s geometry, in any frames, or in the same frames under
-    ``provisional`` ones, in the frame convention, the last one used last. Records from before the last
-    calibration may have been commanded under the drawing, or under ``earlier`` geometries in their frames.
-    ``before`` is the problem of some of these records, if it is known: their start poses are taken from it.
-
-    Raises:
-        IdentifiabilityError: joint variables do not belong to the commanded poses, or for most records
-            no continuation from the commanding to the initial geometry exists; the message names the
-            first.
-    """
-    order = np.argsort(measurements.group, kind="stable")
-    joints, labels = measurements.joints[order], measurements.labels[order]
-    commanding, change = mechanism.normalize_frames(controller)
-    here = [CommandingGeometry(one, change) for one in (commanding, *provisional, prior.centre)]
-    commands = CommandedPoses.of(mechanism, measurements.poses[order], [*here, *earlier], branch, joints)
-    EncoderConsistency(commands, joints, labels, branch, prior.centre, prior.leg_widths(mechanism)).check()
-    initial = provisional[-1] if provisional else commands.most_frequent_geometry
-    free = mechanism.convention.free_parameters(initial)
-    if before is None or not np.array_equal(before.initial_parameters, free):
-        start = commands.solve_poses(initial, joints)
-    else:
-        start = _with_others(before, labels, lambda rows: commands[rows].solve_poses(initial, joints[rows]))
-    _require_start_poses(start.found, labels)
-    return Problem(
-        mechanism=mechanism,
-        prior=prior,
-        noise=noise.along(change.base),
-        joints=joints,
-        deviations=change.deviations(measurements.deviations[order]),
-        first_rows=_first_rows(labels[:, 0]),
-        commands=commands,
-        initial_parameters=free,
-        start=start.poses,
-        has_start_pose=start.found,
-        labels=labels,
-        gauges=change.base,
-        systematic=systematic,
-        unknowns=unknowns,
-    )
-
-
-def _with_others(
-    before: Problem, labels: NDArray[np.int_], solve: Callable[[NDArray[np.intp]], ForwardResult]
-) -> ForwardResult:
-    """The start poses of records (n): those of a problem before, the others solved."""
-    places = {tuple(label): place for place, label in enumerate(before.labels.tolist())}
-    known = np.array([places.get(tuple(label), -1) for label in labels.tolist()], dtype=np.intp)
-    new = np.flatnonzero(known < 0)
-    solved = solve(new)
-    found = before.has_start_pose[known]
-    found[new] = solved.found
-    return ForwardResult(before.start[known].with_rows(new, solved.poses), found)
-
-
-def _require_start_poses(found: Mask, labels: NDArray[np.int_]) -> None:
-    """Require a start pose for at least half of the records; the solver leaves the others out."""
-    missing = np.flatnonzero(~found)
-    if 2 * len(missing) <= len(found):
-        return
-    point, orientation = labels[missing[0]]
-    raise IdentifiabilityError(
-        f"in {len(missing)} of {len(found)} records a singularity lies between the commanded pose and the "
-        f"joint variables; the first is point {point}, orientation {orientation}",
-        action="Check that q1 to q6 belong to these poses, and the poses to this controller's config",
-    )
-
-
-def _first_rows(points: NDArray[np.int_]) -> NDArray[np.intp]:
+def first_rows_of(points: NDArray[np.int_]) -> NDArray[np.intp]:
+    """The rows (m,) at which each point of sorted records (n,) begins."""
     return np.flatnonzero(np.diff(points, prepend=points[:1] - 1))

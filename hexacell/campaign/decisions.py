@@ -35,12 +35,12 @@ class CampaignState:
 
     def records_at(self, point: int) -> int:
         """How many records a point has."""
-        return int((self.measurements.points == point).sum())
+        return self.measurements.counts.get(point, 0)
 
     @property
     def begun_points(self) -> int:
         """How many points have been begun, the present one included."""
-        begun = set(self.measurements.points.tolist())
+        begun = set(self.measurements.counts)
         return len(begun if self.point is None else begun | {self.point})
 
 

@@ -86,7 +86,7 @@ class Forecaster:
                 covariance_update(belief.covariance, record.jacobian[0], record.covariance[0])
             )
         planned = self.planned(state)
-        end = error.worst(self.predicted_belief(belief, state).covariance)
+        end = error.worst(self._covariance_after(belief, state, planned))
         records = sum(planned.values())
         begun_later = len(set(planned) - {state.point})
         return Forecast(

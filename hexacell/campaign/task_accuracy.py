@@ -14,7 +14,7 @@ from hexacell.identification.diagnostics.pose_accuracy import error_jacobian
 from hexacell.identification.identified_zeros import HeldParameters, IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rotations import Array, Mask
 from hexacell.robot_model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Effect
@@ -144,13 +144,20 @@ class Task:
 
         Without what another choice of frames would explain; none if no task pose can be taken.
         """
-        reached = self.reachable(belief)
-        if not len(reached.poses) or not len(reached.workspace):
+        both = PoseBatch.concatenate([self.poses, self.workspace])
+        taken = _are_taken(belief, both)
+        task, workspace = (np.flatnonzero(some) for some in np.split(taken, [len(self.poses)]))
+        if not len(task) or not len(workspace):
             return None
-        return error_jacobian(belief, reached.poses, reached.workspace)
+        return error_jacobian(belief, self.poses[task], self.workspace[workspace])
 
 
 def _reachable(belief: RobotBelief, poses: PoseBatch) -> PoseBatch:
     """The poses that the estimated robot reaches."""
+    return poses[np.flatnonzero(_are_taken(belief, poses))]
+
+
+def _are_taken(belief: RobotBelief, poses: PoseBatch) -> Mask:
+    """Which of n poses the estimated robot reaches."""
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
-    return poses[np.flatnonzero(np.isfinite(joints).all(axis=-1))]
+    return np.asarray(np.isfinite(joints).all(axis=-1))

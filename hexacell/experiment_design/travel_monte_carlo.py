@@ -236,7 +236,8 @@ def _all_within(sampled: _SampledRobots, limits: Limits, share: float) -> Mask:
     spread = (deviations @ limits.frames.base).std(axis=0)
     predicted = limits.within_travel(deviations.mean(axis=0), SIGMAS * spread, share)
     stay = sampled.found & limits.within_travel(deviations, share=share)
-    are_free = (margins.mean(axis=0) >= SPARE_SIGMAS * margins.std(axis=0)).all(axis=-1)
+    mean = margins.mean(axis=0)
+    are_free = (mean >= SPARE_SIGMAS * np.sqrt(np.mean((margins - mean) ** 2, axis=0))).all(axis=-1)
     within: Mask = np.all(stay, axis=0) & predicted & are_free
     return within
 

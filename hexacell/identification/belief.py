@@ -9,6 +9,7 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.commanded_motion import ActualPoses, CommandedRobot
+from hexacell.kinematics.compiled.availability import is_compiled
 from hexacell.kinematics.forward import apply_twist
 from hexacell.kinematics.free_sensitivity import FreeSensitivity, free_sensitivity
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
@@ -144,9 +145,13 @@ class RobotBelief:
         Those of tilt and turn, joint ranges, passive joints and legs, with the ``wanted`` margins (m,) or
         the least ones; an unreachable pose (NaN) does not.
         """
+        wanted = self.least_margins if wanted is None else wanted
+        if is_compiled():  # legs then cost least, and allow fewest
+            kept = self.limits.allow_legs(self.mechanism, self.estimate, poses, joints, wanted)
+            kept[kept] = self.limits.allow_poses(poses[kept], joints[kept])
+            return kept
         kept = self.limits.allow_poses(poses, joints)
         of_estimate = (self.mechanism, self.estimate, poses[kept], joints[kept])
-        wanted = self.least_margins if wanted is None else wanted
         kept[kept] = self.limits.allow_legs(*of_estimate, wanted)
         return kept
 

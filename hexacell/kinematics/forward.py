@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.kinematics import rotations
+from hexacell.kinematics.compiled.availability import own
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.leg_closure import LegClosure, closure_to_compile
 from hexacell.kinematics.mechanism import Mechanism
@@ -85,7 +86,7 @@ def modes_of(
     from hexacell.kinematics.compiled.newton import modes_at  # noqa: PLC0415 - where numba is installed
 
     modes = np.empty(len(joints))
-    modes_at(*closure.arrays(), np.array(poses.positions), np.array(poses.rotations), modes)
+    modes_at(*closure.arrays(), own(poses.positions), own(poses.rotations), modes)
     return modes
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.kinematics.compiled.availability import is_compiled
+from hexacell.kinematics.compiled.availability import is_compiled, own
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import ConstraintDerivatives, Mechanism
 from hexacell.kinematics.pose import PoseBatch
@@ -77,6 +77,6 @@ def _compiled(
     count, size = len(linear.joints), len(mechanism.convention.free_rows())
     by_joints, by_free = np.empty((count, coordinates, 6)), np.zeros((count, coordinates, size))
     determinants = np.empty(count)
-    numbers = tuple(np.array(one, dtype=float) for one in (linear.pose, linear.joints, linear.parameters))
+    numbers = own(linear.pose), own(linear.joints), own(linear.parameters)
     by_joints_and_free(*numbers, mechanism.convention.leg_columns, by_joints, by_free, determinants)
     return FreeSensitivity(by_joints, by_free, np.sign(determinants)) if determinants.all() else None

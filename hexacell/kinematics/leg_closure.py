@@ -9,9 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol, cast
 
-import numpy as np
-
-from hexacell.kinematics.compiled.availability import is_compiled
+from hexacell.kinematics.compiled.availability import is_compiled, own
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.rotations import Array
 
@@ -26,21 +24,23 @@ class LegClosure:
         lengths: (n, 6), mm.
         is_quadratic: whether the constraint is ``(|v|^2 - l^2) / 2 l`` of the vector v between the joints,
             or ``|v| - l``.
+        carriers_turn: whether what carries the joints at the base's end turns, as cranks do.
     """
 
     base_joints: Array
     platform_joints: Array
     lengths: Array
     is_quadratic: bool
+    carriers_turn: bool = False
+
+    def joint_arrays(self) -> tuple[Array, Array]:
+        """Joints as compiled loops take them, with the first axis n or 1."""
+        base, platform = own(self.base_joints), own(self.platform_joints)
+        return base.reshape(-1, 6, 3), platform.reshape(-1, 6, 3)
 
     def arrays(self) -> tuple[Array, Array, Array, bool]:
-        """What compiled loops take: arrays of their own, in one layout, with the first axis n or 1."""
-        base, platform = (
-            np.array(self.base_joints, dtype=float),
-            np.array(self.platform_joints, dtype=float),
-        )
-        lengths = np.array(self.lengths, dtype=float).reshape(-1, 6)
-        return base.reshape(-1, 6, 3), platform.reshape(-1, 6, 3), lengths, self.is_quadratic
+        """What compiled loops take, with the first axis n or 1."""
+        return *self.joint_arrays(), own(self.lengths).reshape(-1, 6), self.is_quadratic
 
 
 class HasLegClosure(Protocol):

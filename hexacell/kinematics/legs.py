@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from hexacell.kinematics.compiled.availability import is_compiled
+from hexacell.kinematics.compiled.availability import is_compiled, own
 from hexacell.kinematics.rotations import Array, Mask
 
 PAIRS = np.array(list(combinations(range(6), 2)))
@@ -76,7 +76,7 @@ class Legs:
         from hexacell.kinematics.compiled.leg_distances import smallest_distances  # noqa: PLC0415
 
         smallest = np.empty(len(self.base_joints))
-        smallest_distances(np.array(self.base_joints), np.array(self.platform_joints), PARALLEL, smallest)
+        smallest_distances(own(self.base_joints), own(self.platform_joints), PARALLEL, smallest)
         return smallest
 
 

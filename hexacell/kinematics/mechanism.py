@@ -170,7 +170,8 @@ class FrameTransform:
         """The same poses in the new frames."""
         return PoseBatch(
             (poses.positions - self.origin) @ self.base.T,
-            self.base @ poses.rotations @ self.platform.T,
+            # Products of small matrices are twice as fast in one layout.
+            self.base @ poses.rotations @ np.ascontiguousarray(self.platform.T),
         )
 
     @property
@@ -184,7 +185,8 @@ class FrameTransform:
 
     def inverse(self) -> FrameTransform:
         """The opposite change."""
-        return FrameTransform(self.base.T, -self.base @ self.origin, self.platform.T)
+        base, platform = np.ascontiguousarray(self.base.T), np.ascontiguousarray(self.platform.T)
+        return FrameTransform(base, -self.base @ self.origin, platform)
 
 
 SAME_FRAMES = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.kinematics.compiled.availability import is_compiled
+from hexacell.kinematics.compiled.availability import is_compiled, own
 from hexacell.kinematics.forward import assembly_mode
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.leg_closure import LegClosure, closure_to_compile
@@ -91,7 +91,7 @@ def inverse_and_mode(pose_jacobian: Array) -> tuple[Array, Array]:
         from hexacell.kinematics.compiled.matrices import invert  # noqa: PLC0415 - where numba is installed
 
         inverse, determinant = np.empty(pose_jacobian.shape), np.empty(len(pose_jacobian))
-        invert(np.array(pose_jacobian), inverse, determinant)
+        invert(own(pose_jacobian), inverse, determinant)
         if determinant.all():
             return inverse, np.sign(determinant)
     return np.linalg.inv(pose_jacobian), assembly_mode(pose_jacobian)
@@ -148,7 +148,7 @@ def _compiled(
 
     decided, modes = np.empty(len(joints), dtype=np.int8), np.empty(len(joints))
     radii = np.array(mechanism.platform_radius(geometry), dtype=float).reshape(-1)
-    at = np.array(poses.positions), np.array(poses.rotations)
+    at = own(poses.positions), own(poses.rotations)
     margins.margins_and_modes(*closure.arrays(), *at, radii, margin, decided, modes)
     has_margin = decided == margins.ABOVE
     rows = np.flatnonzero(decided == margins.UNDECIDED)

@@ -10,8 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.kinematics.compiled.availability import is_compiled
+from hexacell.kinematics.compiled.availability import is_compiled, own
+from hexacell.kinematics.leg_closure import LegClosure
 from hexacell.kinematics.legs import PARALLEL, Legs, angles_between
+from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 ROUNDING = 1e-9
@@ -67,7 +69,7 @@ class LegLimits:
         Distances take most of the time, and the platform's joints limit most, so that each is computed only
         where those before it are kept.
         """
-        least = np.zeros(12 + (self.distance_mm != 0.0)) + wanted
+        least = self._least(wanted)
         if is_compiled():
             return self._keeps_compiled(legs, least)
         at_platform = angles_between(legs.directions_in_platform, self.platform_axes)
@@ -78,15 +80,30 @@ class LegLimits:
             kept[kept] = legs[kept].smallest_distance() - self.distance_mm >= least[12]
         return kept
 
+    def keeps_closed(self, closure: LegClosure, poses: PoseBatch, wanted: Array | float = 0.0) -> Mask:
+        """:meth:`keeps` of n poses by a closure whose carriers do not turn; compiled."""
+        # Only where numba is installed.
+        from hexacell.kinematics.compiled.leg_margins import keeps_at  # noqa: PLC0415
+
+        kept = np.empty(len(poses), dtype=bool)
+        keeps_at(*_closed(closure, poses), *self._reduced(self._least(wanted)), PARALLEL, kept)
+        return kept
+
+    def margins_closed(self, closure: LegClosure, poses: PoseBatch) -> Array:
+        """:meth:`margins` of n poses by a closure whose carriers do not turn; compiled."""
+        # Only where numba is installed.
+        from hexacell.kinematics.compiled.leg_margins import margins_at  # noqa: PLC0415
+
+        found = np.empty((len(poses), 12 + (self.distance_mm != 0.0)))
+        margins_at(*_closed(closure, poses), *self._as_they_are, PARALLEL, found)
+        return found
+
     def _keeps_compiled(self, legs: Legs, least: Array) -> Mask:
         # Only where numba is installed.
         from hexacell.kinematics.compiled.leg_margins import keeps  # noqa: PLC0415
 
         kept = np.empty(len(legs.rotations), dtype=bool)
-        distance = float(self.distance_mm + least[12]) if self.distance_mm != 0.0 else 0.0
-        cones = self.base_cones - least[:6], self.platform_cones - least[6:12]
-        axes = _own(self.base_axes), _own(self.platform_axes)
-        keeps(*_arrays(legs), *axes, *cones, distance, PARALLEL, kept)
+        keeps(*_arrays(legs), *self._reduced(least), PARALLEL, kept)
         return kept
 
     def _margins_compiled(self, legs: Legs) -> Array:
@@ -94,19 +111,36 @@ class LegLimits:
         from hexacell.kinematics.compiled.leg_margins import margins  # noqa: PLC0415
 
         found = np.empty((len(legs.rotations), 12 + (self.distance_mm != 0.0)))
-        axes = _own(self.base_axes), _own(self.platform_axes)
-        cones = _own(self.base_cones), _own(self.platform_cones)
-        margins(*_arrays(legs), *axes, *cones, float(self.distance_mm), PARALLEL, found)
+        margins(*_arrays(legs), *self._as_they_are, PARALLEL, found)
         return found
+
+    def _least(self, wanted: Array | float) -> Array:
+        """The margins (m,) that are wanted."""
+        least: Array = np.zeros(12 + (self.distance_mm != 0.0)) + wanted
+        return least
+
+    def _reduced(self, least: Array) -> tuple[Array, Array, Array, Array, float]:
+        """Axes, cones and distance for compiled loops, with margins (m,)."""
+        distance = float(self.distance_mm + least[12]) if self.distance_mm != 0.0 else 0.0
+        cones = self.base_cones - least[:6], self.platform_cones - least[6:12]
+        return own(self.base_axes), own(self.platform_axes), *cones, distance
+
+    @property
+    def _as_they_are(self) -> tuple[Array, Array, Array, Array, float]:
+        """The same without margins."""
+        cones = own(self.base_cones), own(self.platform_cones)
+        return own(self.base_axes), own(self.platform_axes), *cones, float(self.distance_mm)
 
     def margins_for(self, turn: float, radius_mm: float) -> Array:
         """Margins (m,) that hold should a platform of some radius turn by an angle, rad."""
         turns = np.full(12, turn)
         return turns if self.distance_mm == 0.0 else np.append(turns, turn * radius_mm)
 
-    def including(self, legs: Legs, wanted: Array | float = 0.0) -> LegLimits:
-        """These limits, widened where the margins at one pose (1) are less than wanted (m,)."""
-        missing = np.maximum(0.0, wanted - self.margins(legs)[0] + ROUNDING)
+    def including(self, margins: Array, wanted: Array | float = 0.0) -> LegLimits:
+        """These limits, widened where the :meth:`margins` (m,) at a pose are less than wanted (m,)."""
+        missing = np.maximum(0.0, wanted - margins + ROUNDING)
+        if not missing.any():
+            return self
         distance = self.distance_mm - float(missing[12:].sum())
         return replace(
             self,
@@ -119,9 +153,9 @@ class LegLimits:
 def _arrays(legs: Legs) -> tuple[Array, Array, Array, Array]:
     """What compiled loops take of the legs."""
     carriers = _NO_TURNS if legs.carriers is None else legs.carriers
-    return _own(legs.base_joints), _own(legs.platform_joints), _own(legs.rotations), _own(carriers)
+    return own(legs.base_joints), own(legs.platform_joints), own(legs.rotations), own(carriers)
 
 
-def _own(values: Array) -> Array:
-    """A copy in the one layout that compiled loops take."""
-    return np.array(values, dtype=float)
+def _closed(closure: LegClosure, poses: PoseBatch) -> tuple[Array, Array, Array, Array, Array]:
+    """The same of poses, with the closure of their legs."""
+    return *closure.joint_arrays(), own(poses.positions), own(poses.rotations), _NO_TURNS

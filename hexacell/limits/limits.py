@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.leg_closure import closure_to_compile
 from hexacell.kinematics.mechanism import SAME_FRAMES, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -24,15 +25,22 @@ class AxisLimits:
 
     def including(self, pose: PoseBatch) -> AxisLimits:
         """These limits, widened to allow one pose (1)."""
+        if self == NO_AXIS_LIMITS:
+            return self
         numbers = pose.numbers()[0]
         lowest, highest = np.minimum(self.lowest, numbers), np.maximum(self.highest, numbers)
         return AxisLimits(tuple(lowest.tolist()), tuple(highest.tolist()))
 
     def allow(self, poses: PoseBatch) -> Mask:
         """Which of n poses in the controller's frames."""
+        if self == NO_AXIS_LIMITS:
+            return np.ones(len(poses), dtype=bool)
         numbers = poses.numbers()
         low, high = np.array(self.lowest) - ROUNDING, np.array(self.highest) + ROUNDING
         return np.asarray(((numbers >= low) & (numbers <= high)).all(axis=-1))
+
+
+NO_AXIS_LIMITS = AxisLimits()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +69,7 @@ class Limits:
     singularity_margin: float
     frames: FrameTransform = field(default=SAME_FRAMES)
     turn: float = np.pi
-    axes: AxisLimits = AxisLimits()
+    axes: AxisLimits = NO_AXIS_LIMITS
     legs: LegLimits | None = None
     gauges: GaugeTravel | None = None
     zeroed: GaugeRoom | None = None
@@ -100,7 +108,7 @@ class Limits:
     def sigma_along_gauges(self, covariance: Array) -> Array:
         """Standard deviations (..., 3) of what gauges show, by a covariance in the convention."""
         base = self.frames.base
-        variances = np.einsum("ag,...ab,bg->...g", base, covariance, base)
+        variances = np.sum((covariance @ base) * base, axis=-2)
         sigma: Array = np.sqrt(np.maximum(variances, 0.0))
         return sigma
 
@@ -152,6 +160,9 @@ class Limits:
         """At which of n poses a robot's passive joints and legs keep their limits, with margins (m,)."""
         if self.legs is None:
             return np.ones(len(joints), dtype=bool)
+        closure = closure_to_compile(mechanism, geometry, joints)
+        if closure is not None and not closure.carriers_turn:
+            return self.legs.keeps_closed(closure, poses, wanted)
         return self.legs.keeps(mechanism.legs(geometry, poses, joints), wanted)
 
     def leg_margins(
@@ -163,6 +174,9 @@ class Limits:
         """
         if self.legs is None:
             return np.zeros((len(joints), 0))
+        closure = closure_to_compile(mechanism, geometry, joints)
+        if closure is not None and not closure.carriers_turn:
+            return self.legs.margins_closed(closure, poses)
         return self.legs.margins(mechanism.legs(geometry, poses, joints))
 
     def including(
@@ -184,19 +198,19 @@ class Limits:
             joints: its joint variables there (1, 6), mm.
             wanted: margins (m,) of passive joints and legs; see :meth:`leg_margins`.
         """
-        commanded, stands = (self.frames.inverse().poses(poses) for poses in (command, actual))
-        widened = replace(
+        both = self.frames.inverse().poses(PoseBatch.concatenate([command, actual]))
+        tilts, turns = both.tilts().tolist(), np.abs(both.turns()).tolist()
+        margins = self.leg_margins(mechanism, geometry, actual, joints)[0]
+        return replace(
             self,
-            tilt=max(self.tilt, float(commanded.tilts()[0])),
-            turn=max(self.turn, float(np.abs(commanded.turns()[0]))),
+            tilt=max(self.tilt, tilts[0]),
+            turn=max(self.turn, turns[0]),
             joint_min=np.minimum(self.joint_min, joints[0]),
             joint_max=np.maximum(self.joint_max, joints[0]),
-            axes=self.axes.including(commanded),
-            stands_at=(float(stands.tilts()[0]), float(np.abs(stands.turns()[0]))),
+            axes=self.axes.including(both[:1]),
+            stands_at=(tilts[1], turns[1]),
+            legs=None if self.legs is None else self.legs.including(margins, wanted),
         )
-        if self.legs is None:
-            return widened
-        return replace(widened, legs=self.legs.including(mechanism.legs(geometry, actual, joints), wanted))
 
 
 def _are_within(poses: PoseBatch, tilt: float, turn: float) -> Mask:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -97,6 +97,11 @@ class MeasurementSet:
     def points(self) -> NDArray[np.int_]:
         """The point (n,) of each record, counted from 1."""
         return self.labels[:, 0]
+
+    @cached_property
+    def counts(self) -> Mapping[int, int]:
+        """How many records each point has that has any."""
+        return Counter(self.points.tolist())
 
     @cached_property
     def group(self) -> NDArray[np.intp]:

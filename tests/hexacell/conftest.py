@@ -20,7 +20,9 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
+from hexacell.identification.problem.build import build_problem
+from hexacell.identification.problem.commanded_poses import CommandingGeometry
+from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
@@ -263,7 +265,7 @@ def problem_of(
     return build_problem(
         Hexaglide(),
         measurements,
-        controller=controller,
+        controller=CommandingGeometry.of(Hexaglide(), controller),
         branch=BRANCH,
         prior=Prior.of(Hexaglide(), drawing, tolerances),
         noise=noise,

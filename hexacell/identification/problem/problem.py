@@ -262,10 +262,15 @@ class Problem:
         """Sums over the records of each point: (n, ...) to (m, ...)."""
         return np.add.reduceat(values, self.first_rows, axis=0)
 
+    @property
+    def stations(self) -> NDArray[np.intp]:
+        """The row (n,) of each record's point among the points."""
+        lengths = np.diff(np.append(self.first_rows, self.records))
+        return np.arange(self.points).repeat(lengths)
+
     def per_record(self, values: Array) -> Array:
         """A value of each point (m, ...), repeated for each of its records (n, ...)."""
-        lengths = np.diff(np.append(self.first_rows, self.records))
-        return np.repeat(values, lengths, axis=0)
+        return values[self.stations]
 
     def starting_at(self, free: Array, poses: PoseBatch, has_start_pose: Mask | None = None) -> Problem:
         """The problem with another start: free parameters (p,), mm, and poses that close them."""
@@ -274,6 +279,8 @@ class Problem:
 
     def subset(self, rows: Mask) -> Problem:
         """The problem of some of the records (n,)."""
+        if rows.all():
+            return self
         kept = np.flatnonzero(rows)
         return replace(
             self,

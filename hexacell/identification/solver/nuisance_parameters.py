@@ -51,6 +51,8 @@ class NuisanceElimination:
     def __init__(self, problem: Problem, weights: Array) -> None:
         self.problem = problem
         self._weights = weights
+        self._turns = problem.noise.alignment > 0.0
+        self._stations = problem.stations
         self._local = _local_design(problem)
         self._local_prior = np.full(self._local.shape[-1] - 3, problem.noise.alignment)
         self._normal = np.linalg.inv(self._local_normal())
@@ -84,7 +86,7 @@ class NuisanceElimination:
 
     def nuisance_covariance(self) -> Array:
         """Covariance (n, 3, 3), mm^2, of what is subtracted from each record."""
-        spread = self.problem.per_record(self._normal)
+        spread = self._normal[self._stations]
         taken = self._local @ spread @ np.swapaxes(self._local, -1, -2)
         if self._has_scale:
             design = self._scale_design
@@ -92,6 +94,8 @@ class NuisanceElimination:
         return taken
 
     def _local_normal(self) -> Array:
+        if not self._turns:
+            return self.problem.group_sums(self._weights)
         transposed = np.swapaxes(self._local, -1, -2)
         normal = self.problem.group_sums(transposed @ self._weights @ self._local)
         for axis, sigma in enumerate(self._local_prior, start=3):
@@ -111,9 +115,12 @@ class NuisanceElimination:
 
     def _without_stations(self, values: Array) -> tuple[Array, Array]:
         """Values (n, 3, k) less the best c and w of each point, and the rows of the prior on w."""
+        if not self._turns:
+            means = self._normal @ self.problem.group_sums(self._weights @ values)
+            return values - means[self._stations], np.zeros((0, values.shape[-1]))
         transposed = np.swapaxes(self._local, -1, -2)
         best = self._normal @ self.problem.group_sums(transposed @ (self._weights @ values))
-        reduced = values - self._local @ self.problem.per_record(best)
+        reduced = values - self._local @ best[self._stations]
         turned = best[:, 3:] / self._local_prior[:, None]
         return reduced, turned.reshape(-1, values.shape[-1])
 

@@ -1,4 +1,7 @@
-"""Limits of passive joints and legs, pose by pose, compiled; see :mod:`hexacell.limits.leg_limits`."""
+"""Limits of passive joints and legs, pose by pose, compiled; see :mod:`hexacell.limits.leg_limits`.
+
+Poses are given by their legs, or by what closes these and does not turn what carries their joints.
+"""
 
 from __future__ import annotations
 
@@ -27,22 +30,54 @@ def keeps(
 
     Joints are (n, 6, 3), ``carriers`` (n, 6, 3, 3), or (1, 6, 3, 3) where they do not turn.
     """
+    least_base, least_platform = _cosines(base_cones), _cosines(platform_cones)
     for row in range(len(kept)):
-        kept[row] = True
-        for leg in range(6):
-            start, end = platform_joints[row, leg], base_joints[row, leg]
-            x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
-            length = np.sqrt(x * x + y * y + z * z)
-            x, y, z = x / length, y / length, z / length
-            kept[row] = _angle(rotations[row], platform_axes[leg], x, y, z) <= platform_cones[leg]
-            if not kept[row]:
-                break
-            carrier = carriers[row if len(carriers) > 1 else 0, leg]
-            kept[row] = _angle(carrier, base_axes[leg], x, y, z) <= base_cones[leg]
-            if not kept[row]:
-                break
-        if kept[row] and distance != 0.0:
-            kept[row] = smallest_distance(base_joints[row], platform_joints[row], parallel) >= distance
+        kept[row] = _keeps_one(
+            base_joints[row],
+            platform_joints[row],
+            rotations[row],
+            carriers[row if len(carriers) > 1 else 0],
+            base_axes,
+            platform_axes,
+            least_base,
+            least_platform,
+            distance,
+            parallel,
+        )
+
+
+@compiled
+def keeps_at(
+    base: Array,
+    platform: Array,
+    positions: Array,
+    rotations: Array,
+    carriers: Array,
+    base_axes: Array,
+    platform_axes: Array,
+    base_cones: Array,
+    platform_cones: Array,
+    distance: float,
+    parallel: float,
+    kept: Mask,
+) -> None:
+    """As :func:`keeps` of poses (n), with ``base`` and ``platform`` (n, 6, 3) or (1, 6, 3) of a closure."""
+    least_base, least_platform = _cosines(base_cones), _cosines(platform_cones)
+    ends = np.empty((6, 3))
+    for row in range(len(kept)):
+        place(platform[row if len(platform) > 1 else 0], positions[row], rotations[row], ends)
+        kept[row] = _keeps_one(
+            base[row if len(base) > 1 else 0],
+            ends,
+            rotations[row],
+            carriers[0],
+            base_axes,
+            platform_axes,
+            least_base,
+            least_platform,
+            distance,
+            parallel,
+        )
 
 
 @compiled
@@ -64,25 +99,137 @@ def margins(
     See :func:`keeps`.
     """
     for row in range(len(margin)):
-        for leg in range(6):
-            start, end = platform_joints[row, leg], base_joints[row, leg]
-            x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
-            length = np.sqrt(x * x + y * y + z * z)
-            x, y, z = x / length, y / length, z / length
-            carrier = carriers[row if len(carriers) > 1 else 0, leg]
-            margin[row, leg] = base_cones[leg] - _angle(carrier, base_axes[leg], x, y, z)
-            at_platform = _angle(rotations[row], platform_axes[leg], x, y, z)
-            margin[row, 6 + leg] = platform_cones[leg] - at_platform
-        if margin.shape[1] > 12:
-            nearest = smallest_distance(base_joints[row], platform_joints[row], parallel)
-            margin[row, 12] = nearest - distance
+        _margins_of_one(
+            base_joints[row],
+            platform_joints[row],
+            rotations[row],
+            carriers[row if len(carriers) > 1 else 0],
+            base_axes,
+            platform_axes,
+            base_cones,
+            platform_cones,
+            distance,
+            parallel,
+            margin[row],
+        )
 
 
 @compiled
-def _angle(rotation: Array, axis: Array, x: float, y: float, z: float) -> float:
-    """Between a unit vector x, y, z and a unit ``axis`` (3,) that is rotated, rad."""
+def margins_at(
+    base: Array,
+    platform: Array,
+    positions: Array,
+    rotations: Array,
+    carriers: Array,
+    base_axes: Array,
+    platform_axes: Array,
+    base_cones: Array,
+    platform_cones: Array,
+    distance: float,
+    parallel: float,
+    margin: Array,
+) -> None:
+    """As :func:`margins`, of what :func:`keeps_at` takes."""
+    ends = np.empty((6, 3))
+    for row in range(len(margin)):
+        place(platform[row if len(platform) > 1 else 0], positions[row], rotations[row], ends)
+        _margins_of_one(
+            base[row if len(base) > 1 else 0],
+            ends,
+            rotations[row],
+            carriers[0],
+            base_axes,
+            platform_axes,
+            base_cones,
+            platform_cones,
+            distance,
+            parallel,
+            margin[row],
+        )
+
+
+@compiled
+def place(platform: Array, position: Array, rotation: Array, ends: Array) -> None:
+    """Fill ``ends`` (6, 3): where the joints (6, 3) of a platform at a pose are, in the base frame."""
+    for leg in range(6):
+        x, y, z = platform[leg]
+        for axis in range(3):
+            along = rotation[axis, 0] * x + rotation[axis, 1] * y + rotation[axis, 2] * z
+            ends[leg, axis] = position[axis] + along
+
+
+@compiled
+def _keeps_one(
+    base_joints: Array,
+    platform_joints: Array,
+    rotation: Array,
+    carriers: Array,
+    base_axes: Array,
+    platform_axes: Array,
+    least_base: Array,
+    least_platform: Array,
+    distance: float,
+    parallel: float,
+) -> bool:
+    """Whether one pose does, with the least cosines (6,) of the cones."""
+    for leg in range(6):
+        start, end = platform_joints[leg], base_joints[leg]
+        x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+        length = np.sqrt(x * x + y * y + z * z)
+        x, y, z = x / length, y / length, z / length
+        if not _cosine(rotation, platform_axes[leg], x, y, z) >= least_platform[leg]:
+            return False
+        if not _cosine(carriers[leg], base_axes[leg], x, y, z) >= least_base[leg]:
+            return False
+    return distance == 0.0 or smallest_distance(base_joints, platform_joints, parallel) >= distance
+
+
+@compiled
+def _margins_of_one(
+    base_joints: Array,
+    platform_joints: Array,
+    rotation: Array,
+    carriers: Array,
+    base_axes: Array,
+    platform_axes: Array,
+    base_cones: Array,
+    platform_cones: Array,
+    distance: float,
+    parallel: float,
+    margin: Array,
+) -> None:
+    """Fill ``margin`` (12 or 13,) of one pose."""
+    for leg in range(6):
+        start, end = platform_joints[leg], base_joints[leg]
+        x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+        length = np.sqrt(x * x + y * y + z * z)
+        x, y, z = x / length, y / length, z / length
+        at_base = _cosine(carriers[leg], base_axes[leg], x, y, z)
+        at_platform = _cosine(rotation, platform_axes[leg], x, y, z)
+        margin[leg] = base_cones[leg] - np.arccos(min(max(at_base, -1.0), 1.0))
+        margin[6 + leg] = platform_cones[leg] - np.arccos(min(max(at_platform, -1.0), 1.0))
+    if len(margin) > 12:
+        margin[12] = smallest_distance(base_joints, platform_joints, parallel) - distance
+
+
+@compiled
+def _cosine(rotation: Array, axis: Array, x: float, y: float, z: float) -> float:
+    """Of the angle between a unit vector x, y, z and a unit ``axis`` (3,) that is rotated."""
     cosine = 0.0
     for column in range(3):
         seen = rotation[0, column] * x + rotation[1, column] * y + rotation[2, column] * z
         cosine += seen * axis[column]
-    return float(np.arccos(min(max(cosine, -1.0), 1.0)))
+    return cosine
+
+
+@compiled
+def _cosines(cones: Array) -> Array:
+    """The least cosine of the angles in each cone (6,): none is in a negative one, all in one beyond pi."""
+    least = np.empty(6)
+    for leg in range(6):
+        least[leg] = np.cos(min(cones[leg], np.pi))
+        if cones[leg] < 0.0:
+            least[leg] = 2.0
+        elif cones[leg] >= np.pi:
+            least[leg] = -2.0
+    return least

@@ -144,7 +144,9 @@ class RotaryCranks:
     def leg_closure(self, geometry: Geometry | GeometryBatch, joints: Array) -> LegClosure | None:
         """See :class:`~hexacell.kinematics.leg_closure.HasLegClosure`."""
         ends = _ends(geometry, joints)
-        return LegClosure(ends, geometry["platform"], geometry["rod"], is_quadratic=False)
+        return LegClosure(
+            ends, geometry["platform"], geometry["rod"], is_quadratic=False, carriers_turn=True
+        )
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""

@@ -56,7 +56,7 @@ def test_limits_that_include_legs_that_touch_still_have_a_margin_for_their_dista
     stated = limits(distance=30.0)
     spare = stated.margins(here)[0, 12]
     wanted = np.append(np.zeros(12), spare + missing)
-    widened = stated.including(here, wanted)
+    widened = stated.including(stated.margins(here)[0], wanted)
     assert widened.margins(here).shape == (1, 13)
     assert (widened.margins(here)[0] >= wanted).all()
     assert len(widened.margins_for(0.1, 100.0)) == 13
@@ -64,7 +64,8 @@ def test_limits_that_include_legs_that_touch_still_have_a_margin_for_their_dista
 
 def test_limits_that_include_a_pose_allow_it_and_nothing_beyond():
     here = turned([1, 0, 0], 33.0)
-    widened = limits(distance=60.0).including(here)
+    stated = limits(distance=60.0)
+    widened = stated.including(stated.margins(here)[0])
     assert are_kept(widened, here)[0]
     assert are_kept(widened, turned([1, 0, 0], 10.0))[0]
     assert not are_kept(widened, turned([1, 0, 0], 33.1))[0]

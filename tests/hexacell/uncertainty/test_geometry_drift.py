@@ -12,7 +12,9 @@ from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.experiment_design.predicted_records import position_derivatives
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
-from hexacell.identification.problem.problem import Noise, Prior, Tolerances, build_problem
+from hexacell.identification.problem.build import build_problem
+from hexacell.identification.problem.commanded_poses import CommandingGeometry
+from hexacell.identification.problem.problem import Noise, Prior, Tolerances
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
@@ -67,7 +69,8 @@ def test_the_marginal_likelihood_is_that_of_a_normal_distribution(
 
     def by_integral(scale: float) -> float:
         prior = Prior(geometry, free, scale**2 * covariance)
-        arguments = {"controller": paper.actual, "branch": paper.branch, "noise": noise}
+        controller = CommandingGeometry.of(hexaglide, paper.actual)
+        arguments = {"controller": controller, "branch": paper.branch, "noise": noise}
         problem = build_problem(hexaglide, records, prior=prior, **arguments)
         return log_marginal_likelihood(estimate_online(problem))
 

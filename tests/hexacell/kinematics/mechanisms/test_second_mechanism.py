@@ -15,7 +15,9 @@ from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.identification.diagnostics.frame_choice import choose_frames
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise, Prior, Tolerances, build_problem
+from hexacell.identification.problem.build import build_problem
+from hexacell.identification.problem.commanded_poses import CommandingGeometry
+from hexacell.identification.problem.problem import Noise, Prior, Tolerances
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
@@ -98,7 +100,7 @@ def test_a_second_mechanism_is_identified_from_exact_records(
     problem = build_problem(
         MECHANISM,
         measurements,
-        controller=drawing,
+        controller=CommandingGeometry.of(MECHANISM, drawing),
         branch=BRANCH,
         prior=Prior.of(MECHANISM, drawing, TOLERANCES),
         noise=Noise(1e-4, 1e-4),

@@ -59,7 +59,7 @@ def free_sensitivity(
 def _by_free(mechanism: Mechanism, by_constraints: Array, linear: ConstraintDerivatives) -> Array:
     """Derivatives (n, m, p) by the free parameters, from those by the constraints (n, m, 6)."""
     products = by_constraints[..., None] * linear.parameters[..., None, :, :]
-    of_legs = products.reshape(*by_constraints.shape[:2], -1)
+    of_legs = products.reshape(*by_constraints.shape[:2], len(mechanism.parameters))
     order, convention = mechanism.parameters.leg_order, mechanism.convention
     by_free: Array = np.take(of_legs, order[convention.free_rows()], axis=-1)
     for row, column in convention.dependent:

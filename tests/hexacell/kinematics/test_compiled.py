@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.compiled.availability import VARIABLE
 from hexacell.kinematics.forward import LARGEST_CONTRACTION, continue_solution, forward_kinematics, modes_of
+from hexacell.kinematics.free_sensitivity import POSE, POSITION, free_sensitivity
 from hexacell.kinematics.geometry import GeometryBatch
 from hexacell.kinematics.leg_closure import closure_to_compile
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -132,6 +134,58 @@ def test_poses_depend_alike_on_joints_and_parameters(cell):
     np.testing.assert_allclose(by_numpy.joints, by_loops.joints, atol=1e-9 * largest)
     by_numpy, by_loops = both(lambda: position_sensitivity(robot.mechanism, nominal, poses, joints)[0])
     np.testing.assert_allclose(by_numpy, by_loops, atol=1e-9 * largest)
+
+
+@pytest.mark.parametrize("coordinates", [POSITION, POSE])
+def test_poses_depend_alike_on_free_parameters(cell, coordinates):
+    robot, nominal, _, poses, joints = cell
+    at = robot.mechanism, nominal, poses, joints
+    for few in (40, 1, 0):
+        some = robot.mechanism, nominal, poses[:few], joints[:few]
+        by_numpy, by_loops = both(lambda some=some: free_sensitivity(*some, coordinates))
+        np.testing.assert_array_equal(by_numpy.mode, by_loops.mode)
+        largest = np.abs(by_numpy.free).max(initial=1.0)
+        np.testing.assert_allclose(by_numpy.free, by_loops.free, atol=1e-9 * largest)
+        np.testing.assert_allclose(by_numpy.joints, by_loops.joints, atol=1e-9 * largest)
+    with compiled(False):
+        found, every = free_sensitivity(*at, coordinates), pose_sensitivity(*at)
+    by_basis = every.parameters[:, :coordinates] @ robot.mechanism.convention.basis()
+    np.testing.assert_allclose(found.free, by_basis, atol=1e-12 * np.abs(by_basis).max())
+    np.testing.assert_array_equal(found.joints, every.joints[:, :coordinates])
+
+
+def test_joints_and_derivatives_of_constraints_are_the_same_and_nan_out_of_reach(cell):
+    robot, nominal, _, poses, joints = cell
+    far = poses.with_rows([2], PoseBatch(poses.positions[[2]] + 9000.0, poses.rotations[[2]]))
+    by_numpy, by_loops = both(lambda: robot.mechanism.inverse(nominal, robot.branch, far))
+    np.testing.assert_array_equal(np.isnan(by_numpy), np.isnan(by_loops))
+    np.testing.assert_allclose(by_numpy, by_loops, rtol=1e-12)
+    by_numpy, by_loops = both(lambda: robot.mechanism.derivatives(nominal, poses, joints))
+    for name in ("pose", "joints", "parameters"):
+        one, other = getattr(by_numpy, name), getattr(by_loops, name)
+        np.testing.assert_allclose(one, other, atol=1e-12 * np.abs(one).max())
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, -0.3])
+def test_limits_by_what_closes_the_legs_are_those_by_the_legs(cell, turn):
+    """The least margins, and cones that are narrower than nothing or wider than everything."""
+    robot, nominal, robots, poses, joints = cell
+    legs = robot.mechanism.legs(nominal, poses, joints)
+    toward = legs.directions_in_carriers[0], legs.directions_in_platform[0]
+    cones = np.array([0.3, 0.35, 0.3, 0.35, 0.3, 4.0]), np.array([0.3, 0.3, 0.25, 0.3, 3.2, 0.35])
+    with compiled(False):
+        near = float(np.quantile(legs.smallest_distance(), 0.2))
+    limits = replace(robot.limits, legs=LegLimits(*toward, *cones, near - 1.0))
+    wanted = limits.legs.margins_for(turn, 100.0)
+    for geometry in (nominal, robots):
+        at = robot.mechanism, geometry, poses, joints
+        np.testing.assert_array_equal(*both(lambda at=at: limits.allow_legs(*at, wanted)))
+        by_numpy, by_loops = both(lambda at=at: limits.leg_margins(*at))
+        np.testing.assert_allclose(by_numpy, by_loops, atol=1e-7)
+    unreachable = joints.copy()
+    unreachable[1] = np.nan
+    at = robot.mechanism, nominal, poses, unreachable
+    np.testing.assert_array_equal(*both(lambda: limits.allow_legs(*at, wanted)))
 
 
 def test_an_exact_singularity_is_told_alike():

@@ -86,7 +86,8 @@ class LegLimits:
         from hexacell.kinematics.compiled.leg_margins import keeps_at  # noqa: PLC0415
 
         kept = np.empty(len(poses), dtype=bool)
-        keeps_at(*_closed(closure, poses), *self._reduced(self._least(wanted)), PARALLEL, kept)
+        arrays = *_closed(closure, poses), *self._reduced(self._least(wanted))
+        keeps_at(*arrays, PARALLEL, kept)
         return kept
 
     def margins_closed(self, closure: LegClosure, poses: PoseBatch) -> Array:
@@ -95,7 +96,8 @@ class LegLimits:
         from hexacell.kinematics.compiled.leg_margins import margins_at  # noqa: PLC0415
 
         found = np.empty((len(poses), 12 + (self.distance_mm != 0.0)))
-        margins_at(*_closed(closure, poses), *self._as_they_are, PARALLEL, found)
+        arrays = *_closed(closure, poses), *self._as_they_are
+        margins_at(*arrays, PARALLEL, found)
         return found
 
     def _keeps_compiled(self, legs: Legs, least: Array) -> Mask:
@@ -103,7 +105,8 @@ class LegLimits:
         from hexacell.kinematics.compiled.leg_margins import keeps  # noqa: PLC0415
 
         kept = np.empty(len(legs.rotations), dtype=bool)
-        keeps(*_arrays(legs), *self._reduced(least), PARALLEL, kept)
+        arrays = *_arrays(legs), *self._reduced(least)
+        keeps(*arrays, PARALLEL, kept)
         return kept
 
     def _margins_compiled(self, legs: Legs) -> Array:
@@ -111,7 +114,8 @@ class LegLimits:
         from hexacell.kinematics.compiled.leg_margins import margins  # noqa: PLC0415
 
         found = np.empty((len(legs.rotations), 12 + (self.distance_mm != 0.0)))
-        margins(*_arrays(legs), *self._as_they_are, PARALLEL, found)
+        arrays = *_arrays(legs), *self._as_they_are
+        margins(*arrays, PARALLEL, found)
         return found
 
     def _least(self, wanted: Array | float) -> Array:

@@ -141,8 +141,8 @@ def test_poses_depend_alike_on_free_parameters(cell, coordinates):
     robot, nominal, _, poses, joints = cell
     at = robot.mechanism, nominal, poses, joints
     for few in (40, 1, 0):
-        some = robot.mechanism, nominal, poses[:few], joints[:few]
-        by_numpy, by_loops = both(lambda some=some: free_sensitivity(*some, coordinates))
+        some = robot.mechanism, nominal, poses[:few], joints[:few], coordinates
+        by_numpy, by_loops = both(lambda some=some: free_sensitivity(*some))
         np.testing.assert_array_equal(by_numpy.mode, by_loops.mode)
         largest = np.abs(by_numpy.free).max(initial=1.0)
         np.testing.assert_allclose(by_numpy.free, by_loops.free, atol=1e-9 * largest)

@@ -1,0 +1,67 @@
+"""The problem of records, from that of some of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.identification.problem import build
+from hexacell.identification.problem.build import build_problem
+from hexacell.identification.problem.commanded_poses import CommandedPoses, CommandingGeometry
+from hexacell.identification.problem.problem import Noise, Prior, Tolerances
+from hexacell.measurements.records import MeasurementSet
+
+
+@pytest.fixture
+def arguments(hexaglide, paper):
+    """All but the records: those of one robot are the same objects each time."""
+    return {
+        "controller": CommandingGeometry.of(hexaglide, paper.nominal),
+        "branch": paper.branch,
+        "prior": Prior.of(hexaglide, paper.nominal, Tolerances({"S": 7.0, "B": 3.0, "l": 1.0})),
+        "noise": Noise(0.01, 0.01),
+    }
+
+
+@pytest.fixture
+def records(paper, visit):
+    return (
+        visit(paper.actual, paper.nominal, points=3, orientations=4, seed=4).measured(0.01, seed=2).records
+    )
+
+
+def assert_same(one, other):
+    for name in ("joints", "deviations", "labels", "first_rows", "has_start_pose", "initial_parameters"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    for name in ("choice", "joints"):
+        np.testing.assert_array_equal(getattr(one.commands, name), getattr(other.commands, name))
+    for poses, others in ((one.start, other.start), (one.commands.poses, other.commands.poses)):
+        np.testing.assert_allclose(poses.positions, others.positions, atol=1e-9)
+        np.testing.assert_allclose(poses.rotations, others.rotations, atol=1e-12)
+
+
+@pytest.mark.parametrize("known", [[0], [0, 1, 2, 3, 4], [0, 4, 5, 8, 11], [0, 1, 4, 6, 9, 10]])
+def test_it_is_that_of_all_records_whichever_were_known(hexaglide, arguments, records, known):
+    before = build_problem(hexaglide, MeasurementSet(tuple(records[row] for row in known)), **arguments)
+    every = MeasurementSet(records)
+    assert_same(
+        build_problem(hexaglide, every, before=before, **arguments),
+        build_problem(hexaglide, every, **arguments),
+    )
+
+
+def test_only_new_records_are_attributed(hexaglide, arguments, records, monkeypatch):
+    before = build_problem(hexaglide, MeasurementSet(records[:-1]), **arguments)
+    attributed = []
+
+    class Counted(CommandedPoses):
+        @classmethod
+        def of(cls, mechanism, commands, *others):
+            attributed.append(len(commands))
+            return CommandedPoses.of(mechanism, commands, *others)
+
+    monkeypatch.setattr(build, "CommandedPoses", Counted)
+    build_problem(hexaglide, MeasurementSet(records), before=before, **arguments)
+    another = {**arguments, "controller": CommandingGeometry.of(hexaglide, arguments["prior"].centre)}
+    build_problem(hexaglide, MeasurementSet(records), before=before, **another)
+    assert attributed == [1, len(records)]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose
@@ -189,6 +189,15 @@ class Controller(Device[DeviceIdentity], Protocol):
         Raises:
             drivers.controllers.errors.StartupNotPermitted: as ``prepare``, which may then complete it.
         """
+        ...
+
+
+@runtime_checkable
+class CheckedController(Protocol):
+    """What a controller may have beside: a look at its settings before it is made ready to move."""
+
+    async def check(self) -> None:
+        """Raise if units, offsets or modes of it lead commands elsewhere; nothing is set, nothing moves."""
         ...
 
 

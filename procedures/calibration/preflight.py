@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Iterator
 from pathlib import Path
 
 from drivers.errors import GaugeAtEnd
-from drivers.interfaces import EncoderSample, GaugeReading
+from drivers.interfaces import CheckedController, EncoderSample, GaugeReading
 from hexacell.campaign import feasibility
 from hexacell.errors import AnswerNeeded, HexacellError, flatten_errors, joined
 from hexacell.kinematics.pose import Pose
@@ -71,13 +71,16 @@ def _held_out_failures(calibration: Calibration) -> Iterator[HexacellError]:
 
 
 async def device_failures(devices: Devices) -> list[HexacellError]:
-    """What is wrong with opened devices: each is asked for one reading.
+    """What is wrong with opened devices: each is asked for one reading, the controller what it is set to.
 
     A plunger at an end of its travel is no failure: the robot is not at the gauges yet.
     """
-    calls: list[Awaitable[GaugeReading | EncoderSample]] = [m.gauge.read() for m in devices.gauges]
+    calls: list[Awaitable[GaugeReading | EncoderSample | None]] = [m.gauge.read() for m in devices.gauges]
+    calls.append(devices.encoders.read())
+    if isinstance(devices.controller, CheckedController):
+        calls.append(devices.controller.check())
     try:
-        await gather_errors("devices cannot be read", [*calls, devices.encoders.read()])
+        await gather_errors("devices cannot be read", calls)
     except HexacellError as error:
         return [one for one in flatten_errors(error) if not isinstance(one, GaugeAtEnd)]
     return []

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import PurePath
 
 from drivers.controllers import reload_command
@@ -65,6 +66,7 @@ class LinuxcncrshController:
         self._joints_before_reload: tuple[float, ...] | None = None
         self._restoring = restoring_block("")
         self._has_changed_modes = False
+        self._is_unready = False
 
     async def open(self) -> DeviceIdentity:
         """Connect and take control; nothing moves.
@@ -81,8 +83,19 @@ class LinuxcncrshController:
                 description=", ".join(filter(None, (commands.connection.server, config))),
             )
 
+    async def check(self) -> None:
+        """Check that its coordinates are those of the machine; nothing is set, nothing moves.
+
+        Raises:
+            DeviceError: Units, offsets, modal codes or the feed override make moves other than commanded.
+        """
+        async with self._order:
+            await startup.check_coordinate_system(await self._session.synchronized())
+
     async def prepare(self, permitted: StartupActions) -> None:
         """Leave emergency stop, switch on, home, enter MDI mode. May move the machine.
+
+        Coordinates are checked before it is homed, and again afterwards.
 
         Raises:
             StartupNotPermitted: It needs one of these that is not permitted.
@@ -91,12 +104,8 @@ class LinuxcncrshController:
         """
         stops = self._session.stop_count
         async with self._order:
-            commands = await self._session.in_control()
-            await startup.acknowledge_on_completion(commands)
-            await self._make_ready(commands, permitted, stops)
-            if self._has_changed_modes:
-                await self._restore_modes(commands)
-            self._restoring = restoring_block(await startup.check_coordinate_system(commands))
+            with self._ready_if_done():
+                await self._prepare(permitted, stops)
 
     async def move(self, pose: Pose, duration_s: float) -> None:
         """Move to ``pose`` in inverse time; returns when the actual pose agrees with it.
@@ -106,7 +115,7 @@ class LinuxcncrshController:
 
         Raises:
             PoseRefused: The pose is out of reach or limits.
-            MoveRefused: The controller is not prepared.
+            MoveRefused: The controller is not prepared, or its last preparation failed.
             MotionInterrupted: it stopped at another pose, which the message names.
             DeviceError: The connection broke.
         """
@@ -117,6 +126,7 @@ class LinuxcncrshController:
             commands = await self._session.synchronized()
             if self._was_stopped_since(stops):
                 raise self._stopped_before_moving()
+            self._require_ready(pose)
             await self._execute(commands, block, pose, stops, limit_s)
             await self._verify_arrival(commands, pose, stops, limit_s)
             await self._restore_modes_unless_stopped(commands, stops)
@@ -167,11 +177,11 @@ class LinuxcncrshController:
         """
         stops = self._session.stop_count
         async with self._order:
-            commands = await self._session.synchronized()
-            await self._switch_off(commands)
-            if command := self._settings.reload_command:
-                await reload_command.run(command, self._name, self._timeouts.reload)
-            await self._make_ready(await self._session.reconnect(), permitted, stops)
+            with self._ready_if_done():
+                await self._switch_off(await self._session.synchronized())
+                if command := self._settings.reload_command:
+                    await reload_command.run(command, self._name, self._timeouts.reload)
+                await self._make_ready(await self._session.reconnect(), permitted, stops)
 
     async def close(self) -> None:
         """Close all connections, the modes restored if that is possible; closing twice is harmless."""
@@ -180,6 +190,26 @@ class LinuxcncrshController:
                 async with asyncio.timeout(self._timeouts.restore), self._order:
                     await self._restore_modes(await self._session.synchronized())
         await self._session.close()
+
+    async def _prepare(self, permitted: StartupActions, stops: int) -> None:
+        commands = await self._session.in_control()
+        await startup.acknowledge_on_completion(commands)
+        await self._make_ready(commands, permitted, stops)
+        if self._has_changed_modes:
+            await self._restore_modes(commands)
+        self._restoring = restoring_block(await startup.check_coordinate_system(commands))
+
+    @contextmanager
+    def _ready_if_done(self) -> Iterator[None]:
+        """What fails in this context leaves a controller that moves nothing until it is prepared again."""
+        self._is_unready = True
+        yield
+        self._is_unready = False
+
+    def _require_ready(self, pose: Pose) -> None:
+        if self._is_unready:
+            reason, action = "its last preparation failed", "Prepare it again"
+            raise MoveRefused(f"to move to {pose}", reason, subject=self._name, action=action)
 
     async def _restore_modes(self, commands: ControllerCommands) -> None:
         await commands.set(f"mdi {self._restoring}")
@@ -222,6 +252,7 @@ class LinuxcncrshController:
             case StartupAction.SWITCH_ON:
                 await startup.switch_machine(commands, self._timeouts, on=True)
             case StartupAction.HOME:
+                await startup.check_coordinate_system(commands)
                 self._joints_before_reload = None  # they may move
                 limit_s, poll_s = self._settings.homing_timeout_s, self._timeouts.poll
                 await startup.home_joints(commands, limit_s, poll_s, lambda: self._was_stopped_since(stops))

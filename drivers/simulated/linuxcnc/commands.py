@@ -28,6 +28,9 @@ class ClientSession:
         return self.state.commander is self
 
 
+UNITS = {1.0: "MM", 10.0: "CM", 25.4: "INCH"}
+
+
 def _on_off(*, on: bool) -> str:
     return "ON" if on else "OFF"
 
@@ -38,6 +41,17 @@ def _yes_no(*, yes: bool) -> str:
 
 def _numbers(values: Iterable[float]) -> str:
     return " ".join(f"{value:.6f}" for value in values)
+
+
+def _position(session: ClientSession, values: tuple[float, ...]) -> str:
+    """Three lengths in the machine's unit, and three angles."""
+    unit = session.settings.unit_mm
+    return _numbers([*(value / unit for value in values[:3]), *values[3:]])
+
+
+def _joints(session: ClientSession) -> str:
+    unit = session.settings.joint_unit_mm
+    return _numbers(value / unit for value in session.state.machine.joints())
 
 
 GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
@@ -51,13 +65,13 @@ GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
     "ERROR": lambda session: session.state.next_error(),
     "TELEOP_ENABLE": lambda session: _yes_no(yes=session.state.teleop),
     "JOINT_HOMED": lambda session: " ".join([_yes_no(yes=session.state.homed)] * 6),
-    "JOINT_POS": lambda session: _numbers(session.state.machine.joints()),
-    "ABS_ACT_POS": lambda session: _numbers(session.state.machine.pose().as_tuple()),
-    "POS_OFFSET": lambda _session: _numbers([0.0] * 6),
+    "JOINT_POS": _joints,
+    "ABS_ACT_POS": lambda session: _position(session, session.state.machine.pose().as_tuple()),
+    "POS_OFFSET": lambda session: _position(session, session.state.modes.offsets),
     "PROGRAM_CODES": lambda session: session.state.modes.codes,
     "FEED_OVERRIDE": lambda session: f"{session.state.feed_override_percent:g}",
     "PROGRAM_UNITS": lambda _session: "MM",
-    "USER_LINEAR_UNITS": lambda _session: "MM",
+    "USER_LINEAR_UNITS": lambda session: UNITS.get(session.settings.unit_mm, "CUSTOM"),
     "INIFILE": lambda session: Path(session.settings.config).name,
     "PLAT": lambda _session: "Linux",
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from hexacell.kinematics.pose import Pose
@@ -17,6 +17,8 @@ _MODES = (17.0, 21.0, 49.0, 54.0, 64.0, 90.0)
 """G codes of the modes that are always active here."""
 
 _MACHINE_COORDINATES, _SET_COORDINATE_SYSTEM = 53.0, 10.0
+_SET_OFFSET, _NO_OFFSET = 92.0, 92.1
+_NOWHERE = (0.0,) * len(_AXES)
 
 INVERSE_TIME, PER_MINUTE = 93, 94
 _NO_MOTION = 80
@@ -30,13 +32,21 @@ class BlockError(Exception):
 class ModalState:
     """What a block leaves to those after it: G0, G1 or G80, G93 or G94, and the feed of G94, mm/min.
 
-    ``rotation_deg`` is that of the coordinate system about z (G10 L2 R), which no query tells.
+    ``work_offset`` is that of the coordinate system (G10 L2), and ``rotation_deg`` its rotation about z,
+    which no query tells; ``offset`` is added to it (G92).
     """
 
     motion: int = 0
     feed_mode: int = PER_MINUTE
     feed: float = 0.0
     rotation_deg: float = 0.0
+    work_offset: tuple[float, ...] = _NOWHERE
+    offset: tuple[float, ...] = _NOWHERE
+
+    @property
+    def offsets(self) -> tuple[float, ...]:
+        """The answer to ``get pos_offset``, mm and deg."""
+        return tuple(one + other for one, other in zip(self.work_offset, self.offset, strict=True))
 
     @property
     def codes(self) -> str:
@@ -69,27 +79,59 @@ def parse_block(block: str, current: Pose, modes: ModalState | None = None) -> P
     words = _words(block)
     codes = [value for letter, value in words if letter == "G"]
     numbers = {letter: value for letter, value in words if letter != "G"}
-    if _SET_COORDINATE_SYSTEM in codes:
-        return ParsedBlock(replace(modes or ModalState(), rotation_deg=numbers.get("R", 0.0)))
+    before = modes or ModalState()
+    if {_SET_COORDINATE_SYSTEM, _SET_OFFSET, _NO_OFFSET} & {*codes}:
+        return ParsedBlock(_coordinates_after(codes, numbers, current, before))
     for letter in numbers:
         if letter not in (*_AXES, "F"):
             raise BlockError(f"Bad character '{letter.lower()}' used")
     feed = numbers.pop("F", None)
-    modes = _modes_after(codes, feed, modes or ModalState())
+    after = _modes_after(codes, feed, before)
     if not numbers and 1.0 not in codes:
-        return ParsedBlock(modes)
-    coordinates = dict(zip(_AXES, current.as_tuple(), strict=True)) | numbers
-    target = Pose(*coordinates.values())
-    if _MACHINE_COORDINATES not in codes:
-        target = _rotated(target, modes.rotation_deg)
-    duration_s = _duration(modes, feed, current, target)
-    return ParsedBlock(modes, target, duration_s) if numbers else ParsedBlock(modes)
+        return ParsedBlock(after)
+    system = ModalState() if _MACHINE_COORDINATES in codes else after
+    target = _in_machine(_with(_in_system(current, system), numbers), system)
+    duration_s = _duration(after, feed, current, target)
+    return ParsedBlock(after, target, duration_s) if numbers else ParsedBlock(after)
 
 
-def _rotated(target: Pose, degrees: float) -> Pose:
-    """Where X and Y lead in a coordinate system that is rotated about the machine's origin."""
+def _coordinates_after(
+    codes: Sequence[float], numbers: Mapping[str, float], current: Pose, before: ModalState
+) -> ModalState:
+    if _NO_OFFSET in codes:
+        return replace(before, offset=_NOWHERE)
+    if _SET_OFFSET in codes:
+        here = _in_system(current, before).as_tuple()
+        wanted = _with(Pose(*here), numbers).as_tuple()
+        pairs = zip(before.offset, here, wanted, strict=True)
+        return replace(before, offset=tuple(old + now - new for old, now, new in pairs))
+    work = _with(Pose(*before.work_offset), numbers).as_tuple()
+    return replace(before, work_offset=work, rotation_deg=numbers.get("R", before.rotation_deg))
+
+
+def _with(pose: Pose, numbers: Mapping[str, float]) -> Pose:
+    """The pose with the coordinates that are among the words of a block."""
+    pairs = zip(_AXES, pose.as_tuple(), strict=True)
+    return Pose(*(numbers.get(axis, value) for axis, value in pairs))
+
+
+def _in_system(pose: Pose, system: ModalState) -> Pose:
+    """A pose of the machine in a coordinate system."""
+    pairs = zip(pose.as_tuple(), system.offsets, strict=True)
+    return _rotated(Pose(*(value - offset for value, offset in pairs)), -system.rotation_deg)
+
+
+def _in_machine(pose: Pose, system: ModalState) -> Pose:
+    """A pose in a coordinate system as one of the machine."""
+    pairs = zip(_rotated(pose, system.rotation_deg).as_tuple(), system.offsets, strict=True)
+    return Pose(*(value + offset for value, offset in pairs))
+
+
+def _rotated(pose: Pose, degrees: float) -> Pose:
+    if degrees == 0.0:
+        return pose
     sine, cosine = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
-    x, y, *rest = target.as_tuple()
+    x, y, *rest = pose.as_tuple()
     return Pose(cosine * x - sine * y, sine * x + cosine * y, *rest)
 
 

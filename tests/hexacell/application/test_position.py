@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import pytest
@@ -12,7 +13,7 @@ from drivers.interfaces import StartupAction
 from hexacell.application.calibration_run import preflight
 from hexacell.application.device_setup import open_devices
 from hexacell.cell.loader import Cell
-from hexacell.errors import ExitCode, WriteBackUndone
+from hexacell.errors import DeviceError, ExitCode, WriteBackUndone
 from procedures.calibration.workflow import Mode
 from procedures.run import events
 from procedures.run.trips import Guard, GuardTripped
@@ -94,6 +95,26 @@ async def test_preflight_names_an_encoder_that_the_controller_contradicts(make_s
     cell = replace(cell, settings=wrong)
     with pytest.raises(GuardTripped, match=r"encoder 4: shows slider 4 at .* where the controller's pose"):
         await preflight(cell, Mode.OPTIMISE, unattended=True)
+
+
+async def test_an_offset_of_the_controller_is_found_by_preflight_before_it_is_homed(make_site) -> None:
+    site = make_site()
+    cell = site.order().cell
+    state = site.simulated.controller.state
+    state.modes = replace(state.modes, offset=(0.0, 0.0, 3.0, 0.0, 0.0, 0.0))
+    for find in (partial(preflight, cell, Mode.OPTIMISE, unattended=True), site.calibrate):
+        with pytest.raises(DeviceError, match=r"adds an offset of 0\.000000 0\.000000 3\.000000"):
+            await find()
+    assert site.simulated.schedule.move_count == 0
+    assert not state.homed
+    assert state.estop
+
+
+async def test_a_controller_that_counts_in_inches_is_calibrated(make_site) -> None:
+    site = make_site(**{"controller.unit_mm": 25.4})
+    assert (await site.calibrate()).exit_code == ExitCode.DONE
+    located = site.happened(events.Located)[-1]
+    assert located.joints == pytest.approx(located.encoders, abs=0.1)
 
 
 async def test_a_controller_that_keeps_its_old_config_gets_the_file_back(finished, make_site) -> None:

@@ -19,8 +19,15 @@ IS_ON = ("get machine", b"MACHINE ON\r\n")
 IS_OFF = ("get machine", b"MACHINE OFF\r\n")
 HOMED = ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
 NOT_HOMED = ("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n")
+OWN_COORDINATES = [
+    ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n"),
+    ("get program_codes", b"PROGRAM_CODES G80 G17 G40 G21 G90 G94 G54 G49 G92.2 F0 S0\r\n"),
+    ("get pos_offset", b"POS_OFFSET 0.0 0.0 0.0 0.0 0.0 0.0\r\n"),
+    ("get feed_override", b"FEED_OVERRIDE 100\r\n"),
+]
 HOMING = [
     NOT_HOMED,
+    *OWN_COORDINATES,
     ("set mode manual", b"SET MODE ACK\n\r"),
     ("get teleop_enable", b"TELEOP_ENABLE NO\r\n"),
     ("get error", b"ERROR OK\r\n"),

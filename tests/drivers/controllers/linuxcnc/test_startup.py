@@ -6,9 +6,10 @@ import asyncio
 
 import pytest
 
-from drivers.controllers.errors import CommandRefused, MotionInterrupted, StartupNotPermitted
+from drivers.controllers.errors import CommandRefused, MotionInterrupted, MoveRefused, StartupNotPermitted
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
+from hexacell.kinematics.pose import Pose
 
 ALL = frozenset(StartupAction)
 NO_ERROR = ("get error", b"ERROR OK\r\n")
@@ -39,6 +40,7 @@ UNITS = ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n")
 CODES = ("get program_codes", b"PROGRAM_CODES G80 G17 G40 G21 G90 G94 G54 G49 G92.2 F0 S0\r\n")
 OFFSETS = ("get pos_offset", b"POS_OFFSET 0.000000 0.000000 -0.000000 0.000000 0.000000 0.000000\r\n")
 OVERRIDE = ("get feed_override", b"FEED_OVERRIDE 100\r\n")
+OWN_COORDINATES = [UNITS, CODES, OFFSETS, OVERRIDE]
 UNTIL_HOMED = [*TAKING_CONTROL, *SWITCHING_ON]
 UNTIL_MDI = [*UNTIL_HOMED, *READY, *MDI]
 
@@ -50,21 +52,19 @@ async def test_prepare_releases_the_emergency_stop_switches_on_and_homes(play):
             *RESETTING,
             *SWITCHING_ON,
             *ON_NOT_HOMED,
+            *OWN_COORDINATES,
             *IN_JOINT_MODE,
             *HOMING,
             *READY,
             *MDI,
-            UNITS,
-            CODES,
-            OFFSETS,
-            OVERRIDE,
+            *OWN_COORDINATES,
         ]
     )
     await driver.prepare(ALL)
 
 
 async def test_prepare_changes_no_state_that_is_already_right(play):
-    driver = await play.opened([*TAKING_CONTROL, *READY, *MDI, UNITS, CODES, OFFSETS, OVERRIDE])
+    driver = await play.opened([*TAKING_CONTROL, *READY, *MDI, *OWN_COORDINATES])
     await driver.prepare(ALL)
 
 
@@ -73,6 +73,7 @@ async def test_homing_leaves_teleoperation_first(play):
         [
             *UNTIL_HOMED,
             *ON_NOT_HOMED,
+            *OWN_COORDINATES,
             ("set mode manual", b"SET MODE ACK\n\r"),
             ("get teleop_enable", b"TELEOP_ENABLE YES\r\n"),
             ("set teleop_enable off", b"SET TELEOP_ENABLE ACK\n\r"),
@@ -80,10 +81,7 @@ async def test_homing_leaves_teleoperation_first(play):
             *HOMING,
             *READY,
             *MDI,
-            UNITS,
-            CODES,
-            OFFSETS,
-            OVERRIDE,
+            *OWN_COORDINATES,
         ]
     )
     await driver.prepare(ALL)
@@ -103,10 +101,7 @@ async def test_prepare_waits_until_each_state_is_reached(play):
             MDI[0],
             ("get mode", b"MODE MANUAL\r\n"),
             MDI[1],
-            UNITS,
-            CODES,
-            OFFSETS,
-            OVERRIDE,
+            *OWN_COORDINATES,
         ]
     )
     await driver.prepare(ALL)
@@ -122,7 +117,7 @@ async def test_a_mode_that_was_asked_for_without_effect_is_asked_for_again(play)
         return MDI[0][1]
 
     afterwards |= {"get mode": b"MODE MANUAL\r\n", "set mode mdi": second_request}
-    afterwards |= dict([UNITS, CODES, OFFSETS, OVERRIDE])
+    afterwards |= dict(OWN_COORDINATES)
     await driver.prepare(ALL)
 
 
@@ -166,7 +161,7 @@ async def test_prepare_accepts_a_server_without_the_optional_queries(play):
             "does not enter MDI mode: it is on, and gives no reason",
         ),
         (
-            [*UNTIL_HOMED, *ON_NOT_HOMED, *IN_JOINT_MODE, HOMING[0]],
+            [*UNTIL_HOMED, *ON_NOT_HOMED, *OWN_COORDINATES, *IN_JOINT_MODE, HOMING[0]],
             {
                 "get joint_homed": b"JOINT_HOMED NO NO NO NO NO NO\r\n",
                 "get error": [b"ERROR home switch of joint 2 not found\r\n", b"ERROR OK\r\n"],
@@ -184,7 +179,7 @@ async def test_an_acknowledged_command_without_effect_is_reported(play, conversa
     assert caught.value.subject == f"controller 127.0.0.1:{play.servers[0].port}"
 
 
-@pytest.mark.parametrize(
+FALSE_COORDINATES = pytest.mark.parametrize(
     ("conversation", "problem"),
     [
         (
@@ -209,10 +204,36 @@ async def test_an_acknowledged_command_without_effect_is_reported(play, conversa
         ),
     ],
 )
-async def test_settings_that_falsify_coordinates_are_refused(play, conversation, problem):
+
+
+@FALSE_COORDINATES
+async def test_settings_that_falsify_coordinates_are_refused_and_then_nothing_moves(
+    play, conversation, problem
+):
     driver = await play.opened([*UNTIL_MDI, *conversation])
     with pytest.raises(DeviceError, match=problem):
         await driver.prepare(ALL)
+    with pytest.raises(MoveRefused, match="its last preparation failed. Prepare it again"):
+        await driver.move(Pose(0.0, 0.0, 500.0), 1.0)
+
+
+@FALSE_COORDINATES
+async def test_they_are_refused_before_the_machine_is_homed(play, conversation, problem):
+    driver = await play.opened([*UNTIL_HOMED, *ON_NOT_HOMED, *conversation])
+    with pytest.raises(DeviceError, match=problem):
+        await driver.prepare(ALL)
+
+
+@FALSE_COORDINATES
+async def test_a_check_finds_them_and_sets_nothing(play, conversation, problem):
+    driver = await play.opened(conversation)
+    with pytest.raises(DeviceError, match=problem):
+        await driver.check()
+
+
+async def test_a_check_of_coordinates_that_are_the_machines_own_finds_nothing(play):
+    driver = await play.opened(OWN_COORDINATES)
+    await driver.check()
 
 
 async def test_a_refusal_quotes_the_controllers_error_messages(play):
@@ -271,6 +292,7 @@ async def test_a_stop_during_prepare_prevents_homing(play):
         [
             *UNTIL_HOMED,
             *ON_NOT_HOMED,
+            *OWN_COORDINATES,
             IN_JOINT_MODE[0],
             ("get teleop_enable", stopped, b"TELEOP_ENABLE NO\r\n"),
             NO_ERROR,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
@@ -15,10 +16,13 @@ from drivers.controllers.errors import (
     ResponseTimeout,
     StartupNotPermitted,
 )
+from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.settings import Timeouts
 from drivers.interfaces import StartupAction
 from drivers.simulated.linuxcnc.mdi import ModalState
+from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.linuxcnc.state import WaitMode
+from hexacell.cell.controller import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 from tests.drivers.simulated.linuxcnc.conftest import QUICK
@@ -53,6 +57,46 @@ async def test_a_rotation_that_no_query_tells_does_not_move_the_target(ready, si
     simulated.state.modes = replace(simulated.state.modes, rotation_deg=30.0)
     await ready.move(TARGET, MOVE_S)
     assert machine.pose() == TARGET
+
+
+@pytest.mark.parametrize(
+    "modes", [{"offset": (0.0, 0.0, -5.0, 0.0, 0.0, 0.0)}, {"work_offset": (1.0,) * 6}]
+)
+async def test_an_offset_is_found_before_anything_moves(driver, simulated, machine, modes):
+    simulated.state.modes = replace(simulated.state.modes, **modes)
+    controller = driver()
+    await controller.open()
+    for look in (controller.check, partial(controller.prepare, ALL)):
+        with pytest.raises(DeviceError, match=r"adds an offset of .*\(G54, G92\)"):
+            await look()
+    assert machine.events == ["on"]
+    with pytest.raises(MoveRefused, match="its last preparation failed"):
+        await controller.move(TARGET, MOVE_S)
+    simulated.state.modes = ModalState()
+    await controller.check()
+    await controller.prepare(ALL)
+    await controller.move(TARGET, MOVE_S)
+    assert machine.events == ["on", "home", "move"]
+    await controller.close()
+
+
+async def test_an_inch_machine_is_commanded_and_told_in_mm(machine):
+    inches = ControllerSettings(config="machine.ini", unit_mm=25.4)
+    with SimulatedController(machine, inches) as server:
+        controller = LinuxcncrshController(inches.model_copy(update={"port": server.port}), timeouts=QUICK)
+        await controller.open()
+        await controller.prepare(ALL)
+        await controller.move(TARGET, MOVE_S)
+        assert machine.pose() == TARGET
+        assert (await controller.pose()).as_tuple() == pytest.approx(TARGET.as_tuple(), abs=2e-5)
+        assert await controller.joint_positions() == pytest.approx(TARGET.as_tuple(), abs=2e-5)
+        await controller.close()
+        plain = ControllerSettings(config="machine.ini", port=server.port)
+        controller = LinuxcncrshController(plain, timeouts=QUICK)
+        await controller.open()
+        with pytest.raises(DeviceError, match=r"counts in inch.*Set controller.unit_mm = 25\.4"):
+            await controller.check()
+        await controller.close()
 
 
 async def test_from_emergency_stop_to_a_pose(driver, machine):

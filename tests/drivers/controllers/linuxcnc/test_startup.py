@@ -213,7 +213,7 @@ async def test_settings_that_falsify_coordinates_are_refused_and_then_nothing_mo
     driver = await play.opened([*UNTIL_MDI, *conversation])
     with pytest.raises(DeviceError, match=problem):
         await driver.prepare(ALL)
-    with pytest.raises(MoveRefused, match="its last preparation failed. Prepare it again"):
+    with pytest.raises(MoveRefused, match=r"its last preparation failed\. Prepare it again"):
         await driver.move(Pose(0.0, 0.0, 500.0), 1.0)
 
 

@@ -1,8 +1,9 @@
 """The text of a LinuxCNC INI file, as LinuxCNC reads it.
 
 LinuxCNC looks for a variable in the first section of that name alone and takes the first one there; names
-are case-sensitive; what stands behind the number belongs to the value, comments too (seen with ``inivar``
-of LinuxCNC 2.9). What LinuxCNC would not see, or see otherwise than a person, is refused.
+are case-sensitive; what stands behind the number belongs to the value, comments too; a backslash at the end
+of a line, even of a comment, makes the next one a part of it (seen with ``inivar`` of LinuxCNC 2.9). What
+LinuxCNC would not see, or see otherwise than a person, is refused.
 """
 
 from __future__ import annotations
@@ -19,17 +20,28 @@ from hexacell.errors import FileError
 SEPARATOR = "/"
 """Between a section and a variable in a key; without it the variable is in the section of the options."""
 
+CONTINUED = "\\"
+"""At the end of a line; before a carriage return LinuxCNC takes it for a part of the value."""
+
+_CONTINUATION = "the line before ends with a backslash and goes on in this one", "Remove the backslash"
+_SECOND_SECTION = "it does not look into a second section of that name", "Move it to the first one"
+
 _SECTION = re.compile(r"[ \t]*\[(?P<name>[^\]\n]*)\]")
-_VARIABLE = re.compile(r"[ \t]*(?P<name>[^=\s#;\[][^=\n]*?)[ \t]*=[ \t]*(?P<value>.*?)[ \t\r]*(?:\n|\Z)")
+# Whatever stands between the name and the first "=" LinuxCNC skips; without one it looks no further.
+_VARIABLE = re.compile(
+    r"[ \t]*(?P<name>[^=\s#;\[][^=\s]*)(?:[ \t][^=\n]*)?(?:=[ \t]*(?P<value>.*?))?[ \t\r]*(?:\n|\Z)"
+)
 _NUMBER_AND_MORE = re.compile(r"(?P<number>[-+.\deE]+)[ \t]+(?P<more>.+)")
 
 
 @dataclass(frozen=True, slots=True)
 class _Variable:
+    """One that a person sees; ``hidden`` is why LinuxCNC does not, and what to do, if so."""
+
     section: str
-    is_first_section: bool
     name: str
     token: NumberToken
+    hidden: tuple[str, str] | None
 
 
 @dataclass(frozen=True)
@@ -49,7 +61,7 @@ class IniText:
         section, _, name = key.rpartition(SEPARATOR)
         section = section or self.section
         found = [one for one in self._variables if (one.section, one.name) == (section, name)]
-        seen = [one.token for one in found if one.is_first_section]
+        seen = [one.token for one in found if one.hidden is None]
         if not seen:
             raise self._missing(section, name, found)
         if len(seen) > 1:
@@ -76,11 +88,12 @@ class IniText:
         return any(one.section == name for one in self._variables)
 
     def _missing(self, section: str, name: str, found: list[_Variable]) -> FileError:
-        if found:
-            problem = (
-                f"[{section}] is there twice, and {name} in the second one, where LinuxCNC does not look"
-            )
-            return self._error(found[0].token, problem, "Move it to the first one")
+        for one in found:
+            if one.hidden is not None:
+                problem, action = one.hidden
+                return self._error(
+                    one.token, f"LinuxCNC does not see [{section}] {name}: {problem}", action
+                )
         return FileError(
             f"there is no {name} in a section [{section}]",
             subject=self.source,
@@ -96,14 +109,17 @@ class IniText:
 
     def _each_variable(self) -> Iterator[_Variable]:
         section, seen, start = "", set[str](), 0
-        is_first = True
+        is_first, is_continued = True, False
         for line, content in enumerate(self.text.split("\n"), start=1):
-            if header := _SECTION.match(content):
+            was_continued, is_continued = is_continued, content.endswith(CONTINUED)
+            if variable := _VARIABLE.fullmatch(content):
+                group = "value" if variable["value"] is not None else "name"
+                first, end = (start + place for place in variable.span(group))
+                token = NumberToken(variable[group], first, end, line)
+                hidden = _CONTINUATION if was_continued else None if is_first else _SECOND_SECTION
+                yield _Variable(section, variable["name"], token, hidden)
+            elif (header := _SECTION.match(content)) and not was_continued:
                 section = header["name"]
                 is_first = section not in seen
                 seen.add(section)
-            elif variable := _VARIABLE.fullmatch(content):
-                first, end = (start + place for place in variable.span("value"))
-                token = NumberToken(variable["value"], first, end, line)
-                yield _Variable(section, is_first, variable["name"], token)
             start += len(content) + 1

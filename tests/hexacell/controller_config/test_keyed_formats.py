@@ -234,11 +234,19 @@ class TestWhatLinuxcncSees:
     def test_a_second_section_of_the_same_name(self, written) -> None:
         rows = write_ini(lambda _: "1.5", " ")
         text = "\n".join([*rows[:10], "[EMC]", "[HEXAGLIDE]", *rows[10:]])
-        with pytest.raises(
-            FileError, match=r"a second \[HEXAGLIDE\], where LinuxCNC does not look|twice"
-        ) as e:
+        problem = r"does not see \[HEXAGLIDE\] S4X: it does not look into a second section"
+        with pytest.raises(FileError, match=problem) as caught:
             self.FORM.read(written(text))
-        assert e.value.line == 13
+        assert caught.value.line == 13
+
+    @pytest.mark.parametrize("before", ["# millimetres \\", "NOTE = of the\\"])
+    def test_a_line_behind_a_backslash(self, written, before) -> None:
+        rows = write_ini(lambda _: "1.5", " ")
+        text = "\n".join([*rows[:10], before, *rows[10:]])
+        problem = r"does not see \[HEXAGLIDE\] S4X: the line before ends with a backslash"
+        with pytest.raises(FileError, match=problem) as caught:
+            self.FORM.read(written(text))
+        assert caught.value.line == 12
 
     def test_a_comment_behind_a_number(self, written) -> None:
         rows = write_ini(lambda name: "1.5 # mm" if name == "B1x" else "1.5", " ")

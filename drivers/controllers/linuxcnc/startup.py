@@ -55,7 +55,7 @@ async def leave_emergency_stop(commands: ControllerCommands, timeouts: Timeouts)
     Raises:
         DeviceError: It stays on, for example because a switch is still pressed.
     """
-    await commands.set("estop off")
+    await commands.set("estop off", timeouts.command)
     if not await _becomes_true(lambda: _is(commands, "estop", on=False), timeouts):
         raise DeviceError(
             f"stays in emergency stop: {await commands.reason()}",
@@ -67,17 +67,24 @@ async def leave_emergency_stop(commands: ControllerCommands, timeouts: Timeouts)
 async def switch_machine(commands: ControllerCommands, timeouts: Timeouts, *, on: bool) -> None:
     """Switch the machine on or off.
 
+    Asked for once more where nothing happens and LinuxCNC gives no reason: on a starved computer it loses
+    what its task asks of its motion.
+
     Raises:
         DeviceError: Its state does not change.
     """
-    state = "on" if on else "off"
-    await commands.set(f"machine {state}")
-    if not await _becomes_true(lambda: _is(commands, "machine", on=on), timeouts):
-        raise DeviceError(
-            f"does not switch {state}: {await commands.reason()}",
-            subject=commands.subject,
-            action="Look for a message on the controller's own screen",
-        )
+    state, errors = "on" if on else "off", list[str]()
+    for _ in range(_MOST_REQUESTS):
+        await commands.set(f"machine {state}", timeouts.command)
+        if await _becomes_true(lambda: _is(commands, "machine", on=on), timeouts):
+            return
+        if errors := await commands.errors():
+            break
+    raise DeviceError(
+        f"does not switch {state}: {await commands.reason(tuple(errors))}",
+        subject=commands.subject,
+        action="Look for a message on the controller's own screen",
+    )
 
 
 async def home_joints(
@@ -91,9 +98,9 @@ async def home_joints(
         MotionInterrupted: ``stopped`` became true.
         DeviceError: Some joint is not homed in time.
     """
-    await commands.set("mode manual")
+    await commands.set("mode manual", timeout_s)
     if (await commands.get_if_known("teleop_enable")).upper() in ("YES", "ON"):
-        await commands.set("teleop_enable off")
+        await commands.set("teleop_enable off", timeout_s)
     await commands.errors()
     _raise_if_stopped(stopped, commands)
     await commands.set("home -1", timeout_s)
@@ -119,7 +126,7 @@ async def enter_mdi_mode(commands: ControllerCommands, timeouts: Timeouts) -> No
         return (await commands.get("mode")).upper() == "MDI"
 
     for _ in range(_MOST_REQUESTS):
-        await commands.set("mode mdi")
+        await commands.set("mode mdi", timeouts.command)
         if await _becomes_true(is_mdi, timeouts):
             return
     problem = f"does not enter MDI mode: {await commands.reason()}"

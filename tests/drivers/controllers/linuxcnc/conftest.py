@@ -16,7 +16,14 @@ from hexacell.cell.controller import ControllerSettings
 
 PATIENT = Timeouts(explanation=0.05, poll=0.002)
 IMPATIENT = Timeouts(
-    answer=0.4, explanation=0.05, poll=0.002, arrival=0.02, stop=0.6, switch=0.02, reconnect=0.2
+    answer=0.4,
+    command=0.4,
+    explanation=0.05,
+    poll=0.002,
+    arrival=0.02,
+    stop=0.6,
+    switch=0.02,
+    reconnect=0.2,
 )
 """For tests in which something does not happen."""
 

@@ -69,6 +69,7 @@ async def test_a_machine_that_does_not_go_off_is_not_reloaded(play, tmp_path):
         [IS_ON, BEFORE, OFF[0]], reload_command=python(f"open({str(ran)!r}, 'w').close()")
     )
     play.servers[0].afterwards = {
+        "set machine off": OFF[0][1],
         "get machine": b"MACHINE ON\r\n",
         "get error": b"ERROR OK\r\n",
         "get estop": b"ESTOP OFF\r\n",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -121,6 +122,33 @@ async def test_a_mode_that_was_asked_for_without_effect_is_asked_for_again(play)
     await driver.prepare(ALL)
 
 
+async def test_a_machine_that_is_not_switched_on_without_a_reason_is_asked_again(play):
+    play.patience = play.IMPATIENT
+    driver = await play.opened([*TAKING_CONTROL, *SWITCHING_ON[:-1]])
+    afterwards = play.servers[0].afterwards
+
+    def second_request() -> bytes:
+        afterwards["get machine"] = ON[0][1]
+        return SWITCHING_ON[-2][1]
+
+    afterwards |= {"get machine": OFF[-1][1], "get error": NO_ERROR[1], "set machine on": second_request}
+    afterwards |= dict([*NO_ESTOP, *HOMED, *MDI, *OWN_COORDINATES])
+    await driver.prepare(ALL)
+
+
+async def test_a_change_of_state_may_take_longer_than_a_query(play):
+    play.patience = replace(play.patience, answer=0.4, command=60.0)
+    slow = play.Pause()
+    switching = [*OFF, ("set machine on", slow, b"SET MACHINE ACK\n\r"), *ON]
+    driver = await play.opened([*TAKING_CONTROL, *switching, *READY, *MDI, *OWN_COORDINATES])
+    preparing = asyncio.create_task(driver.prepare(ALL))
+    await slow.reached.wait()
+    done, _ = await asyncio.wait([preparing], timeout=0.8)  # a query would have been given up
+    assert not done
+    slow.set()
+    await preparing
+
+
 async def test_prepare_accepts_a_server_without_the_optional_queries(play):
     unknown = [
         ("get user_linear_units", b"GET USER_LINEAR_UNITS NAK\r\n\r\n"),
@@ -143,11 +171,20 @@ async def test_prepare_accepts_a_server_without_the_optional_queries(play):
         (
             [*TAKING_CONTROL, *SWITCHING_ON[:-1]],
             {
+                "set machine on": b"SET MACHINE ACK\n\r",
                 "get machine": b"MACHINE OFF\r\n",
                 "get estop": b"ESTOP OFF\r\n",
                 "get error": b"ERROR OK\r\n",
             },
             "does not switch on: it is switched off",
+        ),
+        (
+            [*TAKING_CONTROL, *SWITCHING_ON[:-1]],
+            {  # asked for once: a second request would be none of the script
+                "get machine": b"MACHINE OFF\r\n",
+                "get error": [b"ERROR joint 3 following error\r\n", b"ERROR OK\r\n"],
+            },
+            "does not switch on: joint 3 following error",
         ),
         (
             [*UNTIL_HOMED, *READY, MDI[0]],

@@ -54,3 +54,7 @@ class RestartedNodeError(DeviceError):
 
 class InvalidSampleError(DeviceError):
     """An encoder reports an error that makes its position invalid, until it reports that it is gone."""
+
+
+class NotHomedError(DeviceError):
+    """Encoders that the controller reads have no position yet: its joints are not homed."""

@@ -4,18 +4,28 @@ Of most machines the scales are those of the drives, and nothing but the control
 tells is as old as its last cycle (10 ms of LinuxCNC's task) and a position only once the joints are homed.
 It is kept in counts of the size that the cell file states. A comparison of encoders and controller says
 nothing then: both are one reading, and a scale that slips moves both.
+
+Where the joints that it tells include the zeros of its geometry, an encoder shows what is told less the zero
+in its config. That the controller runs these zeros is not seen before they are written: then the joints
+change by other amounts than the config does, and the robot is not where it was.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
 from drivers.encoders.cia406 import joint_variables
+from drivers.errors import NotHomedError
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from hexacell.cell.devices import EncoderSettings
-from hexacell.errors import DeviceError, UsageError
+from hexacell.errors import UsageError
+from hexacell.kinematics.parameters import LEGS
 
 PROTOCOL = "controller"
+
+Zeros = Callable[[], Sequence[float]]
+"""What the joints that a controller tells are more than its encoders show, now; raises ``FileError``."""
 
 
 @runtime_checkable
@@ -34,7 +44,9 @@ class ControllerScales:
         UsageError: this controller does not tell its joints.
     """
 
-    def __init__(self, settings: EncoderSettings, controller: object) -> None:
+    def __init__(
+        self, settings: EncoderSettings, controller: object, zeros: Zeros = lambda: (0.0,) * LEGS
+    ) -> None:
         if not isinstance(controller, JointPositions):
             raise UsageError(
                 "the controller does not tell where its joints are",
@@ -42,30 +54,35 @@ class ControllerScales:
             )
         self._settings = settings
         self._controller = controller
+        self._zeros = zeros
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
         """One identity a leg; nothing is asked."""
         return tuple(
             DeviceIdentity(f"encoder of leg {leg}", PROTOCOL, "as the controller tells its joints")
-            for leg in range(1, 7)
+            for leg in range(1, LEGS + 1)
         )
 
     async def read(self) -> EncoderSample:
         """One sample.
 
         Raises:
-            DeviceError: the joints are not homed, or the controller does not answer.
+            NotHomedError: the joints are not homed.
+            DeviceError: the controller does not answer.
+            FileError: its config has no zeros.
         """
         told = await self._controller.joints_now()
         if told is None:
-            raise DeviceError(
+            raise NotHomedError(
                 "are not homed: what the controller tells of its joints is no position yet",
                 subject="encoders",
                 action="Home the controller, or let controller.startup do it",
             )
         settings = self._settings
-        terms = zip(told, settings.direction, settings.offset, strict=True)
-        counts = tuple(round(sign * (joint - offset) / settings.step) for joint, sign, offset in terms)
+        terms = zip(told, self._zeros(), settings.direction, settings.offset, strict=True)
+        counts = tuple(
+            round(sign * (joint - zero - offset) / settings.step) for joint, zero, sign, offset in terms
+        )
         return EncoderSample(counts, joint_variables(counts, settings), settings.unit)
 
     async def close(self) -> None:

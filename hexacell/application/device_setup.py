@@ -7,18 +7,21 @@ from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from drivers.encoders.of_controller import Zeros
 from drivers.foreign_errors import translated
 from drivers.interfaces import DeviceIdentity
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.stop_input import stop_input_of
 from drivers.wire_trace import WireTrace
 from hexacell.cell.devices import EncoderSettings, GaugeSettings
-from hexacell.cell.loader import Cell
+from hexacell.cell.loader import Cell, config_paths
 from hexacell.cell.measuring import NoiseSettings
 from hexacell.cell.model import CellSettings
 from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
+from hexacell.controller_config.current import CurrentConfig
 from hexacell.errors import FileError, HexacellError
+from hexacell.kinematics.mechanism import joint_zeros
 from hexacell.plugins import Group, load
 from hexacell.robot_model import config_layout
 from hexacell.storage.toml_locations import KeyPath
@@ -105,9 +108,6 @@ AGREEMENT_STEPS = 2.5
 USUAL_RESOLUTION_MM = 0.001
 JUMP_SPEEDS = 10.0
 
-CONTROLLER_SCALES = "controller"
-"""The protocol of encoders that the controller reads: their driver is given that of the controller."""
-
 
 @dataclass(frozen=True)
 class Connected:
@@ -143,17 +143,24 @@ def devices_of(
         load(Group.CONTROLLERS, settings.controller.protocol)(settings.controller, trace=trace),
         "controller",
     )
-    factory = load(Group.ENCODERS, settings.encoders.protocol)
-    of_controller = settings.encoders.protocol == CONTROLLER_SCALES
-    encoders = factory(
-        encoders_with_speed(settings), **({"controller": controller} if of_controller else {"trace": trace})
-    )
+    wiring: dict[str, object] = {"trace": trace}
+    if settings.encoders.are_of_controller:
+        wiring = {"controller": controller} | _zeros_told(settings, folder or Path())
+    encoders = load(Group.ENCODERS, settings.encoders.protocol)(encoders_with_speed(settings), **wiring)
     return Devices(
         gauges,
         translated(encoders, "encoders"),
         controller,
         stop_input_of(settings.guards, folder or Path()),
     )
+
+
+def _zeros_told(settings: CellSettings, folder: Path) -> dict[str, Zeros]:
+    """What joints that include zeros are more than the encoders show, by the config as it is now."""
+    if not settings.controller.joints_include_zeros:
+        return {}
+    config = CurrentConfig(config_paths(settings, folder), config_layout(settings))
+    return {"zeros": lambda: joint_zeros(settings.mechanism, config.geometry().geometry).tolist()}
 
 
 def gauge_with_agreement(gauge: GaugeSettings, noise: NoiseSettings) -> GaugeSettings:

@@ -140,6 +140,10 @@ class GaugeSettings(Section):
         return None if self.middle_mm is None else self.mounting.coordinate(self.middle_mm)
 
 
+OF_CONTROLLER = "controller"
+"""The protocol of encoders that are wired to the controller."""
+
+
 class EncoderSettings(Section, ABC):
     """The bank of six joint encoders, but for what a count is."""
 
@@ -179,6 +183,11 @@ class EncoderSettings(Section, ABC):
         if len(set(nodes)) != len(nodes):
             raise broken_rule("two encoders have the same node id", "Give each leg its own node id")
         return nodes
+
+    @property
+    def are_of_controller(self) -> bool:
+        """Whether the controller reads them: their driver is given that of the controller."""
+        return self.protocol == OF_CONTROLLER
 
     @property
     @abstractmethod

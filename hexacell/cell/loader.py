@@ -64,8 +64,7 @@ class Cell:
     @property
     def config_paths(self) -> tuple[Path, ...]:
         """All files of the controller's config, that one first."""
-        further = self.settings.controller.further_files
-        return (self.config_path, *(self.path.parent / one.config for one in further))
+        return config_paths(self.settings, self.path.parent)
 
     @property
     def taught_path(self) -> Path:
@@ -80,6 +79,12 @@ class Cell:
             return self.config_paths
         further = (one.taught for one in controller.further_files if one.taught is not None)
         return tuple(self.path.parent / name for name in (controller.taught, *further))
+
+
+def config_paths(settings: CellSettings, folder: Path) -> tuple[Path, ...]:
+    """All files of the controller's config, the first one first; ``folder`` has the cell file."""
+    controller = settings.controller
+    return tuple(folder / one.config for one in (controller, *controller.further_files))
 
 
 def load_cell(path: Path) -> Cell:

@@ -208,25 +208,14 @@ class CellSettings(Section):
         return self
 
     @model_validator(mode="after")
-    def _encoders_keep_their_zeros(self) -> Self:
-        if self.encoders.protocol == "controller" and self.controller.joints_include_zeros:
-            refusal = broken_rule(
-                "joints that include the zeros of the geometry are no readings of encoders: they change "
-                "when it is written",
-                "Give the encoders a bus of their own",
-            )
-            detail = InitErrorDetails(type=refusal, loc=("encoders", "protocol"), input=None)
-            raise ValidationError.from_exception_data(self.name, [detail])
-        return self
-
-    @model_validator(mode="after")
     def _real_devices_can_be_reached(self) -> Self:
         """Each missing connection is refused at its own place, which gives the error its line."""
         if self.simulation is not None:
             return self
+        has_bus = not self.encoders.are_of_controller
         connections: list[tuple[tuple[str | int, ...], str, object]] = [
             *((("gauges", n), "the gauge has no port", gauge.port) for n, gauge in enumerate(self.gauges)),
-            (("encoders",), "the encoders have no bus", self.encoders.bus),
+            *([(("encoders",), "the encoders have no bus", self.encoders.bus)] if has_bus else []),
             (("controller",), "the controller has no port", self.controller.port),
         ]
         refusals = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Iterator
 from pathlib import Path
 
-from drivers.errors import GaugeAtEnd
+from drivers.errors import GaugeAtEnd, NotHomedError
 from drivers.interfaces import CheckedController, EncoderSample, GaugeReading
 from hexacell.campaign import feasibility
 from hexacell.errors import AnswerNeeded, HexacellError, flatten_errors, joined
@@ -73,7 +73,8 @@ def _held_out_failures(calibration: Calibration) -> Iterator[HexacellError]:
 async def device_failures(devices: Devices) -> list[HexacellError]:
     """What is wrong with opened devices: each is asked for one reading, the controller what it is set to.
 
-    A plunger at an end of its travel is no failure: the robot is not at the gauges yet.
+    A plunger at an end of its travel is no failure: the robot is not at the gauges yet. Nor are joints that
+    are not homed, where the controller reads the encoders.
     """
     calls: list[Awaitable[GaugeReading | EncoderSample | None]] = [m.gauge.read() for m in devices.gauges]
     calls.append(devices.encoders.read())
@@ -82,7 +83,7 @@ async def device_failures(devices: Devices) -> list[HexacellError]:
     try:
         await gather_errors("devices cannot be read", calls)
     except HexacellError as error:
-        return [one for one in flatten_errors(error) if not isinstance(one, GaugeAtEnd)]
+        return [one for one in flatten_errors(error) if not isinstance(one, GaugeAtEnd | NotHomedError)]
     return []
 
 

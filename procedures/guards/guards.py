@@ -110,8 +110,12 @@ class Guards:
         return await self.supervisor.supervise(action, pollers, self._limits())
 
     async def while_not_ready(self, order: Supervised[None]) -> None:
-        """Run an order during which the controller is switched off, on, or homed: its driver watches it."""
-        await self.supervisor.supervise(order, self._pollers(), self._limits(), STOP_GRACE_S)
+        """Run an order during which the controller is switched off, on, or homed: its driver watches it.
+
+        Encoders that it reads have no position meanwhile.
+        """
+        pollers = self._pollers(encoders=not self._settings.encoders.are_of_controller)
+        await self.supervisor.supervise(order, pollers, self._limits(), STOP_GRACE_S)
 
     async def require_reloaded(self) -> None:
         """Make sure that the controller runs the geometry of its config."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from drivers.errors import NotHomedError
 from drivers.interfaces import EncoderSample
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
@@ -62,7 +63,10 @@ class PositionCheck:
         Raises:
             HexacellError: a device or the config cannot be read.
         """
-        found = await self._compared(encoders or await self.devices.read_encoders())
+        try:
+            found = await self._compared(encoders or await self.devices.read_encoders())
+        except NotHomedError:
+            return CheckedPosition(None, _not_homed())
         for _ in range(1, ATTEMPTS):
             if found.trip is None or found.reports is None:
                 break

@@ -6,8 +6,9 @@ import pytest
 
 from drivers.encoders.cia406 import joint_variables
 from drivers.encoders.of_controller import ControllerScales
+from drivers.errors import NotHomedError
 from hexacell.cell.devices import LinearEncoderSettings
-from hexacell.errors import DeviceError, UsageError
+from hexacell.errors import UsageError
 
 JOINTS = (-461.827519, -455.741652, -448.908104, 465.952312, 465.044723, 488.923462)
 
@@ -45,10 +46,21 @@ async def test_direction_and_offset_are_those_of_the_cell_file() -> None:
     assert sample.positions == pytest.approx(JOINTS, abs=5e-4)
 
 
+async def test_joints_that_include_zeros_are_told_less_the_present_ones() -> None:
+    zeros = [600.0, 601.0, 602.0, 603.0, 604.0, 605.0]
+    bank = ControllerScales(settings(), Controller(), lambda: zeros)
+    told = (await bank.read()).positions
+    assert told == pytest.approx(
+        [joint - zero for joint, zero in zip(JOINTS, zeros, strict=True)], abs=5e-7
+    )
+    zeros[2] += 0.125
+    assert (await bank.read()).positions[2] == pytest.approx(told[2] - 0.125, abs=1e-6)
+
+
 async def test_joints_that_are_not_homed_are_no_positions() -> None:
     controller = Controller()
     controller.joints = None
-    with pytest.raises(DeviceError, match="are not homed"):
+    with pytest.raises(NotHomedError, match="are not homed"):
         await ControllerScales(settings(), controller).read()
 
 

@@ -139,3 +139,31 @@ async def test_joints_that_include_the_zeros_agree_before_and_after_the_geometry
     plain = changed(cell.settings, {"controller.joints_include_zeros": False})
     with pytest.raises(GuardTripped, match="where its pose has it at"):
         await preflight(replace(cell, settings=plain), Mode.OPTIMISE, unattended=True)
+
+
+@pytest.mark.parametrize("includes_zeros", [False, True])
+async def test_encoders_that_the_controller_reads_need_not_be_homed_before_a_run(
+    make_site, includes_zeros
+) -> None:
+    controller = {"controller.joints_include_zeros": includes_zeros}
+    site = make_site(**{"encoders.protocol": "controller"} | controller)
+    cell = site.order().cell
+    await preflight(cell, Mode.OPTIMISE, unattended=True)
+    assert not site.simulated.controller.state.homed
+    assert (await site.calibrate()).exit_code == ExitCode.DONE
+    await preflight(cell, Mode.OPTIMISE, unattended=True)
+
+
+async def test_zeros_that_the_controller_does_not_run_are_not_calibrated_with(make_site) -> None:
+    """No report contradicts another before they are written; then the held-out records do."""
+    zeros = {"controller.joints_include_zeros": True}
+    site = make_site(**{"encoders.protocol": "controller"} | zeros)
+    cell = await homed(site)
+    text = cell.config_path.read_text()
+    assert text.count("[0.0, -155.0, 0.0],  # leg 1") == 1
+    cell.config_path.write_text(
+        text.replace("[0.0, -155.0, 0.0],  # leg 1", "[0.5, -155.0, 0.0],  # leg 1")
+    )
+    edited = site.config
+    assert (await site.calibrate()).exit_code == ExitCode.OUT_OF_LIMITS
+    assert site.config == edited

@@ -268,6 +268,15 @@ def test_real_cell_needs_a_way_to_every_device(load_text, cell_text, line_with):
     assert len(found) == 5
 
 
+def test_encoders_that_the_controller_reads_need_no_bus(load_text, cell_text):
+    text = cell_text[: cell_text.index("[simulation]")].replace('"cia406"', '"controller"')
+    with pytest.raises(SeveralErrors) as refused:
+        load_text(text)
+    problems = [error.problem for error in _file_errors(refused.value)]
+    assert len(problems) == 4
+    assert not any("bus" in problem for problem in problems)
+
+
 def test_several_mistakes_come_together_in_the_order_of_the_file(load_changed, cell_path):
     with pytest.raises(SeveralErrors) as refused:
         load_changed(

@@ -75,16 +75,6 @@ def test_a_length_check_is_of_encoders_of_lengths(tmp_path: Path) -> None:
         load_cell(changed(tmp_path, "[simulation]", section))
 
 
-def test_joints_that_include_zeros_are_no_encoders(tmp_path: Path) -> None:
-    text = changed(tmp_path, "[controller]", "[controller]\njoints_include_zeros = true")
-    load_cell(text)
-    text.write_text(text.read_text().replace("[encoders]", '[encoders]\nprotocol = "controller"', 1))
-    text.write_text(text.read_text().replace('protocol = "cia406"', "", 1))
-    with pytest.raises(FileError, match="are no readings of encoders") as refused:
-        load_cell(text)
-    assert refused.value.line is not None
-
-
 def test_sections_in_mm_stay_as_they_are() -> None:
     assert in_joint_unit(NoiseSettings, JointUnit.MM) is NoiseSettings
     in_deg = in_joint_unit(SpeedSettings, JointUnit.DEG)()

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers.errors import GaugeSilent, GaugeUnsteady
+from drivers.errors import GaugeSilent, GaugeUnsteady, NotHomedError
 from hexacell.campaign import feasibility
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, ReachError, SeveralErrors
 from procedures.calibration.preflight import device_failures, plan_failures, raise_all
@@ -112,6 +112,11 @@ async def test_a_gauge_away_from_the_ball_is_no_failure(bench) -> None:
     assert await device_failures(bench.devices) == []
     bench.encoders.failure = DeviceError("no round", subject="encoders")
     assert [error.subject for error in await device_failures(bench.devices)] == ["encoders"]
+
+
+async def test_joints_that_are_not_homed_are_no_failure_of_the_encoders(bench) -> None:
+    bench.encoders.failure = NotHomedError("are not homed", subject="encoders")
+    assert await device_failures(bench.devices) == []
 
 
 def test_without_failures_nothing_is_raised() -> None:

@@ -84,7 +84,7 @@ class Cell:
 def config_paths(settings: CellSettings, folder: Path) -> tuple[Path, ...]:
     """All files of the controller's config, the first one first; ``folder`` has the cell file."""
     controller = settings.controller
-    return tuple(folder / one.config for one in (controller, *controller.further_files))
+    return (folder / controller.config, *(folder / one.config for one in controller.further_files))
 
 
 def load_cell(path: Path) -> Cell:

@@ -50,6 +50,7 @@ class Real:
 
 @pytest.fixture(scope="module", params=[*CELLS, HAL_AND_INI])
 def real(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Real:
+    paths: tuple[Path, ...]
     if request.param == HAL_AND_INI:
         layout, paths = LAYOUT, write_config(tmp_path_factory.mktemp("drawn"))
     else:

@@ -6,8 +6,8 @@ It is kept in counts of the size that the cell file states. A comparison of enco
 nothing then: both are one reading, and a scale that slips moves both.
 
 Where the joints that it tells include the zeros of its geometry, an encoder shows what is told less the
-zero in its config. That the controller runs these zeros is not seen before they are written: then the joints
-change by other amounts than the config does, and the robot is not where it was.
+zero in its config. That the controller runs these zeros is not seen before others are written: then the
+joints change by other amounts than the config does, and the records do not agree.
 """
 
 from __future__ import annotations

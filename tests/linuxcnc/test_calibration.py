@@ -95,6 +95,19 @@ def test_a_stock_hexapod_is_calibrated_through_a_crash_of_linuxcnc(hexapod: Linu
 
 
 @pytest.mark.slow
+def test_a_stock_hexapod_is_calibrated_whose_encoders_only_linuxcnc_reads(hexapod: LinuxCNC) -> None:
+    cell = hexapod.folder / "cell.toml"
+    text = cell.read_text()
+    for old, new in (('"cia406"', '"controller"'), ("measuring_step_nm = 1000", "measuring_step_nm = 1")):
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    cell.write_text(text)
+    before = written(hexapod)
+    require_passed(hexapod, hexapod.hexacell(*RUN))
+    assert written(hexapod) != before
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [kill, freeze_server, freeze_task, press_emergency_stop, fault_joint])
 def test_a_run_stops_at_a_fault_and_ends_the_same_once_resumed(machine: LinuxCNC, fault: Fault) -> None:
     shorten(machine)

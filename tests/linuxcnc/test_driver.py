@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 
 import pytest
 
@@ -72,8 +73,24 @@ async def test_what_changes_coordinates_is_refused_before_a_move(linuxcnc, drive
     await driver.prepare(ALL)
     with linuxcnc.connect() as client:
         assert "ACK" in client.ask(f"set mdi {block}")
-    with pytest.raises(DeviceError, match=r"offset|relative"):
-        await driver.prepare(ALL)
+    for look in (driver.check, partial(driver.prepare, ALL)):
+        with pytest.raises(DeviceError, match=r"offset|relative"):
+            await look()
+    with pytest.raises(MoveRefused, match="its last preparation failed"):
+        await driver.move(THERE, MOVE_S)
+
+
+async def test_an_offset_that_outlives_linuxcnc_is_found_before_it_is_homed(linuxcnc, driver) -> None:
+    await driver.prepare(ALL)
+    with linuxcnc.connect() as client:
+        assert "ACK" in client.ask("set mdi G10 L2 P1 Y5")
+    linuxcnc.shut_down()
+    linuxcnc.start()
+    for look in (driver.check, partial(driver.prepare, ALL)):
+        with pytest.raises(DeviceError, match="adds an offset of"):
+            await look()
+    with linuxcnc.connect() as client:
+        assert client.ask("get joint_homed").split()[1:] == ["NO"] * 6
 
 
 async def test_a_pose_beyond_a_limit_of_the_ini_is_refused_with_its_axis(driver) -> None:

@@ -84,8 +84,10 @@ async def test_an_offset_that_outlives_linuxcnc_is_found_before_it_is_homed(linu
     await driver.prepare(ALL)
     with linuxcnc.connect() as client:
         assert "ACK" in client.ask("set mdi G10 L2 P1 Y5")
+    await driver.close()
     linuxcnc.shut_down()
     linuxcnc.start()
+    await driver.open()
     for look in (driver.check, partial(driver.prepare, ALL)):
         with pytest.raises(DeviceError, match="adds an offset of"):
             await look()

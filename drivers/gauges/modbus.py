@@ -1,4 +1,4 @@
-"""Gauges and linear encoders with Modbus RTU in place of a dial indicator: a number in registers.
+"""Gauges with Modbus RTU in place of a dial indicator: a number in registers.
 
 The section ``modbus`` of the gauge says where it is and what a count of it is. Frames have a CRC-16; a late
 answer cannot be told from that to the next request, so the line is silent for a while after a time-out.
@@ -9,17 +9,16 @@ from __future__ import annotations
 import struct
 
 from drivers.errors import WrongAnswer
-from drivers.gauges.modbus_port import HOLDING, INPUT, REQUEST, ModbusPort
 from drivers.gauges.plausibility import decimals_of
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
 from drivers.gauges.value_only import ValueOnlyGauge
+from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort
 from drivers.serial.request_port import PortFactory
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, FileError
 
 FORMATS = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
-FUNCTIONS = {"holding": HOLDING, "input": INPUT}
 WORD = 2
 
 
@@ -54,7 +53,7 @@ class ModbusGauge(ValueOnlyGauge):
 
     def _garbled(self, received: bytes) -> DeviceError:
         return WrongAnswer(
-            f"answers {received!r}, no frame with a right checksum",
+            f"answers {received!r}, no single frame with a right checksum",
             subject=self.subject,
             action="Check its cable, and its baud rate and parity against serial in the cell file",
         )

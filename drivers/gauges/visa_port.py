@@ -15,7 +15,8 @@ from typing import Any
 from drivers.errors import PortLost
 from drivers.extras import optional
 from drivers.serial.errors import lost_port
-from drivers.serial.port import FRAME_LIMIT, SLICE_S, NoAnswer
+from drivers.serial.opening import SLICE_S
+from drivers.serial.port import FRAME_LIMIT, NoAnswer
 from drivers.serial.request_port import LibraryPort
 from drivers.wire_trace import TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError

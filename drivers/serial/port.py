@@ -6,7 +6,6 @@ opening of a network port, which pyserial limits to five seconds.
 
 from __future__ import annotations
 
-import errno
 import termios
 import threading
 import time
@@ -18,26 +17,21 @@ from math import inf
 import serial
 
 from drivers.errors import PortLost
-from drivers.serial.errors import lost_port, opening_errors
+from drivers.serial.errors import lost_port
 from drivers.serial.frame_log import FrameLog
 from drivers.serial.framing import LINE_ENDS, cut_frame, is_copies
+from drivers.serial.opening import opened_port
 from drivers.serial.parity import have_terminal_check, in_software
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError
 
-SLICE_S = 0.05
-WRITE_SLICE_S = 0.2
 WORST_LATENCY_S = 2.0
 FRAME_GAP_S = 0.1
 FRAME_LIMIT = 256
 CHUNK_LIMIT = 4096
 SILENCE_ATTEMPTS = 5  # a line may take this many times the required silence to become silent
-OPEN_TRIES = 5
 CAREFUL_EXCHANGES = 20  # after bytes that nobody asked for, so many wait whether a frame was the only one
 EXCHANGE_TRIES = 3
-WITHOUT_WRITE_TIMEOUT = (
-    "rfc2217://"  # pyserial has none there, and refuses to open with one (its issue 412)
-)
 
 
 class NoAnswer(Exception):
@@ -104,7 +98,8 @@ class SerialPort:
         if self._port is not None and not self._is_alive(self._port):
             self.close()
         if self._port is None:
-            self._port = self._opened()
+            self._port = opened_port(self.url, self._settings, self.subject, self._closing)
+            have_terminal_check(self._port, self._settings)
             self.open_count += 1
             self._silence_s, self._surplus, self._last_frame, self._careful = 0.0, b"", b"", 0
             self._empty_at = -inf
@@ -170,36 +165,6 @@ class SerialPort:
         except (OSError, termios.error):
             return False
         return True
-
-    def _opened(self) -> serial.Serial:
-        attempts = 0
-        with opening_errors(self.subject, self.url):
-            port = self._configured()
-            while not port.is_open:
-                attempts += 1
-                self._try_to_open(port, last=attempts == OPEN_TRIES)
-            have_terminal_check(port, self._settings)
-        return port
-
-    def _try_to_open(self, port: serial.Serial, *, last: bool) -> None:
-        try:
-            port.open()
-        except termios.error as error:
-            if last or not _refuses_parity(error):
-                raise
-            self._closing.wait(SLICE_S)
-            self.require_not_closed()
-
-    def _configured(self) -> serial.Serial:
-        lines = {name: value for name, value in self._settings.items() if name in {"dtr", "rts"}}
-        settings = {name: value for name, value in self._settings.items() if name not in lines}
-        port = serial.serial_for_url(self.url, do_not_open=True, **settings)  # type: ignore[arg-type]
-        port.timeout = SLICE_S  # set once and before opening: a pseudo-terminal refuses later changes
-        if not self.url.lower().startswith(WITHOUT_WRITE_TIMEOUT):
-            port.write_timeout = WRITE_SLICE_S
-        for name, level in lines.items():
-            setattr(port, name, level)
-        return port
 
     def _resynchronise(self, port: serial.Serial) -> None:
         """Read unsolicited bytes until the line has been silent as long as required."""
@@ -297,15 +262,6 @@ class SerialPort:
             subject=self.subject,
             action="Switch its continuous output off, or correct port and protocol in the cell file",
         )
-
-
-def _refuses_parity(error: termios.error) -> bool:
-    """Whether a pseudo-terminal refused parity, as it does until its server has reset its speed.
-
-    glibc's ``tcsetattr`` succeeds if it changed anything at all, so the first open passes and the
-    next one, with nothing left to change, fails (pyserial issue 196).
-    """
-    return bool(error.args[:1] == (errno.EINVAL,))
 
 
 def close_port(port: serial.Serial) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
+from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.robot import SimulatedMachine
@@ -25,7 +26,7 @@ class CellFaults:
     def __init__(
         self,
         gauges: SimulatedGaugeBank,
-        encoders: SimulatedEncoderBank | SimulatedDbcBank,
+        encoders: SimulatedEncoderBank | SimulatedDbcBank | SimulatedModbusBank,
         controller: SimulatedController,
         machine: SimulatedMachine,
         stop_file: Path,

@@ -8,6 +8,7 @@ from typing import Any
 
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
+from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.serial_line import PtyLine
@@ -38,15 +39,19 @@ class SimulatedSensors(Closeable):
             self.gauges = served.enter_context(_gauge_bank(settings, simulation, physics, clock))
             self.encoders = _encoder_bank(settings, simulation, physics, clock)
             served.enter_context(self.encoders)
-            self._bus: dict[str, Any] = self.encoders.bus_settings
-            if other_processes:
+            self._address: dict[str, Any] = {}
+            if isinstance(self.encoders, SimulatedModbusBank):
+                self._address = {"modbus": self.encoders.described}
+            elif other_processes:
                 adapter = served.enter_context(SlcanServer(self.encoders.channel, PtyLine("slcan")))
-                self._bus = adapter.bus_settings
+                self._address = {"bus": adapter.bus_settings}
+            else:
+                self._address = {"bus": self.encoders.bus_settings}
             self._served = served.pop_all()
 
     def addressed(self, settings: CellSettings) -> CellSettings:
         """The settings with the address of every sensor; nothing of them is simulated any more."""
-        encoders = settings.encoders.model_copy(update={"bus": self._bus})
+        encoders = settings.encoders.model_copy(update=self._address)
         return settings.model_copy(
             update={"gauges": self.gauges.gauges, "encoders": encoders, "simulation": None}
         )
@@ -65,15 +70,18 @@ def _gauge_bank(
 
 def _encoder_bank(
     settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
-) -> SimulatedEncoderBank | SimulatedDbcBank:
-    if settings.encoders.dbc is not None:
-        return SimulatedDbcBank(
-            settings.encoders, settings.encoders.dbc, lambda: physics.encoder_positions().tolist()
-        )
-    latency = simulation.encoders.latency_s
-    return SimulatedEncoderBank(
-        settings.encoders, lambda: physics.encoder_positions().tolist(), clock, latency_s=latency
-    )
+) -> SimulatedEncoderBank | SimulatedDbcBank | SimulatedModbusBank:
+    encoders, latency_s = settings.encoders, simulation.encoders.latency_s
+
+    def positions() -> list[float]:
+        found: list[float] = physics.encoder_positions().tolist()
+        return found
+
+    if encoders.modbus is not None:
+        return SimulatedModbusBank(encoders, encoders.modbus, positions, clock, latency_s)
+    if encoders.dbc is not None:
+        return SimulatedDbcBank(encoders, encoders.dbc, positions)
+    return SimulatedEncoderBank(encoders, positions, clock, latency_s=latency_s)
 
 
 def _plunger_position(physics: RobotPhysics, gauge: GaugeSettings) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -130,6 +130,55 @@ class ModbusSettings(Section):
     at_end: tuple[int, ...] = Field(
         (), max_length=8, description="numbers that mean an end of the travel, or no value"
     )
+
+
+ModbusAddress = Annotated[int, Field(ge=1, le=247)]
+Register = Annotated[int, Field(ge=0, le=65535)]
+SixDevices = tuple[ModbusAddress, ModbusAddress, ModbusAddress, ModbusAddress, ModbusAddress, ModbusAddress]
+SixRegisters = tuple[Register, Register, Register, Register, Register, Register]
+
+
+class LatchSettings(Section):
+    """What is written to all devices at once for each of them to keep its position of that instant."""
+
+    register_: Register = Field(alias="register", description="the register, counted from 0")
+    value: int = Field(1, ge=0, le=65535, description="what is written to it")
+    delay_s: NotNegative = Field(0.005, description="how long they take, before they are asked")
+
+
+class ModbusEncoderSettings(Section):
+    """Where the positions of encoders of protocol ``modbus`` are; they are counts."""
+
+    port: Text | None = Field(None, description="device path or pyserial URL of the line with all of them")
+    serial: dict[str, Any] = Field(
+        default_factory=dict, description="passed to pyserial; by default 19200 baud and even parity"
+    )
+    devices: SixDevices = Field(
+        (1, 1, 1, 1, 1, 1), description="addresses of the devices with legs 1 to 6; one may have several"
+    )
+    registers: SixRegisters = Field(
+        description="first register of the position of legs 1 to 6, counted from 0"
+    )
+    kind: Literal["input", "holding"] = Field("input", description="function 4 or 3")
+    bits: Literal[16, 32] = Field(32, description="of a position, in one or two registers")
+    word_order: Literal["big", "little"] = Field("big", description="which of two registers comes first")
+    latch: LatchSettings | None = Field(
+        None, description="samples several devices at one instant, where they can be told to"
+    )
+    invalid: tuple[int, ...] = Field((), max_length=8, description="counts that mean no valid position")
+
+    @property
+    def places(self) -> tuple[tuple[int, int], ...]:
+        """Device and first register of legs 1 to 6."""
+        return tuple(zip(self.devices, self.registers, strict=True))
+
+    @model_validator(mode="after")
+    def _places_differ(self) -> Self:
+        words = self.bits // 16
+        taken = [(device, first + word) for device, first in self.places for word in range(words)]
+        if len(set(taken)) < len(taken):
+            raise broken_rule("two encoders share a register", "Give each leg registers of its own")
+        return self
 
 
 MessageSignal = Annotated[str, Field(max_length=200, pattern=r"^\w+\.\w+$")]

@@ -11,6 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from hexacell.cell.certificates import CertificateSettings
 from hexacell.cell.described_devices import (
     DbcSettings,
+    ModbusEncoderSettings,
     ModbusSettings,
     RequestSettings,
     StreamSettings,
@@ -147,7 +148,9 @@ OF_CONTROLLER = "controller"
 class EncoderSettings(Section, ABC):
     """The bank of six joint encoders, but for what a count is."""
 
-    protocol: Text = Field("cia406", description="cia406, controller, dbc, or one that a plug-in adds")
+    protocol: Text = Field(
+        "cia406", description="cia406, controller, dbc, modbus, or one that a plug-in adds"
+    )
     bus: dict[str, Any] | None = Field(None, description="passed to python-can's Bus")
     nodes: tuple[NodeId, NodeId, NodeId, NodeId, NodeId, NodeId] = Field(
         (1, 2, 3, 4, 5, 6), description="CANopen node ids of legs 1 to 6, each from 1 to 127"
@@ -175,6 +178,7 @@ class EncoderSettings(Section, ABC):
         description="a joint that goes faster between two samples jumped; by default from [speed]",
     )
     dbc: DbcSettings | None = Field(None, description="of protocol dbc: what they send")
+    modbus: ModbusEncoderSettings | None = Field(None, description="of protocol modbus: where they are")
     certificate: CertificateSettings | None = Field(None, description="of the calibration of all six")
 
     @field_validator("nodes")
@@ -188,6 +192,13 @@ class EncoderSettings(Section, ABC):
     def are_of_controller(self) -> bool:
         """Whether the controller reads them: their driver is given that of the controller."""
         return self.protocol == OF_CONTROLLER
+
+    @property
+    def address(self) -> object:
+        """What says where they are; none if nothing does."""
+        if self.are_of_controller:
+            return self.protocol
+        return self.bus if self.modbus is None else self.modbus.port
 
     @property
     @abstractmethod

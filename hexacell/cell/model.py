@@ -212,10 +212,9 @@ class CellSettings(Section):
         """Each missing connection is refused at its own place, which gives the error its line."""
         if self.simulation is not None:
             return self
-        has_bus = not self.encoders.are_of_controller
         connections: list[tuple[tuple[str | int, ...], str, object]] = [
             *((("gauges", n), "the gauge has no port", gauge.port) for n, gauge in enumerate(self.gauges)),
-            *([(("encoders",), "the encoders have no bus", self.encoders.bus)] if has_bus else []),
+            (("encoders",), "the encoders have no bus", self.encoders.address),
             (("controller",), "the controller has no port", self.controller.port),
         ]
         refusals = [

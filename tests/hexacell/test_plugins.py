@@ -57,7 +57,7 @@ def test_every_kind_that_hexacell_itself_announces() -> None:
     assert own == {
         Group.GAUGES: GAUGES,
         Group.SIMULATED_GAUGES: (),
-        Group.ENCODERS: ("cia406", "controller", "dbc"),
+        Group.ENCODERS: ("cia406", "controller", "dbc", "modbus"),
         Group.CONTROLLERS: ("linuxcncrsh",),
         Group.THERMOMETERS: ("sysfs",),
         Group.CONFIG_FORMATS: ("linuxcnc-hal", "linuxcnc-ini", "template", "toml"),

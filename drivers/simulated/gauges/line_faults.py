@@ -14,7 +14,8 @@ LATE_TIMEOUTS = 1.5
 LATE_EVERY = 4
 DAMAGED_EVERY = 5
 NULS = b"\0\0"
-VALUE = re.compile(rb"\d\.\d")
+VALUE = re.compile(rb"\d\.\d|[\x03\x04]")
+"""Of an answer with a value: a number, or a function of Modbus that reads registers."""
 
 
 class LineFault(StrEnum):

@@ -8,22 +8,10 @@ from typing import ClassVar
 
 from drivers.simulated.gauges.indicator import MM_PER_INCH, Indicator
 from drivers.simulated.gauges.instruments import Instrument
+from drivers.simulated.modbus_frames import answer, refusal, split_requests
 from hexacell.cell.described_devices import ModbusSettings
 
-REQUEST_BYTES = 8
-ILLEGAL_ADDRESS = 2
-POLYNOMIAL = 0xA001
 PACKED = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
-
-
-def crc(data: bytes) -> bytes:
-    """CRC-16 of the Modbus over Serial Line specification, 2.5.1.2: low byte first."""
-    register = 0xFFFF
-    for byte in data:
-        register ^= byte
-        for _ in range(8):
-            register = register >> 1 ^ POLYNOMIAL if register & 1 else register >> 1
-    return struct.pack("<H", register)
 
 
 class Modbus(Instrument):
@@ -39,15 +27,7 @@ class Modbus(Instrument):
 
     def split(self, received: bytes) -> tuple[list[bytes], bytes]:
         """Whole requests with a right checksum; bytes that begin none are dropped."""
-        requests = []
-        while len(received) >= REQUEST_BYTES:
-            head = received[:REQUEST_BYTES]
-            if crc(head[:-2]) == head[-2:]:
-                requests.append(head)
-                received = received[REQUEST_BYTES:]
-            else:
-                received = received[1:]
-        return requests, received
+        return split_requests(received)
 
     def answer(self, command: bytes) -> bytes:
         """The registers, or an exception; nothing if no device has that address."""
@@ -56,13 +36,10 @@ class Modbus(Instrument):
         if device not in {known >> 16 for known in self.indicators}:
             return b""
         if place not in self.indicators:
-            body = bytes((device, function | 0x80, ILLEGAL_ADDRESS))
-            return body + crc(body)
+            return refusal(device, function)
         if not self.indicators[place].powered:
             return b""
-        data = self._value(place)
-        body = bytes((device, function, len(data))) + data
-        return body + crc(body)
+        return answer(device, function, self._value(place))
 
     def _value(self, channel: int) -> bytes:
         shown, settings = self.indicators[channel].shown(), self._settings

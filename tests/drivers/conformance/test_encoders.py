@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,17 +13,21 @@ from drivers.conformance import EncoderConformance, EncoderTwin, served_encoder_
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.dbc import DbcBank
+from drivers.encoders.modbus import ModbusBank
 from drivers.encoders.of_controller import ControllerScales
 from drivers.interfaces import DeviceIdentity, EncoderBank, EncoderSample, StartupAction
 from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
+from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.cell.simulation import FaultKind
+from hexacell.clock import CellClock
 from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
 
 TIMEOUT_S = 1.0
+QUICKER = 100.0
 
 
 class Cia406(EncoderConformance):
@@ -141,6 +145,48 @@ class TestByDbcFile(EncoderConformance):
     def twin(self) -> Iterator[EncoderTwin]:
         with TemporaryDirectory() as folder, closing(DbcTwin(Path(folder))) as twin:
             yield twin
+
+
+class ModbusTwin:
+    """Six encoders with Modbus RTU."""
+
+    def __init__(self, modbus: dict[str, object]) -> None:
+        stated = LinearEncoderSettings.model_validate(
+            {"protocol": "modbus", "timeout_s": TIMEOUT_S, "modbus": modbus}
+        )
+        assert stated.modbus is not None
+        self._joints: tuple[float, ...] = (0.0,) * 6
+        self.bank = SimulatedModbusBank(stated, stated.modbus, lambda: self._joints, CellClock(QUICKER))
+        self.settings = stated.model_copy(update={"modbus": self.bank.described})
+
+    def stand_at(self, joints: Sequence[float]) -> None:
+        self._joints = tuple(joints)
+
+    def inject(self, fault: FaultKind, *, on: bool) -> None:
+        self.bank.faults(3)[fault](on=on)
+
+    def close(self) -> None:
+        self.bank.close()
+
+
+class TestModbusOfOneDevice(EncoderConformance):
+    modbus: Mapping[str, object] = {"registers": (0, 2, 4, 6, 8, 10)}
+
+    def driver(self, twin: EncoderTwin) -> EncoderBank:
+        return ModbusBank(twin.settings)
+
+    @contextmanager
+    def twin(self) -> Iterator[EncoderTwin]:
+        with closing(ModbusTwin(dict(self.modbus))) as twin:
+            yield twin
+
+
+class TestModbusOfSixDevicesThatLatch(TestModbusOfOneDevice):
+    modbus: Mapping[str, object] = {
+        "registers": (0,) * 6,
+        "devices": (1, 2, 3, 4, 5, 6),
+        "latch": {"register": 9, "delay_s": 0.0},
+    }
 
 
 def test_samples_of_two_instants_are_found() -> None:

@@ -95,4 +95,4 @@ class TestVisa(OfProtocol):
 class TestModbus(OfProtocol):
     protocol, factory = "modbus", ModbusGauge
     # a pseudo-terminal refuses the parity of a port that is opened again
-    more = {"modbus": {"device": 3, "register": 100}, "serial": {"parity": "N"}}  # noqa: RUF012
+    more = {"modbus": {"device": 3, "register": 100}}  # noqa: RUF012

@@ -19,7 +19,7 @@ from drivers.gauges.modbus import ModbusGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_instrument
 from drivers.simulated.gauges.indicator import Indicator
-from drivers.simulated.gauges.modbus import crc
+from drivers.simulated.modbus_frames import crc
 from drivers.wire_trace import WireTrace
 from hexacell.cell.described_devices import ModbusSettings
 from hexacell.cell.devices import GaugeSettings
@@ -138,7 +138,7 @@ async def test_a_number_that_means_an_end_is_told():
         await cell.gauges[0].close()
 
 
-@pytest.mark.parametrize("fault", ["damaged", "cut short", "repeated"])
+@pytest.mark.parametrize("fault", ["damaged", "cut short", "repeated", "NUL bytes"])
 async def test_faults_of_the_line_change_no_value(fault):
     with bench() as cell:
         await cell.gauges[0].open()
@@ -187,7 +187,7 @@ async def test_a_line_that_is_not_there_is_told():
         port="/dev/nowhere",
         modbus=ModbusSettings.model_validate({"register": 0}),
     )
-    with pytest.raises(PortLost, match="gauge x: port /dev/nowhere cannot be opened"):
+    with pytest.raises(PortLost, match="gauge x: port /dev/nowhere is absent"):
         await ModbusGauge(settings, SharedSerialPorts()).open()
 
 

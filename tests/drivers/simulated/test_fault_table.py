@@ -19,10 +19,12 @@ import pytest
 from drivers.encoders import alarm_poll
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.dbc import DbcBank
+from drivers.encoders.modbus import ModbusBank
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
+from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
-from hexacell.cell.described_devices import DbcSettings
+from hexacell.cell.described_devices import DbcSettings, ModbusEncoderSettings
 from hexacell.cell.devices import LinearEncoderSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.clock import CellClock
@@ -41,6 +43,24 @@ READINGS = 5
 ENCODER_READINGS = 50
 AT_ONCE = 4
 DBC_FAULTS: tuple[FaultKind, ...] = ("silent", "alarm", "frozen", "jumped")
+MODBUS_FAULTS: tuple[FaultKind, ...] = (
+    "unplugged",
+    "silent",
+    "alarm",
+    "frozen",
+    "jumped",
+    "reversed",
+    "zeroed",
+    "damaged",
+    "cut short",
+    "repeated",
+    "unasked",
+    "late",
+    "echoing",
+    "NUL bytes",
+)
+INVALID = 0x7FFFFFFF
+FAST = 100.0
 NOT_DUE = {("uwave", "late"), ("stream", "late")}
 """What comes unasked is due at no time: such a line pauses once, and what is told depends on when."""
 
@@ -163,6 +183,33 @@ async def dbc_row(fault: FaultKind, folder: Path) -> Row:
         simulated.close()
 
 
+async def modbus_row(fault: FaultKind) -> Row:
+    described = ModbusEncoderSettings(registers=(0, 2, 4, 6, 8, 10), invalid=(INVALID,))
+    settings = LinearEncoderSettings(
+        protocol="modbus", timeout_s=1.0, largest_speed_mm_s=SLOW_MM_S, modbus=described
+    )
+    at = [ENCODER_BEFORE_MM]
+    simulated = SimulatedModbusBank(settings, described, lambda: at * 6, CellClock(FAST))
+    bank = ModbusBank(settings.model_copy(update={"modbus": simulated.described}))
+    try:
+        await bank.open()
+        await bank.read()
+        simulated.faults(3)[fault](on=True)
+        at[0] = ENCODER_AFTER_MM
+        found: list[float] = []
+
+        async def read_often() -> None:
+            while len(found) < READINGS:
+                found.append((await bank.read()).positions[2])
+
+        error = await told(read_often)
+        is_right = bool(found) and abs(found[-1] - ENCODER_AFTER_MM) < RIGHT_MM
+        return row("encoders, modbus", fault, error, is_right=is_right)
+    finally:
+        await bank.close()
+        simulated.close()
+
+
 async def rows(folder: Path) -> list[Row]:
     gauges = _kinds(lambda: Cell(["sylvac"] * 3).rack, "x")
     encoders = list(SimulatedEncoderBank.faults(_a_bank(), 1))
@@ -170,7 +217,8 @@ async def rows(folder: Path) -> list[Row]:
     pairs = [(protocol, fault) for fault in gauges for protocol in devices]
     found = await _a_few_at_once([gauge_row(*pair) for pair in pairs if pair not in NOT_DUE])
     found += [await encoder_row(fault) for fault in encoders]
-    return found + [await dbc_row(fault, folder) for fault in DBC_FAULTS]
+    found += [await dbc_row(fault, folder) for fault in DBC_FAULTS]
+    return found + await _a_few_at_once([modbus_row(fault) for fault in MODBUS_FAULTS])
 
 
 async def _a_few_at_once(rows: list[Coroutine[Any, Any, Row]]) -> list[Row]:

@@ -268,13 +268,21 @@ def test_real_cell_needs_a_way_to_every_device(load_text, cell_text, line_with):
     assert len(found) == 5
 
 
-def test_encoders_that_the_controller_reads_need_no_bus(load_text, cell_text):
-    text = cell_text[: cell_text.index("[simulation]")].replace('"cia406"', '"controller"')
+@pytest.mark.parametrize(
+    ("encoders", "is_enough"),
+    [
+        ('protocol = "controller"', True),
+        ('protocol = "modbus"\nmodbus = {{ port = "/dev/a", registers = {registers} }}', True),
+        ('protocol = "modbus"\nmodbus = {{ registers = {registers} }}', False),
+    ],
+)
+def test_encoders_without_a_bus_say_otherwise_where_they_are(load_text, cell_text, encoders, is_enough):
+    text = cell_text[: cell_text.index("[simulation]")]
+    stated = encoders.format(registers=list(range(0, 12, 2)))
     with pytest.raises(SeveralErrors) as refused:
-        load_text(text)
+        load_text(text.replace('protocol = "cia406"', stated))
     problems = [error.problem for error in _file_errors(refused.value)]
-    assert len(problems) == 4
-    assert not any("bus" in problem for problem in problems)
+    assert any("the encoders have no bus" in problem for problem in problems) is not is_enough
 
 
 def test_several_mistakes_come_together_in_the_order_of_the_file(load_changed, cell_path):

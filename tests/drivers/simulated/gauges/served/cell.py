@@ -65,7 +65,7 @@ def described(protocol, number):
     if protocol == "modbus":
         place = {"register": 2 * number, "at_end": [0x7FFFFFFF]}
         # a pseudo-terminal refuses the parity of a port that is opened again
-        return {"modbus": place, "serial": {"parity": "N"}}
+        return {"modbus": place}
     if protocol == "request":
         return {"request": REQUEST}
     if protocol == "stream":

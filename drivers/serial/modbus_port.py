@@ -14,10 +14,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from drivers.errors import PortLost
 from drivers.extras import optional
 from drivers.serial.errors import lost_port
-from drivers.serial.port import SLICE_S, NoAnswer
+from drivers.serial.framing import is_copies
+from drivers.serial.opening import opened_port
+from drivers.serial.port import NoAnswer
 from drivers.serial.request_port import LibraryPort
 from drivers.wire_trace import TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError
@@ -25,6 +26,15 @@ from hexacell.errors import DeviceError
 EXTRA = "modbus"
 REQUEST = struct.Struct(">BBHH")
 HOLDING, INPUT = 3, 4
+FUNCTIONS = {"holding": HOLDING, "input": INPUT}
+"""By the kind of a register in the cell file."""
+
+BROADCAST = 0
+NUL = b"\0"
+"""Real lines send some before a frame, and no device has this address."""
+FRAME_BYTES, REGISTER_BYTES = 5, 2
+"""Of an answer: device, function, length and checksum; and what each register adds."""
+
 EXCEPTIONS = {
     1: "illegal function",
     2: "illegal data address",
@@ -32,11 +42,14 @@ EXCEPTIONS = {
     4: "device failure",
     6: "device busy",
 }
-OPEN_TRIES = 20
 LINE_KEYS = ("baudrate", "bytesize", "parity", "stopbits")
 
 # Failures are raised as errors; without a handler pymodbus would also print them.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
+
+
+class RefusedRequest(DeviceError):
+    """A device answers that it cannot do what it is asked."""
 
 
 class ModbusPort(LibraryPort):
@@ -54,14 +67,15 @@ class ModbusPort(LibraryPort):
         self._line: dict[str, Any] = {name: settings[name] for name in LINE_KEYS if name in settings}
         self._client: Any = None
         self._modbus: Any = None
-        self._received = b""
+        self._received = self._frame = b""
 
     def open(self) -> int:
         """Open the line unless it is open; how often it has been opened.
 
         Raises:
             UsageError: pymodbus is not installed.
-            PortLost: the line cannot be opened.
+            PortLost: the line is absent, in use, or cannot be opened.
+            FileError: pyserial does not accept the URL or a setting.
         """
         self.require_not_closed()
         if self._client is None:
@@ -69,32 +83,21 @@ class ModbusPort(LibraryPort):
             client = optional("pymodbus.client", EXTRA, self.subject).ModbusSerialClient(
                 self.url, retries=0, trace_packet=self._note, **self._line
             )
-            if not self._connects(client):
-                raise PortLost(
-                    f"port {self.url} cannot be opened",
-                    subject=self.subject,
-                    action="Plug it in, close other programs that use it, or correct port in the cell file",
-                )
+            # Not by its own connect(), which tells no cause and configures a pseudo-terminal twice.
+            client.socket = opened_port(
+                self.url, self._line, self.subject, self._closing, client.inter_byte_timeout or None
+            )
             self._client = client
             self.open_count += 1
             self._must_clear = False
         return self.open_count
 
-    def _connects(self, client: Any) -> bool:  # noqa: ANN401 - of a library that may be missing
-        """Whether it opens; a pseudo-terminal refuses parity until its server has reset its speed."""
-        for _ in range(OPEN_TRIES):
-            if client.connect():
-                return True
-            self._closing.wait(SLICE_S)
-            self.require_not_closed()
-        return False
-
     def exchange(self, request: bytes, _terminator: bytes, timeout_s: float) -> bytes:
         """Read registers; see the head of this file.
 
         Raises:
-            NoAnswer: none came in time, or a damaged one.
-            DeviceError: the device answers with an exception.
+            NoAnswer: none came in time, a damaged one, or more than one.
+            RefusedRequest: the device answers with an exception.
             PortLost: the line is not open, or was lost.
         """
         self.require_not_closed()
@@ -105,14 +108,28 @@ class ModbusPort(LibraryPort):
         client.comm_params.timeout_connect = timeout_s
         read = client.read_holding_registers if function == HOLDING else client.read_input_registers
         with self._port_errors():
-            if self._must_clear:
-                self._clear()
+            self._drop_surplus()
             answer = read(address, count=count, device_id=device)
         if answer.isError():
             raise self._refused(device, answer.exception_code)
-        if len(answer.registers) != count:
+        frame_bytes = FRAME_BYTES + REGISTER_BYTES * count
+        if len(answer.registers) != count or not self._is_alone(frame_bytes):
+            self._must_clear = True  # one of several frames, of which nobody knows which is the answer
             raise NoAnswer(self._received)
         return struct.pack(f">{count}H", *answer.registers)
+
+    def write_to_all(self, register: int, value: int) -> None:
+        """Write a register of all devices at once, which none of them answers.
+
+        Raises:
+            PortLost: the line is not open, or was lost.
+        """
+        self.require_not_closed()
+        if self._client is None:
+            raise lost_port(self.subject, self.url, "it is not open")
+        with self._port_errors():
+            self._drop_surplus()
+            self._client.write_register(register, value, device_id=BROADCAST, no_response_expected=True)
 
     def close(self) -> None:
         """Close the line; closing twice is harmless."""
@@ -120,6 +137,21 @@ class ModbusPort(LibraryPort):
         if client is not None:
             with suppress(OSError, termios.error):
                 client.close()
+
+    def _is_alone(self, frame_bytes: int) -> bool:
+        """Whether what came is one frame, or copies of it, as some adapters send."""
+        frames = self._received.lstrip(NUL)
+        self._frame = frames[:frame_bytes]
+        return is_copies(frames, self._frame)
+
+    def _drop_surplus(self) -> None:
+        """What came after an answer makes that doubtful, unless it is a copy of it."""
+        port = self._client.socket
+        if port is not None and port.in_waiting and not is_copies(port.read(port.in_waiting), self._frame):
+            self.surplus_count += 1
+            self._must_clear = True
+        if self._must_clear:
+            self._clear()
 
     def _clear(self) -> None:
         """Let late answers come and go: they look like those to the next request."""
@@ -134,7 +166,7 @@ class ModbusPort(LibraryPort):
         if not sending:
             self._received = data
         self._record(TrafficDirection.SENT if sending else TrafficDirection.RECEIVED, new)
-        return data
+        return data if sending else data.lstrip(NUL)
 
     @contextmanager
     def _port_errors(self) -> Iterator[None]:
@@ -148,8 +180,8 @@ class ModbusPort(LibraryPort):
             raise lost_port(self.subject, self.url, str(error)) from error
 
     def _refused(self, device: int, code: int) -> DeviceError:
-        return DeviceError(
+        return RefusedRequest(
             f"device {device} answers exception {code} ({EXCEPTIONS.get(code, 'of its maker')})",
             subject=self.subject,
-            action="Correct device, kind and register in [gauges.modbus]",
+            action="Correct device, kind and register of modbus in the cell file",
         )

@@ -1,0 +1,248 @@
+"""Encoders with Modbus RTU on a pseudo-terminal: requests, one instant, faults of devices and line."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from drivers.encoders import modbus as driver_module
+from drivers.encoders.modbus import ModbusBank
+from drivers.encoders.modbus_registers import RegisterSpan, counts_in, register_spans
+from drivers.errors import BusError, InvalidSampleError, SilentNodeError, WrongSetting
+from drivers.interfaces import DeviceIdentity
+from drivers.serial.modbus_port import RefusedRequest
+from hexacell.cell.described_devices import ModbusEncoderSettings
+from hexacell.cell.devices import LinearEncoderSettings
+from hexacell.errors import HexacellError, UsageError
+from tests.drivers.encoders.modbus.conftest import TWO_DEVICES, modbus_settings
+
+LATCH = {"register": 9, "value": 1, "delay_s": 0.0}
+ALL = tuple(10.0 * leg for leg in range(1, 7))
+SAMPLES = 10
+
+
+async def read_often(bank: ModbusBank) -> None:
+    for _ in range(SAMPLES):
+        await bank.read()
+
+
+async def test_six_positions_of_one_device_come_in_one_answer(simulated):
+    cell = simulated()
+    identities = await cell.driver.open()
+    assert identities[2] == DeviceIdentity("encoder of leg 3", "modbus", "device 1, register 104")
+    sample = await cell.driver.read()
+    assert sample.positions == pytest.approx(ALL)
+    assert sample.counts == tuple(10_000 * leg for leg in range(1, 7))
+    assert cell.requests == [bytes.fromhex("01 04 00 64 00 0c")] * 2
+
+
+async def test_several_devices_are_told_to_keep_their_positions_of_one_instant(simulated):
+    cell = simulated(latch=LATCH, **TWO_DEVICES)
+    await cell.driver.open()
+    cell.positions = [-2.5] * 6
+    assert (await cell.driver.read()).positions == pytest.approx((-2.5,) * 6)
+    latch, one, other = (
+        bytes.fromhex(f"{text}") for text in ("00 06 00 09 00 01", "07 04 00 00 00 06", "08 04 00 00 00 06")
+    )
+    assert cell.requests == [latch, one, other] * 2
+
+
+async def test_without_that_they_are_asked_there_and_back(simulated):
+    """Each answer is a step later; the mean of both is where all were in the middle."""
+    cell = simulated(**TWO_DEVICES)
+    await cell.driver.open()
+    passed = iter(range(4))
+    cell.bank._positions = lambda: [5.0 + 0.01 * next(passed)] * 6
+    sample = await cell.driver.read()
+    assert sample.positions == pytest.approx((5.015,) * 6)
+    assert [request[0] for request in cell.requests[-4:]] == [7, 8, 8, 7]
+
+
+async def test_a_device_that_refuses_registers_between_is_asked_leg_by_leg(simulated):
+    cell = simulated(has_gaps=False, registers=(0, 10, 20, 30, 40, 50))
+    await cell.driver.open()
+    assert (await cell.driver.read()).positions == pytest.approx(ALL)
+    assert cell.requests[0] == bytes.fromhex("01 04 00 00 00 34")
+    assert cell.requests[-1] == bytes.fromhex("01 04 00 00 00 02")
+
+
+@pytest.mark.parametrize(
+    "keys", [{"word_order": "little"}, {"kind": "holding"}, {"bits": 16, "registers": (0, 1, 2, 3, 4, 5)}]
+)
+async def test_counts_are_what_the_cell_file_says(simulated, keys):
+    cell = simulated(**keys)
+    cell.positions = [-1.5, 2.0, -0.001, 0.0, 20.0, -20.0]
+    await cell.driver.open()
+    assert (await cell.driver.read()).positions == pytest.approx(cell.positions)
+
+
+async def test_direction_and_offset_are_those_of_the_cell_file(simulated):
+    cell = simulated({"direction": (1, -1, 1, 1, 1, 1), "offset": (100.0, 0.0, 0.0, 0.0, 0.0, 0.0)})
+    await cell.driver.open()
+    sample = await cell.driver.read()
+    assert sample.positions == pytest.approx(ALL)
+    assert sample.counts[:2] == (-90_000, -20_000)
+
+
+@pytest.mark.parametrize("fault", ["damaged", "cut short", "repeated", "NUL bytes"])
+async def test_faults_of_the_line_change_no_position(simulated, monkeypatch, fault):
+    cell = simulated()
+    await cell.driver.open()
+    monkeypatch.setattr(cell.driver._session._port, "_worst_latency_s", 0.1)
+    cell.bank.faults(1)[fault](on=True)
+    for step in range(SAMPLES):
+        cell.positions = [0.25 * step] * 6
+        assert (await cell.driver.read()).positions == pytest.approx((0.25 * step,) * 6)
+
+
+async def test_a_frame_from_before_is_never_taken_for_the_answer(simulated, monkeypatch):
+    cell = simulated()
+    await cell.driver.open()
+    await cell.driver.read()
+    monkeypatch.setattr(cell.driver._session._port, "_worst_latency_s", 0.1)
+    cell.bank.faults(1)["unasked"](on=True)
+    cell.positions = [5.0] * 6
+    assert (await cell.driver.read()).positions == pytest.approx((5.0,) * 6)  # it was asked again
+    cell.positions = [6.0] * 6
+    assert (await cell.driver.read()).positions == pytest.approx((6.0,) * 6)
+    cell.positions = [5.0] * 6
+    cell.bank.faults(1)["unasked"](on=False)
+    assert (await cell.driver.read()).positions == pytest.approx((5.0,) * 6)
+
+
+async def test_a_late_answer_is_not_that_of_the_next_request(simulated, monkeypatch):
+    cell = simulated(timeout_s=0.1)
+    await cell.driver.open()
+    monkeypatch.setattr(cell.driver._session._port, "_worst_latency_s", 0.3)
+    cell.bank.faults(1)["late"](on=True)
+    with pytest.raises(SilentNodeError, match=r"does not answer within 0\.1 s"):
+        await read_often(cell.driver)
+    cell.bank.faults(1)["late"](on=False)
+    cell.positions = [1.75] * 6
+    assert (await cell.driver.read()).positions == pytest.approx((1.75,) * 6)
+
+
+@pytest.mark.parametrize(
+    ("fault", "error", "message"),
+    [
+        ("silent", SilentNodeError, r"encoders of legs 1, 2, 3 \(device 7\): does not answer within 0.5 s"),
+        ("alarm", InvalidSampleError, "encoder of leg 3: shows -1, which means no valid position"),
+        ("jumped", InvalidSampleError, "encoder of leg 3: jumped from 30.000 to 430.000 mm"),
+        ("unplugged", BusError, r"encoders: port .* was lost"),
+    ],
+)
+async def test_a_fault_names_the_leg_and_they_can_be_opened_again(simulated, fault, error, message):
+    cell = simulated({"largest_speed": 1.0}, invalid=(-1,), latch=LATCH, **TWO_DEVICES)
+    await cell.driver.open()
+    await cell.driver.read()
+    cell.bank.faults(3)[fault](on=True)
+    with pytest.raises(error, match=message):
+        await cell.driver.read()
+    cell.bank.faults(3)[fault](on=False)
+    await cell.driver.open()
+    assert (await cell.driver.read()).positions == pytest.approx(ALL)
+
+
+@pytest.mark.parametrize(
+    ("fault", "shown"), [("reversed", -30.0), ("zeroed", 0.0), ("frozen", 30.0), ("jumped", 430.0)]
+)
+async def test_what_an_encoder_shows_may_be_wrong(simulated, fault, shown):
+    cell = simulated()
+    cell.bank.faults(3)[fault](on=True)
+    await cell.driver.open()
+    assert (await cell.driver.read()).positions[2] == pytest.approx(shown)
+    cell.bank.faults(3)[fault](on=False)
+
+
+async def test_negative_counts_that_are_read_as_unsigned_are_told(simulated):
+    cell = simulated({"signed": False})
+    cell.positions = [-1.0] * 6
+    await cell.driver.open()
+    with pytest.raises(WrongSetting, match="encoder of leg 1: shows 4294966296 counts"):
+        await cell.driver.read()
+
+
+async def test_damage_without_end_is_told_as_such(simulated, monkeypatch):
+    monkeypatch.setattr(driver_module, "DAMAGED_TRIES", 1)
+    cell = simulated()
+    await cell.driver.open()
+    monkeypatch.setattr(cell.driver._session._port, "_worst_latency_s", 0.1)
+    cell.bank.faults(1)["cut short"](on=True)
+    with pytest.raises(SilentNodeError, match=r"answers b.*no single frame with a right checksum, 1 times"):
+        await read_often(cell.driver)
+
+
+async def test_a_register_that_is_not_there_is_told(simulated):
+    cell = simulated()
+    wrong = cell.settings.modbus.model_copy(update={"registers": (900, 902, 904, 906, 908, 910)})
+    bank = ModbusBank(cell.settings.model_copy(update={"modbus": wrong}))
+    message = r"encoder of leg 1 \(device 1\): device 1 answers exception 2 \(illegal data address\)"
+    with pytest.raises(RefusedRequest, match=message):
+        await bank.open()
+
+
+async def test_a_device_that_is_not_there_is_named(simulated):
+    cell = simulated()
+    wrong = cell.settings.modbus.model_copy(update={"devices": (1, 1, 1, 1, 1, 99)})
+    bank = ModbusBank(cell.settings.model_copy(update={"modbus": wrong}))
+    with pytest.raises(SilentNodeError, match=r"encoder of leg 6 \(device 99\): does not answer"):
+        await bank.open()
+
+
+async def test_what_the_cell_file_lacks_is_told():
+    with pytest.raises(BusError, match="encoders: have no port"):
+        await ModbusBank(modbus_settings()).open()
+    with pytest.raises(BusError, match="encoders: port /dev/nowhere is absent"):
+        await ModbusBank(modbus_settings(port="/dev/nowhere")).open()
+    with pytest.raises(UsageError, match="in which registers the encoders are"):
+        ModbusBank(LinearEncoderSettings(protocol="modbus"))
+
+
+async def test_without_the_extra_the_command_that_installs_it_is_told(simulated, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pymodbus", None)
+    with pytest.raises(HexacellError, match=r"Type: pip install 'hexacell\[modbus\]'"):
+        await simulated().driver.open()
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"registers": (0, 2, 4, 6, 8, 9)}, "two encoders share a register"),
+        ({"registers": (0, 2, 4, 6, 8, 70000)}, "less than or equal"),
+        ({"devices": (0, 1, 1, 1, 1, 1)}, "greater than or equal"),
+        ({"bits": 24}, "Input should be"),
+    ],
+)
+def test_places_that_cannot_be_are_refused(keys, message):
+    with pytest.raises(ValidationError, match=message):
+        modbus_settings(**keys)
+
+
+def test_requests_are_as_few_as_answers_allow():
+    described = ModbusEncoderSettings(registers=(0, 2, 4, 200, 202, 204), devices=(1, 1, 1, 1, 1, 2))
+    assert register_spans(described, joined=True) == (
+        RegisterSpan(1, 0, 6, (1, 2, 3)),
+        RegisterSpan(1, 200, 4, (4, 5)),
+        RegisterSpan(2, 204, 2, (6,)),
+    )
+    assert len(register_spans(described, joined=False)) == 6
+
+
+@given(st.integers(-(2**31), 2**31 - 1), st.sampled_from(["big", "little"]))
+def test_every_count_is_understood(count, order):
+    described = ModbusEncoderSettings(registers=(0, 2, 4, 6, 8, 10), word_order=order)
+    data = count.to_bytes(4, signed=True)
+    words = data if order == "big" else data[2:] + data[:2]
+    span = RegisterSpan(1, 0, 2, (1,))
+    assert counts_in(words, span, described, signed=True) == {1: count}
+    assert counts_in(words, span, described, signed=False) == {1: count % 2**32}
+
+
+def test_the_library_is_not_imported_with_the_driver():
+    code = "import sys, drivers.encoders.modbus; sys.exit('pymodbus' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 from drivers.discovery import visa
 from drivers.discovery.streams import a_number, uwave_channels
@@ -30,6 +30,9 @@ BAUD_RATES = (9600, 115200)
 DESCRIBE_QUESTION = 'Say what it is asked with protocol = "visa" (docs/drivers.md)'
 DESCRIBE = 'Describe its lines with protocol = "stream" (docs/drivers.md)'
 
+OTHER_BAUD_RATES = {"mux10": (19200, 4800, 2400, 38400, 57600, 115200)}
+"""Of instruments that come set to others than their protocol's usual one."""
+
 CHANNELS = range(1, 5)
 """Inputs of a multiplexer that are tried."""
 
@@ -44,6 +47,7 @@ class FoundGauge:
         channel: its input of a multiplexer; none if it has the port alone.
         shown: what it shows, as it sent it; empty if it cannot be used as it is.
         problem: why it cannot be used as it is, with what to do.
+        baudrate: of its line, where it is not that of its protocol.
     """
 
     protocol: str
@@ -52,30 +56,45 @@ class FoundGauge:
     channel: int | None = None
     shown: str = ""
     problem: str = ""
+    baudrate: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class PortFindings:
-    """What is on a port: its gauges, or why it could not be opened."""
+    """What is on a port: its gauges, or why it could not be opened.
+
+    ``heard`` is what was said of the last answer that no protocol understands, where none does.
+    """
 
     port: str
     gauges: tuple[FoundGauge, ...] = ()
     problem: str = ""
+    heard: str = ""
 
 
 async def search_port(port: str, factories: Mapping[str, GaugeFactory]) -> PortFindings:
     """Ask in every protocol, then listen; the first that is answered is the port's."""
     if visa.SEPARATOR in port:
         return await _identify(port)
-    for protocol in sorted(factories.keys() - {UWAVE}, key=lambda name: (name == HEIDENHAIN, name)):
-        factory = factories[protocol]
+    heard: list[str] = []
+    for protocol, baudrate in _tries(factories):
         try:
-            found = await _channels(protocol, factory, port)
+            found = await _channels(protocol, factories[protocol], port, baudrate, heard)
         except HexacellError as error:
             return PortFindings(port, problem=f"{error.problem}. {error.action}")
         if found:
             return PortFindings(port, tuple(found))
-    return await _listen(port, factories.get(UWAVE))
+    listened = await _listen(port, factories.get(UWAVE))
+    return replace(listened, heard=heard[-1]) if heard and not listened.gauges else listened
+
+
+def _tries(protocols: Collection[str]) -> Iterator[tuple[str, int | None]]:
+    """Protocols in the order in which they are tried, with a baud rate where it is not the usual one."""
+    asked = sorted(set(protocols) - {UWAVE}, key=lambda name: (name == HEIDENHAIN, name))
+    yield from ((protocol, None) for protocol in asked)
+    for protocol, rates in OTHER_BAUD_RATES.items():
+        if protocol in asked:
+            yield from ((protocol, rate) for rate in rates)
 
 
 async def _identify(resource: str) -> PortFindings:
@@ -98,15 +117,23 @@ async def _listen(port: str, uwave: GaugeFactory | None) -> PortFindings:
     return PortFindings(port)
 
 
-async def _channels(protocol: str, factory: GaugeFactory, port: str) -> list[FoundGauge]:
-    """The gauges that answer in one protocol; raises ``PortLost`` where the port cannot be used."""
+async def _channels(
+    protocol: str, factory: GaugeFactory, port: str, baudrate: int | None, heard: list[str]
+) -> list[FoundGauge]:
+    """The gauges that answer in one protocol; raises ``PortLost`` where the port cannot be used.
+
+    What is said of an answer that is none of the protocol is added to ``heard``.
+    """
     found = []
     for channel in CHANNELS:
         try:
-            gauge = await _ask(protocol, factory, port, channel)
+            gauge = await _ask(protocol, factory, port, channel, baudrate)
         except EmptyChannel:
             continue
-        except (GaugeSilent, WrongAnswer):
+        except GaugeSilent:
+            break
+        except WrongAnswer as error:
+            heard.append(error.problem)
             break
         found.append(gauge)
         if gauge.channel is None:
@@ -114,9 +141,18 @@ async def _channels(protocol: str, factory: GaugeFactory, port: str) -> list[Fou
     return found
 
 
-async def _ask(protocol: str, factory: GaugeFactory, port: str, channel: int) -> FoundGauge:
+async def _ask(
+    protocol: str, factory: GaugeFactory, port: str, channel: int, baudrate: int | None = None
+) -> FoundGauge:
+    serial = {} if baudrate is None else {"baudrate": baudrate}
     settings = GaugeSettings(
-        name="x", axis="x", protocol=protocol, port=port, channel=channel, timeout_s=TIMEOUT_S
+        name="x",
+        axis="x",
+        protocol=protocol,
+        port=port,
+        serial=serial,
+        channel=channel,
+        timeout_s=TIMEOUT_S,
     )
     ports = SharedSerialPorts(worst_latency_s=TIMEOUT_S)
     gauge = factory(settings, ports)
@@ -125,7 +161,8 @@ async def _ask(protocol: str, factory: GaugeFactory, port: str, channel: int) ->
         identity = await gauge.open()
         shown = (await gauge.read_once()).raw
     except (WrongSetting, GaugeAtEnd, ZeroVoid) as error:  # it answered
-        return FoundGauge(protocol, port, "", its_channel, problem=f"{error.problem}. {error.action}")
+        told = f"{error.problem}. {error.action}"
+        return FoundGauge(protocol, port, "", its_channel, "", told, baudrate)
     except (GaugeSilent, WrongAnswer, PortLost):
         raise
     except DeviceError as error:
@@ -133,4 +170,4 @@ async def _ask(protocol: str, factory: GaugeFactory, port: str, channel: int) ->
     finally:
         await gauge.close()
         await ports.close()
-    return FoundGauge(protocol, port, identity.description, its_channel, shown)
+    return FoundGauge(protocol, port, identity.description, its_channel, shown, "", baudrate)

@@ -57,11 +57,14 @@ class CellFaults:
         Raises:
             UsageError: there is no such device, or not with such a fault.
         """
-        if kind not in self._switches.get(device, {}):
-            raise UsageError(
-                f"no fault '{kind}' can be simulated of '{device}'",
-                action="Correct kind or device in [[simulation.faults]]",
-            )
+        if kind in self._switches.get(device, {}):
+            return
+        devices = [name for name, faults in self._switches.items() if name and kind in faults]
+        if devices:
+            action = f"Name one of {', '.join(devices)}"
+        else:
+            action = f"'{device}' has {', '.join(self._switches.get(device, self._switches['']))}"
+        raise UsageError(f"no fault '{kind}' can be simulated of '{device}'", action=action)
 
     def inject(self, kind: FaultKind, device: str = "") -> None:
         """Inject a fault now; raises ``UsageError``."""

@@ -56,9 +56,9 @@ def with_faults(cell: Cell, faults: Sequence[str]) -> Cell:
 
 
 def _fault(words: str) -> SimulatedFault:
-    what, _, move = words.partition("@")
+    what, at, move = words.partition("@")
     kind, _, device = what.partition(":")
-    stated = {"kind": kind.strip(), "device": device.strip(), **({"at_move": move} if move else {})}
+    stated = {"kind": kind.strip(), "device": device.strip(), **({"at_move": move} if at else {})}
     try:
         return SimulatedFault.model_validate(stated)
     except ValueError as error:

@@ -11,9 +11,10 @@ from drivers.discovery.controllers import FoundController, search_controller
 from drivers.discovery.encoders import BusFindings, search_bus, socketcan_interfaces, speaks_slcan
 from drivers.discovery.gauges import PortFindings, search_port
 from drivers.serial.adapters import SerialPortFound, serial_ports
+from hexacell.application.first_answers import DESCRIBED
 from hexacell.plugins import Group, load, names
 
-UNTRIED = frozenset({"request", "stream", "visa", "modbus", "keyence-dl-rs1a"})
+UNTRIED = DESCRIBED | {"keyence-dl-rs1a"}
 """Protocols that are not tried: the cell file describes them, or the question stops machines (``M0``)."""
 
 

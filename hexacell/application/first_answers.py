@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from hexacell.plugins import Group, names
 from hexacell.storage.toml_locations import KeyPath
 
 GAUGE_AXES = "xyz"
@@ -18,6 +19,9 @@ POINT_OFFSETS = (
 )
 HELD_OUT_OFFSETS = ((-0.5, -0.25, -0.5), (0.5, 0.5, 0.0), (0.0, -0.5, 0.25))
 """Of the ball, in units of its largest distance from the middle: as in Table 3 of the paper."""
+
+DESCRIBED = frozenset({"request", "stream", "visa", "modbus"})
+"""Protocols of gauges of which the cell file must say more than one answer does."""
 
 Document = dict[str, Any]
 Setting = Callable[[Document, str], None]
@@ -100,8 +104,9 @@ def _six(given: str) -> list[int]:
 
 
 def _protocol(given: str) -> str:
-    if given.strip() not in {"sylvac", "mux10", "cdi"}:
-        raise ValueError("it is one of sylvac, mux10, cdi")
+    known = [name for name in names(Group.GAUGES) if name not in DESCRIBED]
+    if given.strip() not in known:
+        raise ValueError(f"it is one of {', '.join(known)}")
     return given.strip()
 
 

@@ -69,6 +69,8 @@ class CellDraft:
 
     def problem(self, name: str, given: str) -> str:
         """Why an answer cannot be taken; empty if it can."""
+        if not given.isprintable():
+            return "it has characters that cannot be shown; type it again"
         [answer] = [one for one in self.answers() if one.name == name]
         try:
             document = TomlDocument.parse(self._text({**self.given, name: given}), self.path)
@@ -85,9 +87,11 @@ class CellDraft:
         """Write the file.
 
         Raises:
-            FileError: it cannot be written, or a pose is out of reach; then there is no file.
+            FileError: it is there, cannot be written, or a pose is out of reach; then there is no new file.
             SeveralErrors: more than one is.
         """
+        if self.path.exists():
+            raise FileError("is there by now", subject=self.path, action="Remove it, or name another")
         write_atomically(self.path, self._text(self.given).encode())
         try:
             cell = load_cell(self.path)

@@ -51,10 +51,11 @@ def unknown_encoders(found: SearchFindings) -> BusFindings | None:
 
 
 def gauge_keys(gauge: FoundGauge) -> Document:
-    """What a gauge told beside its address: its channel and the last digit of its display."""
+    """What a gauge told beside its address: its channel, its line and the last digit of its display."""
     decimals = len(gauge.shown.rstrip("<=>, M").partition(".")[2])
     channel = {} if gauge.channel is None else {"channel": gauge.channel}
-    return {**channel, **({"resolution_mm": round(10.0**-decimals, decimals)} if decimals else {})}
+    line = {} if gauge.baudrate is None else {"serial": {"baudrate": gauge.baudrate}}
+    return {**channel, **line, **({"resolution_mm": round(10.0**-decimals, decimals)} if decimals else {})}
 
 
 def encoder_keys(nodes: tuple[FoundNode, ...]) -> Document:

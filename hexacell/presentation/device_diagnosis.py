@@ -29,20 +29,25 @@ def diagnosis_lines(found: DeviceDiagnosis) -> Iterator[str]:
     for identity in found.identities:
         yield device_line(identity)
     rate = found.readings / found.seconds if found.seconds else 0.0
-    yield f"{found.readings} readings in {found.seconds:.1f} s, {rate:.1f} a second"
+    yield f"{_counted(found.readings, 'reading')} in {found.seconds:.1f} s, {rate:.1f} a second"
     for series in found.series:
         yield _series_line(series)
     if not found.failures:
         yield "No answer was damaged or missing."
     for failure in found.failures:
-        yield f"{failure.count} answers were {failure.kind}, at last: {failure.latest}"
+        was = "was" if failure.count == 1 else "were"
+        yield f"{_counted(failure.count, 'answer')} {was} {failure.kind}, at last: {failure.latest}"
     yield from _meaning(found)
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def _series_line(series: SeriesFigures) -> str:
     scatter = "" if series.scatter is None else f", scatter {_micro(series.scatter, series.unit)}"
     span = f"{series.lowest:.4f} to {series.highest:.4f} {series.unit}"
-    return f"{series.name}: {span}, {series.distinct} distinct values{scatter}"
+    return f"{series.name}: {span}, {_counted(series.distinct, 'distinct value')}{scatter}"
 
 
 def _meaning(found: DeviceDiagnosis) -> Iterator[str]:

@@ -79,12 +79,18 @@ def _port_lines(
         yield f"{name}{adapter}: {on_it.problem}"
     elif _is_can_adapter(on_it, buses):
         yield f"{name}{adapter}: a CAN adapter"
+    elif on_it.heard:
+        yield (
+            f"{name}{adapter}: what comes is in no protocol that is tried: {on_it.heard}. Its baud rate or "
+            "parity may be another: try them with serial and its protocol in a cell file (docs/drivers.md)"
+        )
     elif not on_it.gauges:
         yield f"{name}{adapter}: nothing answers; is the gauge on, and is its cable a duplex one?"
     for gauge in on_it.gauges:
         where = "" if gauge.channel is None else f", channel {gauge.channel}"
         what = f"{gauge.description}, shows {gauge.shown}" if gauge.shown else gauge.problem
-        yield f"{name}{adapter}{where}: {gauge.protocol}: {what}"
+        rate = "" if gauge.baudrate is None else f" at {gauge.baudrate} baud"
+        yield f"{name}{adapter}{where}: {gauge.protocol}{rate}: {what}"
 
 
 def _is_can_adapter(on_it: PortFindings, buses: tuple[BusFindings, ...]) -> bool:

@@ -15,6 +15,7 @@ import hashlib
 import os
 import secrets
 import stat
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -140,6 +141,19 @@ def require_replaceable(path: Path) -> None:
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
         raise os_error_to_file_error("cannot be written and is unchanged", path, error) from error
+
+
+def require_creatable(path: Path) -> None:
+    """Raise ``FileError`` if a new file at ``path`` is known to be refused."""
+    try:
+        folder = _resolved(path).parent
+        if not stat.S_ISDIR(folder.stat().st_mode):
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+        descriptor, name = tempfile.mkstemp(prefix=".hexacell-", suffix=".tmp", dir=folder)
+        os.close(descriptor)
+        os.unlink(name)  # noqa: PTH108 - the name as mkstemp gives it
+    except OSError as error:
+        raise os_error_to_file_error("no file can be made there", path, error) from error
 
 
 def sync_folder(folder: Path) -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 import re
+import socket
+import threading
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -113,6 +116,40 @@ def test_an_instrument_of_each_protocol_that_is_tried_is_found(typed_here) -> No
     found = [[one["protocol"] for one in port["gauges"]] for port in outcome.document["gauges"]]
     assert found == [[protocol] for protocol in protocols]
     assert "Not tried" not in outcome.err
+
+
+@pytest.mark.usefixtures("no_ports", "patient")
+def test_what_no_protocol_understands_is_told(typed_here) -> None:
+    """As of a gauge at another baud rate."""
+    with answering(lambda received: bytes(byte ^ 0x55 for byte in received) + b"\r") as port:
+        outcome = typed_here("devices", port, "--controller", NOBODY)
+    said = " ".join(outcome.out.split())
+    assert "what comes is in no protocol that is tried: answers b" in said
+    assert "Its baud rate or parity may be another" in said
+    assert "nothing answers; is the gauge on" not in said
+
+
+@contextmanager
+def answering(answer: Callable[[bytes], bytes]) -> Iterator[str]:
+    """A port that answers whatever comes."""
+    listener = socket.create_server(("127.0.0.1", 0))
+
+    def serve() -> None:
+        with suppress(OSError):
+            while True:
+                client, _ = listener.accept()
+                with client:
+                    while received := client.recv(1024):
+                        client.sendall(answer(received))
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    try:
+        yield f"socket://127.0.0.1:{listener.getsockname()[1]}"
+    finally:
+        listener.shutdown(socket.SHUT_RDWR)
+        listener.close()
+        thread.join()
 
 
 @pytest.fixture
@@ -276,6 +313,31 @@ def test_questions_want_a_terminal_and_a_new_file(typed_here, cell_folder, monke
     outcome = typed_here("devices", "--write", "new.toml")
     assert outcome.code == 4
     assert "asks what no device tells" in outcome.err
+
+
+@pytest.mark.parametrize("place", ["nowhere/new.toml", "file/new.toml"])
+def test_a_place_where_no_file_can_be_made_is_told_first(typed_here, tmp_path, place) -> None:
+    (tmp_path / "file").touch()
+    outcome = typed_here("devices", "--write", tmp_path / place)
+    assert outcome.code == 2
+    assert "no file can be made there" in outcome.err
+    assert outcome.out == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("--controller", "127.0.0.1:99999"), "--controller 127.0.0.1:99999 is no address"),
+        (("--controller", "127.0.0.1:0"), "--controller 127.0.0.1:0 is no address"),
+        (("--diagnose", "x", "--seconds", "-1"), "argument --seconds"),
+        (("--diagnose", "x", "--seconds", "nan"), "argument --seconds"),
+        (("--diagnose", "x", "--seconds", "inf"), "argument --seconds"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused(typed_here, arguments, told) -> None:
+    outcome = typed_here("devices", *arguments)
+    assert outcome.code == 2
+    assert told in outcome.err
 
 
 def test_a_cell_file_is_written_from_what_was_found_and_answers(

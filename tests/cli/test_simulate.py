@@ -163,13 +163,22 @@ def test_two_processes_cannot_move_one_robot(served, start, typed_here):
     [
         ("slow:x", "--fault slow:x is no fault that can be simulated. Write it like damaged:x@12"),
         ("damaged:x@soon", "--fault damaged:x@soon is no fault"),
-        ("damaged:w", "no fault 'damaged' can be simulated of 'w'"),
+        ("damaged:x@", "--fault damaged:x@ is no fault"),
+        ("damaged:w", "no fault 'damaged' can be simulated of 'w'. Name one of x, y, z"),
+        ("damaged", "no fault 'damaged' can be simulated of ''. Name one of x, y, z"),
     ],
 )
 def test_faults_that_cannot_be_simulated_are_refused(cell_folder, typed_here, fault, words):
     outcome = typed_here("simulate", cell_folder.cell, "--fault", fault)
     assert outcome.code == 2
     assert words in " ".join(outcome.err.split())
+
+
+def test_the_files_of_the_cell_itself_are_not_written_over(cell_folder, typed_here):
+    before = cell_folder.cell.read_bytes()
+    outcome = typed_here("simulate", cell_folder.cell, "--output", cell_folder.cell)
+    assert (outcome.code, cell_folder.cell.read_bytes()) == (2, before)
+    assert "is a file of the simulated cell. Name another file" in " ".join(outcome.err.split())
 
 
 def test_a_fault_named_on_the_command_line_is_there(cell_folder, start, typed_here):

@@ -12,7 +12,10 @@ import pytest
 from textual.pilot import Pilot
 from textual.widgets import Input
 
+from drivers.discovery.gauges import FoundGauge, PortFindings
+from hexacell.application.device_search import SearchFindings
 from hexacell.application.first_cell import CellDraft
+from hexacell.application.found_cell import draft_of
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.errors import FileError, HexacellError
@@ -89,6 +92,8 @@ async def test_leaving_it_writes_nothing(path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "given", "problem"),
     [
+        ("name", "\udcff", "it has characters that cannot be shown"),
+        ("name", "a\x1b[A", "it has characters that cannot be shown"),
         ("name", "", "must be text that is not empty"),
         ("tolerance", "x", "'x' is no number"),
         ("tolerance", "-1", "must be more than 0"),
@@ -96,7 +101,7 @@ async def test_leaving_it_writes_nothing(path: Path) -> None:
         ("port", "1.5", "'1.5' is no whole number"),
         ("sliders", "5", "2 numbers are expected: the smallest and the largest position"),
         ("sliders", "800 -800", "joint_m"),
-        ("protocol x", "foo", "it is one of sylvac, mux10, cdi"),
+        ("protocol x", "foo", "it is one of cdi, digimatic-usb, heidenhain-nd"),
         ("sign y", "perhaps", "answer yes or no"),
         ("nodes", "1 1 2 3 4 5", "two encoders have the same node id"),
         ("bus", "can0", "name the interface and the channel"),
@@ -106,6 +111,26 @@ async def test_leaving_it_writes_nothing(path: Path) -> None:
 )
 def test_a_wrong_answer_is_refused_with_its_reason(path: Path, name: str, given: str, problem: str) -> None:
     assert problem in CellDraft(path).problem(name, given)
+
+
+@pytest.mark.parametrize("protocol", ["mitutoyo-id-h", "uwave", "heidenhain-nd", "digimatic-usb"])
+def test_a_gauge_of_every_protocol_that_is_found_is_taken(path: Path, protocol: str) -> None:
+    found = FoundGauge(protocol, "/dev/ttyUSB7", "one", channel=3, shown="+1.2345", baudrate=19200)
+    findings = SearchFindings((), (PortFindings(found.port, (found,)),), (), None)
+    draft = draft_of(findings, path)
+    assert draft.problem("protocol x", draft.given["protocol x"]) == ""
+    draft.write()
+    gauge = load_cell(path).settings.gauges[0]
+    assert (gauge.protocol, gauge.port, gauge.channel) == (protocol, "/dev/ttyUSB7", 3)
+    assert (gauge.serial, gauge.resolution_mm) == ({"baudrate": 19200}, 0.0001)
+
+
+def test_a_file_that_came_meanwhile_is_not_written_over(path: Path) -> None:
+    draft = CellDraft(path)
+    path.write_text("of somebody else")
+    with pytest.raises(FileError, match="is there by now"):
+        draft.write()
+    assert path.read_text() == "of somebody else"
 
 
 def test_points_out_of_reach_leave_no_file(path: Path) -> None:

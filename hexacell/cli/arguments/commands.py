@@ -94,6 +94,17 @@ def positive(text: str) -> int:
     return number
 
 
+LONGEST_S = 86_400.0
+
+
+def duration(text: str) -> float:
+    """Seconds, more than none and no more than a day; raises ``ValueError``."""
+    seconds = float(text)
+    if not 0.0 < seconds <= LONGEST_S:
+        raise ValueError(text)
+    return seconds
+
+
 def node_id(text: str) -> int:
     """A CANopen node id, from 1 to 127; raises ``ValueError`` likewise."""
     number = int(text)

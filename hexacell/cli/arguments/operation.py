@@ -12,6 +12,7 @@ from hexacell.cli.arguments.commands import (
     add_file,
     add_json,
     add_parser,
+    duration,
     node_id,
     not_negative,
 )
@@ -66,7 +67,7 @@ def _devices(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument("--cell", type=Path, metavar="CELL", help="the cell file (TOML) of --diagnose")
     parser.add_argument(
         "--seconds",
-        type=float,
+        type=duration,
         default=10.0,
         metavar="S",
         help="how long --diagnose watches (default: %(default)s)",

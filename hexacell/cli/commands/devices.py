@@ -20,6 +20,9 @@ from hexacell.presentation.device_diagnosis import diagnosis_document, diagnosis
 from hexacell.presentation.found_devices import cell_lines, search_document, search_lines
 from hexacell.presentation.layout import wrapped
 from hexacell.screen.assistant import FirstCellAssistant
+from hexacell.storage.atomic_files import require_creatable
+
+TCP_PORTS = 1 << 16
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -73,6 +76,7 @@ def _search(options: argparse.Namespace, console: Console) -> ExitCode:
 def _require_new(path: Path) -> None:
     if path.exists():
         raise FileError("is there already", subject=path, action="Name a new file, or remove it")
+    require_creatable(path)
     if not is_interactive():
         raise AnswerNeeded("--write asks what no device tells", action="Start it at a terminal")
 
@@ -119,6 +123,6 @@ def _bus(words: str) -> dict[str, Any]:
 def _address(words: str) -> tuple[str, int]:
     """Host and port from ``HOST:PORT``."""
     host, _, port = words.rpartition(":")
-    if not host or not port.isdigit():
+    if not host or not port.isdecimal() or not 0 < int(port) < TCP_PORTS:
         raise UsageError(f"--controller {words} is no address", action="Write it like 127.0.0.1:5007")
     return host, int(port)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 from hexacell.application.demo import served_cell, with_faults
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
-from hexacell.errors import ExitCode
+from hexacell.errors import ExitCode, UsageError
 from hexacell.storage.atomic_files import write_atomically
 
 
@@ -19,6 +20,8 @@ def main(options: argparse.Namespace) -> ExitCode:
     """Serve until interrupted; stdout gets a cell file with the addresses of the served devices."""
     console = Console()
     cell = with_faults(cell_at(options.cell, console), options.fault)
+    if options.output is not None:
+        _require_other(options.output, (cell.path, *cell.config_paths))
     with _blocked_signals() as stops, served_cell(cell) as text:
         if options.output is None:
             print(text, flush=True)
@@ -27,6 +30,12 @@ def main(options: argparse.Namespace) -> ExitCode:
         print("serving; Ctrl-C ends it", file=sys.stderr, flush=True)
         signal.sigwait(stops)
     return ExitCode.DONE
+
+
+def _require_other(output: Path, own: Sequence[Path]) -> None:
+    """Refuse to write over the files of the simulated cell itself."""
+    if output.resolve() in {path.resolve() for path in own}:
+        raise UsageError(f"--output {output} is a file of the simulated cell", action="Name another file")
 
 
 @contextmanager

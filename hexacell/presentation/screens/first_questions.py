@@ -23,7 +23,7 @@ QUESTIONS = {
     ),
     "protocol": (
         "What does the {axis} gauge speak?",
-        "sylvac, mux10 (Mitutoyo's multiplexer) or cdi (CDI, Starrett).",
+        "sylvac, mux10 (Mitutoyo's multiplexer), cdi (CDI, Starrett), or one of docs/drivers.md.",
     ),
     "port of gauge": ("Where is the {axis} gauge connected?", "A device, such as /dev/ttyUSB0, or a URL."),
     "sign": (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from decimal import Decimal
 
 from drivers.gauges.protocol import DisplayedValue
@@ -14,6 +15,11 @@ AGREEMENT_MM = 0.05
 """Of readings in a row, where nothing is known of the gauge."""
 
 ROUNDING_MM = 1e-9
+
+ALIKE_DIGITS, ALIKE_SHARE = 2.5, 0.1
+"""Readings are alike within so many of their last digits, or this share of what may differ at all."""
+
+MIDDLE_OF = 3
 
 
 def decimals_of(resolution_mm: float) -> int:
@@ -38,9 +44,28 @@ class DisplayHistory:
         self._agreement_mm = AGREEMENT_MM if settings.agreement_mm is None else settings.agreement_mm
         self._range: tuple[float, float] | None = None
 
-    def agree(self, one: DisplayedValue, next_one: DisplayedValue) -> bool:
-        """Whether two readings in a row agree: within what the cell file says, or 0.05 mm."""
-        return abs(next_one.value - one.value) <= self._agreement_mm + ROUNDING_MM
+    def agreed(self, readings: Sequence[DisplayedValue]) -> DisplayedValue | None:
+        """What readings in a row agree on; none if the latest do not.
+
+        Two that differ by hardly more than the last digits are enough. Where they differ by more, one may
+        be damaged: a bit of the hundredths is 0.04 mm, and two such readings of five would outlast the
+        trimmed mean of a window. Then the middle one of three counts.
+        """
+        *_, last = readings
+        before = readings[-3:-1]
+        if not before or not self._differ_by_at_most(self._agreement_mm, before[-1], last):
+            return None
+        alike_mm = max(ALIKE_DIGITS * 10.0**-last.decimals, ALIKE_SHARE * self._agreement_mm)
+        if self._differ_by_at_most(alike_mm, before[-1], last):
+            return last
+        if len(before) < MIDDLE_OF - 1 or not self._differ_by_at_most(self._agreement_mm, *before, last):
+            return None
+        return sorted((*before, last), key=lambda one: one.value)[1]
+
+    @staticmethod
+    def _differ_by_at_most(limit_mm: float, *readings: DisplayedValue) -> bool:
+        values = [one.value for one in readings]
+        return max(values) - min(values) <= limit_mm + ROUNDING_MM
 
     @property
     def limit(self) -> str:

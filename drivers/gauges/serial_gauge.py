@@ -109,19 +109,22 @@ class SerialGauge(ABC):
         return DeviceIdentity(self.name, self.spec.protocol, description, port=adapter)
 
     async def read(self) -> GaugeReading:
-        """The displayed value, mm, as soon as two consecutive readings agree.
+        """The displayed value, mm, as soon as consecutive readings agree: two that hardly differ, or three.
 
         A reading does not count if bytes came after it that nobody asked for: it may have been such bytes.
         """
         self._opened_state()
         readings = [await self._read_value()]
+        in_step = readings[:]
         while len(readings) < MAX_READINGS:
             surplus = self._open_port().surplus_count
             readings.append(await self._read_value())
-            is_in_step = self._open_port().surplus_count == surplus
-            if is_in_step and self._history.agree(*readings[-2:]):
-                self._history.add(readings[-1])
-                return _reading(readings[-1])
+            if self._open_port().surplus_count != surplus:
+                in_step.clear()
+            in_step.append(readings[-1])
+            if (agreed := self._history.agreed(in_step)) is not None:
+                self._history.add(agreed)
+                return _reading(agreed)
         raise GaugeUnsteady(
             f"readings do not agree{self._history.limit}: {', '.join(one.text for one in readings)}",
             subject=self.subject,

@@ -97,7 +97,9 @@ class GaugeSettings(Section):
         None, description="the last digit of its display in mm; one with other decimals is set to inches"
     )
     agreement_mm: Positive | None = Field(
-        None, description="two readings in a row count if they differ by no more; by default from [noise]"
+        None,
+        description="two readings in a row count if they hardly differ, or three that differ by no more "
+        "than this; by default from [noise]",
     )
     middle_mm: InRange | None = Field(
         None,

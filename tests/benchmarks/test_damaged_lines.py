@@ -18,6 +18,7 @@ from random import Random
 import numpy as np
 import pytest
 
+from drivers.gauges import plausibility
 from drivers.interfaces import EncoderSample, Gauge, GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import simulated_instrument
@@ -242,3 +243,49 @@ async def test_no_damage_becomes_a_record(protocol: str, say, monkeypatch) -> No
     assert outcome.shown_by_another == 0
     assert outcome.wrong_records <= outcome.records / ONE_IN
     assert grown <= MEMORY_MIB
+
+
+class HundredthsDamage(Damage):
+    """Four hundredths more or less: the worst that two readings that may differ by 0.05 mm do not show."""
+
+    def of(self, answer: bytes) -> bytes:
+        self.answers += 1
+        if b"." not in answer or self.random.random() >= self.share:
+            return answer
+        place = answer.index(b".") + 2
+        changed = bytes((answer[place] ^ FOUR,))
+        if not changed.isdigit():
+            return answer
+        self.damaged += 1
+        return answer[:place] + changed + answer[place + 1 :]
+
+
+FOUR = 4
+USUAL_SHARE = plausibility.ALIKE_SHARE
+HUNDREDTHS_SHARE = 0.02
+
+
+async def wrong_of(alike_share: float, monkeypatch: pytest.MonkeyPatch) -> tuple[int, int]:
+    """Records that such damage made wrong, and all of them."""
+    monkeypatch.setattr(plausibility, "ALIKE_SHARE", alike_share)
+    monkeypatch.setattr("tests.benchmarks.test_damaged_lines.Damage", HundredthsDamage)
+    cell = Cell("mux10", monkeypatch, Random("hundredths"))
+    await cell.open()
+    cell.damage.share = HUNDREDTHS_SHARE
+    try:
+        while cell.damage.answers < FRAMES:
+            await cell.record()
+    finally:
+        await cell.devices.gauges[0].gauge.close()
+        await cell.ports.close()
+    return cell.outcome.wrong_records, cell.outcome.records
+
+
+async def test_the_same_bit_of_two_readings_of_five_is_no_record(say, monkeypatch) -> None:
+    """The cause of the only wrong record of a million: two such readings outlast the trimmed mean."""
+    two, of_two = await wrong_of(1.0, monkeypatch)
+    three, of_three = await wrong_of(USUAL_SHARE, monkeypatch)
+    say("hundredths damaged, any two readings that agree: records; wrong", f"{of_two}; {two}", "")
+    say("  the middle one of three", f"{of_three}; {three}", "a tenth")
+    assert two > 0
+    assert three * of_two <= 0.1 * two * of_three

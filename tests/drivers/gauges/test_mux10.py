@@ -292,6 +292,21 @@ async def test_the_cell_file_says_which_readings_agree(dialogue, links, settings
     await gauge.close()
 
 
+@pytest.mark.parametrize("damaged", [0, 1, 2])
+async def test_damage_below_the_agreement_is_outvoted_by_a_third_reading(
+    dialogue, links, settings, damaged
+):
+    """One bit of the hundredths: 0.04 mm, where two readings may differ by 0.05 mm."""
+    gauge = Mux10Gauge(settings("mux10", channel=2, agreement_mm=0.05), links)
+    values = [b"02A+0004.102\r", b"02A+0004.102\r", b"02A+0004.102\r"]
+    values[damaged] = b"02A+0004.142\r"
+    needed = values[:2] if damaged == 2 else values
+    dialogue.expect(*OPENING, *((b"2\r", value) for value in needed))
+    await gauge.open()
+    assert (await gauge.read()).value_mm == 4.102
+    await gauge.close()
+
+
 async def test_another_protocol_is_quoted_beside_what_was_expected(dialogue, gauge):
     dialogue.expect(*[(b"2\r", b"ERR1\r")] * 3)
     with pytest.raises(WrongAnswer, match=r"b'ERR1\\r' where protocol mux10 has answers like '01A"):

@@ -97,7 +97,7 @@ def positive(text: str) -> int:
 LONGEST_S = 86_400.0
 
 
-def duration(text: str) -> float:
+def bounded_seconds(text: str) -> float:
     """Seconds, more than none and no more than a day; raises ``ValueError``."""
     seconds = float(text)
     if not 0.0 < seconds <= LONGEST_S:

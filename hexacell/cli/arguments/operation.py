@@ -12,7 +12,7 @@ from hexacell.cli.arguments.commands import (
     add_file,
     add_json,
     add_parser,
-    duration,
+    bounded_seconds,
     node_id,
     not_negative,
 )
@@ -67,7 +67,7 @@ def _devices(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument("--cell", type=Path, metavar="CELL", help="the cell file (TOML) of --diagnose")
     parser.add_argument(
         "--seconds",
-        type=duration,
+        type=bounded_seconds,
         default=10.0,
         metavar="S",
         help="how long --diagnose watches (default: %(default)s)",

@@ -100,13 +100,15 @@ def _amplitudes(uniform: Array, scale: Array, amplitudes: Amplitudes) -> Array:
 def rows_apart(rotations: Array, ranking: NDArray[np.intp], most: int, apart: float) -> NDArray[np.intp]:
     """The first of some ranked orientations (n, 3, 3), none of them within ``apart``, rad, of another."""
     flat = rotations[ranking].reshape(-1, 9)
-    traces = flat @ flat.T
-    is_near, is_left = traces >= 1.0 + 2.0 * np.cos(apart), np.ones(len(flat), dtype=bool)
+    is_near = flat @ flat.T >= 1.0 + 2.0 * np.cos(apart)
+    is_left_out = np.zeros(len(flat), dtype=bool)
     kept: list[int] = []
-    while len(kept) < most and is_left.any():
-        kept.append(int(np.argmax(is_left)))
-        is_left &= ~is_near[kept[-1]]
-        is_left[kept[-1]] = False  # with ``apart`` 0 rounding decides whether it is near itself
+    for row in range(len(flat)):
+        if not is_left_out[row]:
+            kept.append(row)
+            if len(kept) == most:
+                break
+            is_left_out |= is_near[row]
     return ranking[kept]
 
 

@@ -58,13 +58,15 @@ def changed(section: Any, changes: dict[str, Any]) -> Any:
 
 
 def choose_among_few(patch: pytest.MonkeyPatch) -> None:
-    """Choose among few poses, and move there in few pieces: what is chosen is not under test.
-
-    Nor is how near to the best it is: its bound is one of a rough search.
-    """
+    """Choose among few poses, and move there in few pieces: what is chosen is not under test."""
     patch.setattr(workflow, "CANDIDATES", 64)
     patch.setattr(measuring, "HELD_OUT_CANDIDATES", 128)
     patch.setattr(robot, "LINE_STEPS", 8)
+    bound_roughly(patch)
+
+
+def bound_roughly(patch: pytest.MonkeyPatch) -> None:
+    """Search the best design roughly: how near to it the poses are is not under test, nor is its certificate."""
     patch.setattr(pose_bound, "SPREAD", 64)
     patch.setattr(pose_bound, "CLIMBING", 4)
     patch.setattr(pose_bound, "MOST_CLIMBS", 2)

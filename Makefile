@@ -10,6 +10,8 @@ ARGS =
 # Tests of devices mostly wait, so that four processes keep two cores busy. In the order of the folders
 # the long files come early; by default files with few tests, which are the long ones, would come last.
 FOUR_AT_A_TIME = -n 4 --dist loadfile --no-loadscope-reorder
+# Not even imported, by each of the four.
+ELSEWHERE = --ignore=tests/benchmarks --ignore=tests/linuxcnc
 RUN = .venv/bin/python -m
 
 # Packages of other software on these paths would take precedence over the pinned ones.
@@ -27,10 +29,10 @@ demo: venv
 	.venv/bin/hexacell demo $(ARGS)
 
 test: venv
-	$(RUN) pytest $(FOUR_AT_A_TIME) -m "not slow and not benchmark and not linuxcnc" $(ARGS)
+	$(RUN) pytest $(FOUR_AT_A_TIME) $(ELSEWHERE) -m "not slow and not benchmark and not linuxcnc" $(ARGS)
 
 test-full: venv
-	$(RUN) pytest $(FOUR_AT_A_TIME) -m "not benchmark and not linuxcnc" $(ARGS)
+	$(RUN) pytest $(FOUR_AT_A_TIME) $(ELSEWHERE) -m "not benchmark and not linuxcnc" $(ARGS)
 
 bench:
 	@.ci/venv "$(PYTHON)" bench

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import fnmatch
 import json
 import os
 import re
@@ -46,7 +47,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if BENCHMARKS in item.path.parents:
             item.add_marker(pytest.mark.benchmark)
+        if _repeats(item):
+            item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: item.path.parent != TESTS)
+
+
+def _repeats(item: pytest.Item) -> bool:
+    """Whether other parameters of the same test are the sample that ``make test`` takes."""
+    sample = item.get_closest_marker("sample")
+    if sample is None or not isinstance(item, pytest.Function):
+        return False
+    return not any(fnmatch.fnmatchcase(item.callspec.id, pattern) for pattern in sample.args)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -66,7 +66,7 @@ def choose_among_few(patch: pytest.MonkeyPatch) -> None:
 
 
 def bound_roughly(patch: pytest.MonkeyPatch) -> None:
-    """Search the best design roughly: how near to it the poses are is not under test, nor is its certificate."""
+    """Search the best design roughly: how near to it the poses are is not under test."""
     patch.setattr(pose_bound, "SPREAD", 64)
     patch.setattr(pose_bound, "CLIMBING", 4)
     patch.setattr(pose_bound, "MOST_CLIMBS", 2)

@@ -124,6 +124,7 @@ def check_demo(venv: Path, folder: Path, records: int) -> None:
     assert json.loads(result.read_text())["converged"] is True
 
 
+@pytest.mark.slow
 def test_the_installed_demo_passes_with_a_small_cell(elsewhere: Path, tmp_path: Path) -> None:
     cell = site_packages(elsewhere) / "hexacell" / "_configs" / CELL
     as_it_comes = text = cell.read_text()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import fcntl
-import json
 import os
 import pty
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -21,6 +19,16 @@ from procedures.run import events
 from tests.cli.cell_folder import QUICK, SHORT, CellFolder, copy_cell
 from tests.cli.commands import Outcome, Start, run_command, started_in
 from tests.cli.terminal import Terminal
+from tests.made_once import made_once
+from tests.small_cell import bound_roughly
+
+
+@pytest.fixture(scope="module", autouse=True)
+def rough_bound() -> Iterator[None]:
+    """For commands within this process."""
+    with pytest.MonkeyPatch.context() as patch:
+        bound_roughly(patch)
+        yield
 
 
 @pytest.fixture
@@ -128,20 +136,12 @@ class Demo:
 
 @pytest.fixture(scope="session")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Demo:
-    """``hexacell demo --json``, once for all tests; do not change what is in its folder.
+    """``hexacell demo --json``, once for all tests; do not change what is in its folder."""
 
-    Of several processes that run tests the first one that needs it makes it, and the others wait.
-    """
-    together = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        together = together.parent
-    folder, kept = together / "demo", together / "demo.json"
-    with (together / "demo.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not kept.exists():
-            folder.mkdir()
-            kept.write_text(json.dumps(asdict(run_command(folder, "demo", "--json"))))
-    return Demo(Outcome(**json.loads(kept.read_text())), folder / "hexacell-demo")
+    def ran_in(folder: Path) -> Demo:
+        return Demo(run_command(folder, "demo", "--json"), folder / "hexacell-demo")
+
+    return made_once(tmp_path_factory, "demo", ran_in)
 
 
 @pytest.fixture

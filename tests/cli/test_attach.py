@@ -71,6 +71,7 @@ def test_left_and_come_back_to(cell, start, terminals) -> None:
     assert not any(isinstance(event, events.Paused) for event in history(cell))
 
 
+@pytest.mark.slow
 def test_a_second_terminal_watches_and_takes_over(cell, start, terminals) -> None:
     first, second, third = terminals
     beginning = start_at(first, start, "run", cell.cell, "--detachable")

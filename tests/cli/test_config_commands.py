@@ -105,6 +105,7 @@ def test_an_edit_is_refused_politely(cell, typed_here) -> None:
     assert refused.err.splitlines()[-1].endswith("undo the edit and repeat, or calibrate again")
 
 
+@pytest.mark.sample("linuxcnc-ini")
 def test_unattended_what_needs_a_person_is_refused(cell, typed) -> None:
     run = propose_run(cell, gates=(MET, GRAVE))
     refused = typed("apply", run.folder.path)
@@ -112,6 +113,7 @@ def test_unattended_what_needs_a_person_is_refused(cell, typed) -> None:
     assert "Beyond: S1x." in refused.err
 
 
+@pytest.mark.sample("toml")
 def test_what_is_grave_needs_the_cells_name(cell, start, terminal) -> None:
     run = propose_run(cell, gates=(MET, GRAVE))
     process = start("apply", run.folder.path, stdin=terminal.slave, stderr=terminal.slave)

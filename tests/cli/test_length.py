@@ -24,6 +24,7 @@ def calibrated(typed_here, quick_cell, few_candidates):
     return quick_cell, outcome
 
 
+@pytest.mark.slow
 def test_a_run_and_the_command_find_the_same_scale_and_the_command_changes_nothing(
     typed_here, typed, calibrated
 ) -> None:

@@ -92,6 +92,7 @@ def _is_told_again(process: Process, before: int) -> bool:
     return process.out.count(TOLD) > before
 
 
+@pytest.mark.slow
 def test_what_is_no_letter_tells_all_of_them(quick_cell, start, terminal) -> None:
     quick_cell.edit(BY_HAND)
     process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")

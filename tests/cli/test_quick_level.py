@@ -43,6 +43,7 @@ def plan_shown(cell: Path, mode: Mode, monkeypatch: pytest.MonkeyPatch) -> str:
     return " ".join(shown.getvalue().split())
 
 
+@pytest.mark.slow
 def test_from_a_calibration_on(typed_here, cell_folder, monkeypatch) -> None:
     """What is told before, at the end, in the history, in the report, and to programs."""
     assert typed_here("run", cell_folder.cell, "--unattended", "--mode", "optimise").code == 0

@@ -21,6 +21,7 @@ def run(typed_here, quick_cell, few_candidates):
     return folder
 
 
+@pytest.mark.slow
 def test_a_run_is_the_same_again_and_nothing_is_touched(typed_here, quick_cell, run):
     before = quick_cell.snapshot()
     outcome = typed_here("replay", run, "--json")

@@ -133,7 +133,11 @@ class TestAPersonAtTheTerminal:
         return process, question, fast_cell
 
     @pytest.mark.parametrize(
-        ("typed", "code"), [("no\n", 1), ("simulated-hexaglide\n", 0)], ids=["no", "the cell's name"]
+        ("typed", "code"),
+        [
+            pytest.param("no\n", 1, id="no"),
+            pytest.param("simulated-hexaglide\n", 0, id="the cell's name", marks=pytest.mark.slow),
+        ],
     )
     def test_a_geometry_beyond_the_tolerance_needs_the_cell_s_name(
         self, fast_cell, demo, start, terminal, typed, code
@@ -171,6 +175,7 @@ class TestAPersonAtTheTerminal:
         assert "declined; nothing was applied" in terminal.shown
         assert cell.controller.read_bytes() == (demo.run / "config-before").read_bytes()
 
+    @pytest.mark.slow
     def test_the_end_of_input_leaves_the_question_unanswered(self, waiting, terminal, demo):
         process, _, cell = waiting
         terminal.type("\x04")

@@ -148,6 +148,7 @@ def test_sigterm_stops_a_run_that_ignores_ctrl_c(start, good_cell):
     assert isinstance(history(good_cell.runs()[0])[-1], events.Interrupted)
 
 
+@pytest.mark.slow
 def test_a_killed_run_can_be_resumed(start, typed_here, good_cell):
     process = start("run", good_cell.cell, "--unattended")
     under_way(process, good_cell, 2)

@@ -10,7 +10,7 @@ import pytest
 from tests.hexacell.notices.local_servers import closed_port
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
 def test_it_serves_until_it_is_interrupted(start, cell_folder, number) -> None:
     port = closed_port()
     with cell_folder.cell.open("a") as cell:

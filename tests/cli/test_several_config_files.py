@@ -59,21 +59,21 @@ def kill_after(folder: Path, files: int, *arguments: object) -> None:
     assert ended.returncode == -signal.SIGKILL, ended.stderr
 
 
-def test_both_are_applied_and_undone_and_shown_by_their_names(cell, run, typed) -> None:
+def test_both_are_applied_and_undone_and_shown_by_their_names(cell, run, typed_here) -> None:
     before, after = run.change.before_contents, run.change.after_contents
-    applied = typed("apply", run.folder.path)
+    applied = typed_here("apply", run.folder.path)
     assert (applied.code, found(cell)) == (0, after)
     hal, ini = cell.config_paths
     assert f"Written into {hal} and {ini}, approved by the command." in applied.out
     assert str(run.folder.path / "config-before-2") in applied.out
-    again = typed("apply", run.folder.path)
+    again = typed_here("apply", run.folder.path)
     assert (again.code, "nothing was written" in again.out) == (0, True)
-    undone = typed("rollback", cell.path)
+    undone = typed_here("rollback", cell.path)
     assert (undone.code, found(cell)) == (0, before)
     for name in ("hexapod.hal", "hexapod.ini"):
         assert f"--- {name}\n+++ {name}\n" in undone.out
     assert f"{ini} is {run.folder.path / 'config-before-2'} again, bit for bit" in undone.out
-    restored = typed("rollback", cell.path, "--to", run.folder.path.name, "--json")
+    restored = typed_here("rollback", cell.path, "--to", run.folder.path.name, "--json")
     assert (restored.code, found(cell)) == (0, after)
     assert restored.document["further_configs"] == [str(ini)]
 
@@ -90,43 +90,47 @@ def test_the_cell_is_checked_with_all_its_files(cell, typed_here) -> None:
     assert "offset3 is in hexapod.hal and in hexapod.ini" in refused.err
 
 
-@pytest.mark.parametrize("command", ["status", "history", "rollback", "cell show"])
+@pytest.mark.parametrize(
+    "command",
+    [pytest.param(one, marks=pytest.mark.slow) for one in ("status", "history", "cell show")]
+    + ["rollback"],
+)
 def test_a_kill_between_the_two_is_undone_by_the_next_command(
-    cell, run, typed, tmp_path, command: str
+    cell, run, typed_here, tmp_path, command: str
 ) -> None:
     before = run.change.before_contents
     kill_after(tmp_path, 1, "apply", run.folder.path)
     assert found(cell) == (run.change.after_contents[0], before[1])
-    told = typed(*command.split(), cell.path)
+    told = typed_here(*command.split(), cell.path)
     assert "a write of hexapod.hal and hexapod.ini was interrupted between them" in told.err
     assert "hexapod.hal got the old content back" in told.err
     assert found(cell) == before
-    assert "interrupted" not in typed("status", cell.path).err
+    assert "interrupted" not in typed_here("status", cell.path).err
 
 
-def test_a_kill_behind_the_second_one_is_finished(cell, run, typed, tmp_path) -> None:
+def test_a_kill_behind_the_second_one_is_finished(cell, run, typed_here, tmp_path) -> None:
     kill_after(tmp_path, 2, "apply", run.folder.path)
     assert found(cell) == run.change.after_contents
-    told = typed("apply", run.folder.path)
+    told = typed_here("apply", run.folder.path)
     assert told.code == 0
     assert "was interrupted when all of them were new: it is complete" in told.err
     assert "nothing was written" in told.out
-    undone = typed("rollback", cell.path)
+    undone = typed_here("rollback", cell.path)
     assert (undone.code, found(cell)) == (0, run.change.before_contents)
 
 
-def test_a_killed_apply_is_repeated_by_one_command(cell, run, typed, tmp_path) -> None:
+def test_a_killed_apply_is_repeated_by_one_command(cell, run, typed_here, tmp_path) -> None:
     kill_after(tmp_path, 1, "apply", run.folder.path)
-    again = typed("apply", run.folder.path)
+    again = typed_here("apply", run.folder.path)
     assert "got the old content back" in again.err
     assert (again.code, found(cell)) == (0, run.change.after_contents)
 
 
-def test_a_rollback_is_killed_too(cell, run, typed, tmp_path) -> None:
-    assert typed("apply", run.folder.path).code == 0
+def test_a_rollback_is_killed_too(cell, run, typed_here, tmp_path) -> None:
+    assert typed_here("apply", run.folder.path).code == 0
     kill_after(tmp_path, 1, "rollback", cell.path)
     assert found(cell) == (run.change.before_contents[0], run.change.after_contents[1])
-    again = typed("rollback", cell.path)
+    again = typed_here("rollback", cell.path)
     assert "hexapod.hal got the old content back" in again.err
     assert (again.code, found(cell)) == (0, run.change.before_contents)
 

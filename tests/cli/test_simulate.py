@@ -76,6 +76,7 @@ def farthest(geometry, truth) -> float:
     return first.largest_difference(second)
 
 
+@pytest.mark.slow
 def test_a_run_calibrates_the_simulated_cell_over_its_ports(served, typed_here, quick_cell, few_candidates):
     _, printed = served
     before = tomllib.loads(quick_cell.controller.read_text())

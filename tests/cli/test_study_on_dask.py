@@ -48,6 +48,7 @@ def test_results_are_those_of_processes_though_a_worker_is_killed(
     assert len(kept) == len({json.loads(line)["key"] for line in kept}) == 21
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_on_a_cluster_goes_on_by_processes(start, cluster, tmp_path: Path) -> None:
     study = start(*PAPER, "--scheduler", cluster.address, "--folder", "kept")
     study.wait_until(lambda: len(results(tmp_path / "kept")) >= 2, "results")
@@ -60,6 +61,7 @@ def test_an_interrupted_study_on_a_cluster_goes_on_by_processes(start, cluster, 
     assert results(tmp_path / "kept")[: len(kept)] == kept
 
 
+@pytest.mark.slow
 def test_a_lost_scheduler_ends_the_command_with_what_to_do(start, cluster, tmp_path: Path) -> None:
     study = start(*PAPER, "--scheduler", cluster.address, "--folder", "kept")
     study.wait_until(lambda: len(results(tmp_path / "kept")) >= 1, "results")

@@ -78,6 +78,7 @@ def test_a_person_at_the_machine_may_run_it_in_quiet_hours(typed_here, short_cel
     assert typed_here("history", short_cell.cell, "--json").document["runs"] == []
 
 
+@pytest.mark.slow
 def test_a_busy_cell_is_tried_again_until_it_is_free(start, quick_cell) -> None:
     stated(quick_cell, "window_minutes = 10\nretry_minutes = 0.02")
     with cell_lock(quick_cell.controller):
@@ -99,6 +100,7 @@ def test_a_signal_ends_the_waiting(start, short_cell) -> None:
     assert process.stopped(signal.SIGTERM).code == ExitCode.INTERRUPTED
 
 
+@pytest.mark.slow
 def test_a_run_that_lasts_too_long_ends_at_its_reference_and_is_resumed(typed_here, quick_cell) -> None:
     stated(quick_cell, "longest_minutes = 4")
     ended = typed_here("run", quick_cell.cell, "--unattended", "--mode", "optimise")

@@ -24,6 +24,7 @@ from tests.faults.cell import MEASURED, NEVER_GOOD_ENOUGH, PROVISIONAL, Site, ma
 from tests.faults.driver import UNEXPECTED, Order
 from tests.faults.interception import Call
 from tests.faults.matrix import PROPERTY, Case
+from tests.made_once import made_once
 from tests.signals import terminal_signals
 
 ROOT = Path(__file__).parents[2]
@@ -158,9 +159,9 @@ def whole(program: Program, folder: Path, *changes: dict[str, Any]) -> Whole:
 
 
 @pytest.fixture(scope="session")
-def undisturbed(program: Program, session_ground: Path) -> Whole:
+def undisturbed(program: Program, tmp_path_factory: pytest.TempPathFactory) -> Whole:
     """A run that passes."""
-    found = whole(program, session_ground / "passes")
+    found = made_once(tmp_path_factory, "undisturbed", lambda folder: whole(program, folder))
     assert found.ended.code == 0, found.ended.words
     return found
 
@@ -183,9 +184,9 @@ def lent(program: Program, session_ground: Path) -> Whole:
 
 
 @pytest.fixture(scope="session")
-def noise_measured(program: Program, session_ground: Path) -> Whole:
+def noise_measured(program: Program, tmp_path_factory: pytest.TempPathFactory) -> Whole:
     """A run that measures the noise at its first reference."""
-    found = whole(program, session_ground / "noise", MEASURED)
+    found = made_once(tmp_path_factory, "noise", lambda folder: whole(program, folder, MEASURED))
     assert found.ended.code == 0, found.ended.words
     return found
 

@@ -35,6 +35,7 @@ def kill(program: Any, new_site: Any, undisturbed: Any, case: Any) -> Break:
 
 
 class TestSelectedKills:
+    @pytest.mark.slow
     def test_a_run_killed_between_a_step_and_its_record_is_resumed(
         self, undisturbed: Any, kill: Break
     ) -> None:
@@ -130,6 +131,7 @@ def kill_while_measuring_noise(
     return broken
 
 
+@pytest.mark.slow
 def test_a_run_killed_while_it_measures_the_noise_is_resumed(
     noise_measured: Any, kill_while_measuring_noise: Any
 ) -> None:

@@ -12,7 +12,7 @@ from tests.faults.matrix import step_of
 from tests.faults.promises import require_identical
 
 INSTANTS = 200
-SAMPLE = 2
+SAMPLE = 1
 
 SOONER = 0.95
 

@@ -64,6 +64,7 @@ def puller(program: Any, new_site: Any, whole_with: Any, case: Any) -> Puller:
     return Puller(program, new_site, whole_with, case)
 
 
+@pytest.mark.slow
 def test_a_gauge_plugged_in_again_while_measuring_is_recovered(puller: Puller) -> None:
     assert puller.pull("gauge y", "sampling", back=True) == "done, recovered"
 

@@ -103,6 +103,7 @@ def test_a_rod_far_outside_its_tolerance_is_named_with_its_sign(judged, shifted)
     assert re.search(r"S1y \(\+\d\d\.\d\d mm\)", gate.sentence)
 
 
+@pytest.mark.slow
 def test_an_allowed_offset_of_the_ball_is_no_violation(judged, identified, paper):
     """As the paper's own did: 30 mm in z."""
     moved = replace(identified.estimate, geometry=paper.calibrated)

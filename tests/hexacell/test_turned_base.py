@@ -87,6 +87,7 @@ def scaled(records: MeasurementSet, scales: tuple[float, float, float]) -> Measu
     )
 
 
+@pytest.mark.slow
 def test_each_gauge_has_a_scale_of_its_own(turned: Robot, truth: Geometry, records: MeasurementSet) -> None:
     shown = scaled(records, (1.004, 1.0, 0.993))
     noise = Noise(1e-4, 1e-4, gauge_scale=0.005)

@@ -18,6 +18,7 @@ from hexacell.controller_config.change import ConfigChange
 from hexacell.controller_config.write_back import commit
 from procedures.run import events
 from procedures.run.steps import Phase, SetKey
+from tests.made_once import made_once
 from tests.procedures.fakes import Bench
 from tests.procedures.rig import MakeRig, Recording, Rig, new_rig
 from tests.procedures.story import Story
@@ -37,9 +38,13 @@ def make_rig(few_candidates: None, tmp_path: Path) -> MakeRig:
 
 @pytest.fixture(scope="session")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return made_once(tmp_path_factory, "recording", recorded_in)
+
+
+def recorded_in(folder: Path) -> Recording:
     with pytest.MonkeyPatch.context() as patch:
         choose_among_few(patch)
-        rig = new_rig(tmp_path_factory.mktemp("recording"))
+        rig = new_rig(folder)
         before = rig.config
         told: list[events.Event] = []
         asyncio.run(rig.run(lambda event, _: told.append(event)))

@@ -182,6 +182,7 @@ async def test_a_grave_change_needs_the_name_of_the_cell(
         assert run.given == [Answer("a person at the screen")]
 
 
+@pytest.mark.sample("*-size0")
 @pytest.mark.parametrize("size", [(80, 24), (100, 32), (140, 40)])
 @pytest.mark.parametrize("is_grave", [False, True])
 async def test_a_long_change_leaves_in_sight_what_to_press(
@@ -327,6 +328,7 @@ async def test_quitting_may_stop_the_run(
         await until(lambda: run.left == [False])
 
 
+@pytest.mark.sample("s-optimise", "r-resume")
 @pytest.mark.parametrize(
     ("key", "what"),
     [

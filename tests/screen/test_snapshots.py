@@ -192,6 +192,7 @@ async def test_the_assistant_looks_as_it_did(size: str, tmp_path: Path) -> None:
             await compare_with_snapshot(f"assistant-{size}-{theme}", pilot)
 
 
+@pytest.mark.sample("*-80x24")
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("scene", SCENES)
 async def test_it_looks_as_it_did(

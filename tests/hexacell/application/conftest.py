@@ -20,6 +20,7 @@ from procedures.engine.engine import Listener
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.questions import Question, UnattendedOperator
+from tests.made_once import made_once
 from tests.native_config import NATIVE
 from tests.small_cell import SMALL, few_candidates, history_until, write_small_cell
 
@@ -87,7 +88,10 @@ class Finished:
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    folder = tmp_path_factory.mktemp("finished")
+    return made_once(tmp_path_factory, "finished", finished_in)
+
+
+def finished_in(folder: Path) -> Finished:
     cell = maker(folder)()
     before = cell.config_path.read_bytes()
     run = RunFolder(runs_folder(cell) / "run")

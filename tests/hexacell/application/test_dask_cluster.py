@@ -75,7 +75,11 @@ def cluster(tmp_path: Path) -> Iterator[DaskProcesses]:
         yield processes
 
 
-@pytest.mark.parametrize("settings", [{}, GIVEN_UP_AT_ONCE], ids=["by the scheduler", "by this program"])
+@pytest.mark.parametrize(
+    "settings",
+    [{}, pytest.param(GIVEN_UP_AT_ONCE, marks=pytest.mark.slow)],
+    ids=["by the scheduler", "by this program"],
+)
 def test_tasks_of_a_killed_worker_are_done_again(tmp_path: Path, settings: dict[str, str]) -> None:
     with dask_processes(tmp_path, 3, **settings) as cluster:
         carry_out = partial(square_unless_killed, folder=tmp_path)
@@ -102,7 +106,11 @@ def test_a_scheduler_that_goes_away_is_named_and_what_was_done_is_told(cluster, 
     assert all(done[key] == int(key) ** 2 for key in done)
 
 
-@pytest.mark.parametrize("settings", [{}, GIVEN_UP_AT_ONCE], ids=["nothing is told", "tasks are lost"])
+@pytest.mark.parametrize(
+    "settings",
+    [pytest.param({}, marks=pytest.mark.slow), GIVEN_UP_AT_ONCE],
+    ids=["nothing is told", "tasks are lost"],
+)
 def test_workers_that_all_leave_are_missed(tmp_path: Path, settings: dict[str, str]) -> None:
     with dask_processes(tmp_path, 2, **settings) as cluster:
         started = results_of({"3": 3}, square, dask_cluster(cluster.address, patience_s=LATE_S))

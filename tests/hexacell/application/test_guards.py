@@ -61,6 +61,14 @@ def striking(site: Any, key: str, kind: FaultKind, device: str) -> Callable[...,
     return listener
 
 
+@pytest.mark.sample(
+    "stop line-*",
+    "emergency stop-*",
+    "at its end-*",
+    "unplugged-x-*",
+    "frozen-encoder*",
+    "unplugged-controller-*",
+)
 @pytest.mark.parametrize(("kind", "device", "key", "guards"), FAULTS)
 async def test_a_fault_during_a_move_stops_the_robot_and_trips_its_guard(
     make_site, kind, device, key, guards

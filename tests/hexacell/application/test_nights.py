@@ -11,6 +11,8 @@ from hexacell.errors import ExitCode
 from procedures.calibration.workflow import Mode
 from tests.benchmarks.simulated_year import DEAD_GAUGE, FULL_DISK, Year
 
+pytestmark = pytest.mark.slow
+
 DEAD, FULL, CRASH, NIGHTS = 2, 3, 5, 8
 
 

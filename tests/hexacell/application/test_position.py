@@ -39,6 +39,7 @@ def edit(cell: Cell) -> None:
     cell.config_path.write_text(text.replace("615.0", "615.1", 1))
 
 
+@pytest.mark.slow
 async def test_a_pose_of_home_after_a_failed_kinematics_is_not_believed(make_site) -> None:
     """The move was carried out and the pose is that of home; no resumption moves on from there."""
     site = make_site()
@@ -128,6 +129,7 @@ async def test_a_controller_that_keeps_its_old_config_gets_the_file_back(finishe
     assert site.simulated.schedule.move_count == 0
 
 
+@pytest.mark.slow
 async def test_joints_that_include_the_zeros_agree_before_and_after_the_geometry_is_written(
     make_site,
 ) -> None:

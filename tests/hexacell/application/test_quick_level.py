@@ -132,6 +132,7 @@ async def test_without_an_accepted_result_it_says_what_to_do(make_cell, tmp_path
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 async def test_one_that_was_ended_in_its_midst_is_resumed(drifted) -> None:
     """With the same prior and budget: what it started from is in its journal."""
     folder, queue, counted = RunFolder(runs_folder(drifted) / "quick"), CommandQueue(), 0

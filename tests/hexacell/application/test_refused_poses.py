@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from hexacell.application.replay_run import replay
 from hexacell.cell.simulation import SoftLimits
 from hexacell.errors import ExitCode
@@ -12,6 +14,7 @@ LIMITS = SoftLimits(
 )
 
 
+@pytest.mark.slow
 async def test_poses_that_the_controller_refuses_are_replaced_by_others(make_site, approver) -> None:
     site = make_site(simulation__soft_limits=LIMITS)
     ended = await site.calibrate(operator=approver, unattended=False)

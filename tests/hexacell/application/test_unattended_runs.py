@@ -153,7 +153,9 @@ async def test_the_run_is_told_when_its_time_is_over(make_cell) -> None:
     assert list(queue.take()) == []
 
 
-@pytest.mark.parametrize(("phase", "records"), [(Phase.IDENTIFY, 5), (Phase.BEFORE, 2)])
+@pytest.mark.parametrize(
+    ("phase", "records"), [(Phase.IDENTIFY, 5), pytest.param(Phase.BEFORE, 2, marks=pytest.mark.slow)]
+)
 async def test_it_ends_at_its_reference_and_can_be_resumed(make_site, finished, phase, records) -> None:
     """With the same records and the same config, byte for byte, as a run that had the time."""
     site, queue, counted = make_site(), CommandQueue(), 0
@@ -179,16 +181,17 @@ async def test_it_ends_at_its_reference_and_can_be_resumed(make_site, finished, 
     assert len(read_measurements(site.folder.measurements)) == 24
 
 
-async def test_after_the_write_back_an_unverified_geometry_does_not_stay(make_site) -> None:
+async def test_after_the_write_back_an_unverified_geometry_does_not_stay(make_site, finished) -> None:
     site, queue = make_site(), CommandQueue()
     before = site.config
+    site.write(finished.until(events.Proposed), finished)
 
     def end(event: events.Event, _: object) -> None:
         if isinstance(event, events.RecordTaken) and event.at.phase is Phase.AFTER:
             queue.put(EndAtReference("quiet hours begin at 05:30"))
 
     with pytest.raises(WriteBackUndone, match=r"the old config is back\. the run was ended") as refusal:
-        await calibrate(site.order(), [end], queue)
+        await calibrate(site.order(resume=True), [end], queue)
     assert refusal.value.exit_code == ExitCode.WRITE_BACK_UNDONE
     assert site.config == before
 

@@ -206,7 +206,9 @@ async def test_who_leaves_it_running_finds_it_running(hosted) -> None:
         await client.connection.leave(keep_running=True)
         await until(lambda: not run.host._audience.is_controlled)
         back = await run.client()
-        await back.until_control(is_in_control=True)  # told after the history, which may be of the whole set
+        await back.until_control(
+            is_in_control=True
+        )  # told after the history, which may be of the whole set
         if not any(isinstance(event, events.RecordTaken) for event in history_told(back)[known:]):
             await back.until(told_of(events.RecordTaken))
         await back.connection.leave(keep_running=False)

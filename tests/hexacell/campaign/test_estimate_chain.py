@@ -50,6 +50,7 @@ def chain(make_problem):
     return estimates
 
 
+@pytest.mark.sample("label0")
 @pytest.mark.parametrize("label", [FALSE, OTHERS, (2, 1), (3, 2)])
 def test_a_false_record_is_left_out_and_changes_nothing(noisy, chain, make_problem, label):
     spoilt = with_change(noisy, label, one_mm_more)

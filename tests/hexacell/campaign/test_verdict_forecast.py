@@ -100,6 +100,7 @@ def test_the_held_out_records_confirm_the_identification_and_lessen_its_covarian
     assert cell.updated.records - cell.found.records == 3 * 6
 
 
+@pytest.mark.slow
 def test_what_will_be_stated_is_as_large_as_in_simulated_verifications(cell, simulated) -> None:
     stated = stated_errors(cell.found, cell.updated, cell.first, cell.second)
     draws = np.random.default_rng(SEED).standard_normal((4000, stated.shape[-1]))

@@ -93,6 +93,7 @@ def test_shared_causes_cancel_between_runs() -> None:
     assert np.abs(unaware.scores(evidence(rows[1], 6), np.eye(6))).max() > 4.5
 
 
+@pytest.mark.slow
 def test_the_largest_score_exceeds_its_limit_as_seldom_as_stated() -> None:
     above = []
     for seed in range(500):

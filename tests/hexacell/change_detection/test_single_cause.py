@@ -20,6 +20,7 @@ def outcome(seed: int, change: np.ndarray | None = None, records: int = 9) -> Si
     return single_cause_test(robot.records(robot.check[:records], state), COVARIANCE, CAUSES.by_state)
 
 
+@pytest.mark.slow
 def test_unchanged_robots_alarm_as_seldom_as_stated() -> None:
     runs = 500
     alarms = sum(outcome(seed).is_alarm for seed in range(runs))

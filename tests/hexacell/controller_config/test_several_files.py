@@ -186,6 +186,7 @@ def test_consecutive_failures_leave_what_the_message_says_or_what_is_undone_next
     assert halves or math.isfinite(width)
 
 
+@pytest.mark.sample("commit")
 @pytest.mark.parametrize("job", ["commit", "rollback"])
 def test_a_power_cut_at_any_moment_is_settled(bench: Bench, job: str) -> None:
     doing, prepare = {

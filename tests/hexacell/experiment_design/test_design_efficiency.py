@@ -66,6 +66,7 @@ def test_random_orientations_are_far_from_efficient(know, much, campaign, bound)
     assert 0.1 < found.certified <= found.value < 0.8
 
 
+@pytest.mark.slow
 def test_a_certificate_is_also_given_for_the_task(know, much, limits):
     belief = know(much, limits=replace(limits, turn=np.radians(60.0)))
     predictions = np.eye(len(belief.free))[:6]

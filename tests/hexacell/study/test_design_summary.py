@@ -101,6 +101,7 @@ def test_a_robot_that_is_measured_at_one_point_only_is_not_identified(monkeypatc
     assert "no second point" in found.reason
 
 
+@pytest.mark.slow
 def test_chosen_orientations_tell_more_than_random_ones_of_the_same_travel() -> None:
     """One robot, three points; the trial is the same whenever it is made."""
     usual = DesignTrial(0, points=3)

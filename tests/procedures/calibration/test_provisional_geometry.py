@@ -123,6 +123,7 @@ async def test_an_abort_at_a_reference_pose_reverts_the_provisional_geometry(rig
     await require_finished(rig)
 
 
+@pytest.mark.sample("2")
 @pytest.mark.parametrize("count", [2, 5])
 async def test_an_abort_within_a_set_leaves_the_provisional_geometry_until_the_run_resumes(
     rig, count
@@ -134,6 +135,7 @@ async def test_an_abort_within_a_set_leaves_the_provisional_geometry_until_the_r
     await require_finished(rig)
 
 
+@pytest.mark.sample("take back")
 @pytest.mark.parametrize("step", ["lend", "take back"])
 async def test_a_run_resumes_after_a_power_cut_before_the_provisional_geometry_is_written(
     rig, step
@@ -179,6 +181,7 @@ async def test_a_provisional_geometry_that_cannot_be_loaded_leaves_the_config_un
     assert rig.config == before
 
 
+@pytest.mark.sample("True")
 @pytest.mark.parametrize("reload_works", [True, False])
 async def test_a_provisional_geometry_that_cannot_be_journalled_is_reverted_or_reported(
     rig, monkeypatch, reload_works: bool

@@ -97,6 +97,7 @@ LATER = [pytest.param("power cut", 1, 27, 3, marks=pytest.mark.slow), ("aborted"
 """The first number is of sets that are measured already."""
 
 
+@pytest.mark.sample("power cut-3-9")
 @pytest.mark.parametrize(("how", "first", "second"), HERE_AND_THERE)
 async def test_a_run_interrupted_twice_from_its_beginning_finishes_with_every_record_once(
     make_rig, how: str, first: int, second: int

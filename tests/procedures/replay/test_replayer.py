@@ -164,6 +164,7 @@ def anything(_: events.Event) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_a_run_that_was_stopped_several_times_is_reproduced(recording, replayed, replay) -> None:
     rig = replayed(recording.until(events.SetClosed, count=1))
 

@@ -20,6 +20,7 @@ def returns(rig, since: int) -> list[Move]:
     return [step for step in steps if isinstance(step, Move)]
 
 
+@pytest.mark.sample("this point")
 @pytest.mark.parametrize(
     ("records", "from_elsewhere"), [(13, True), (5, False)], ids=["other point", "this point"]
 )

@@ -67,6 +67,7 @@ async def test_every_station_is_tried_once(make_rig) -> None:
     assert lengths[:3] == pytest.approx([1.0] * 3)
 
 
+@pytest.mark.slow
 async def test_without_a_distance_nothing_is_tried(make_rig) -> None:
     rig = make_rig(stations__trial_mm=0.0)
     make_mistake(rig, "z reversed")
@@ -113,6 +114,7 @@ async def test_after_an_interruption_the_gauges_are_tried_again_before_the_set_c
     assert records == [1, 2, 3, 4, 5, 6, 7, 8, 9]
 
 
+@pytest.mark.slow
 async def test_a_trial_that_was_interrupted_begins_again(make_rig) -> None:
     rig = make_rig(stations__trial_mm=1.0)
 

@@ -59,6 +59,7 @@ def test_play_of_the_sliders_is_found_with_its_size(visit) -> None:
     assert np.median(sizes) == pytest.approx(0.05, rel=0.15)
 
 
+@pytest.mark.sample("gauges1-*")
 @pytest.mark.parametrize(
     ("gauges", "source"),
     [
@@ -74,6 +75,7 @@ def test_a_gauge_that_does_not_repeat_is_named_with_its_size(visit, gauges, sour
     assert np.median([one.excess for one in named]) == pytest.approx(max(gauges), rel=0.2)
 
 
+@pytest.mark.sample("0.02")
 @pytest.mark.parametrize("stops", [0.0, 0.02])
 def test_play_moves_the_ball_and_errors_of_encoders_do_not(visit, stops) -> None:
     """Whether the controller stops at the same place or not, neither is taken for the other."""

@@ -47,6 +47,7 @@ def levels_of(visit, make_problem):
     return found
 
 
+@pytest.mark.sample("0.005-0.02")
 @pytest.mark.parametrize(("encoder", "gauge_mm"), [(0.02, 0.01), (0.005, 0.02), (0.01, 0.01)])
 def test_levels_are_found_without_bias_and_with_their_standard_errors(levels_of, encoder, gauge_mm):
     found = [levels_of(encoder, gauge_mm, seed) for seed in range(REPETITIONS)]

@@ -99,6 +99,7 @@ def test_without_systematic_errors_it_is_the_test_of_the_noise(found):
     assert linear.expected == pytest.approx(alone.noise_test.expected)
 
 
+@pytest.mark.slow
 def test_machines_with_the_stated_effects_agree(visit, make_problem):
     """Their chi-square has its degrees of freedom as mean; by the noise alone it would be far larger."""
     exact, noise = visit(seed=2), Noise(0.01, 0.01)

@@ -7,6 +7,7 @@ in a comment, and the password in an address such as ``http://user:password@host
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 from hexacell.storage.toml_document import SECRET_WORDS, TomlDocument, is_secret
 from hexacell.storage.toml_locations import KeyPath
@@ -34,6 +35,7 @@ def clear_secrets(document: TomlDocument) -> list[KeyPath]:
     return [path for path in secret_paths(document) if document.value(path) != MASK]
 
 
+@lru_cache(maxsize=4)
 def without_secrets(text: str) -> str:
     """A valid TOML text with every secret masked; every other character is kept."""
     document = TomlDocument.parse(text)

@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Self
 
@@ -44,7 +45,7 @@ class TomlDocument:
             line = text.count("\n", 0, found.start()) + 1
             raise FileError("a key has too many parts", subject=source, line=line, action="Shorten it")
         with _file_errors(text, source):
-            return cls(text, tomllib.loads(text.removeprefix(BYTE_ORDER_MARK)), locate(text), source)
+            return cls(text, tomllib.loads(text.removeprefix(BYTE_ORDER_MARK)), _located(text), source)
 
     def to_json(self) -> str:
         """The values as JSON, dates and times as text; raises ``FileError`` for endless integers."""
@@ -91,6 +92,12 @@ class TomlDocument:
             item = "row" if isinstance(self.value(path[: depth + 1]), list) else "number"
             words += f", {item} {int(path[depth]) + 1}"
         return words
+
+
+@lru_cache(maxsize=8)
+def _located(text: str) -> Mapping[KeyPath, slice]:
+    """The same few texts are parsed again and again, and the scanner takes most of the time."""
+    return locate(text)
 
 
 def is_secret(path: KeyPath) -> bool:

@@ -39,25 +39,28 @@ settings.register_profile(
 settings.load_profile("hexacell")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Whatever lies in tests/benchmarks is a benchmark; tests of the whole project come first.
 
-    They are the longest, and the processes that share the tests should end together.
+    They are the longest, and the processes that share the tests should end together. Of tests with a
+    ``sample`` of their parameters the others are slow.
     """
+    patterns: set[tuple[str, str]] = set()
+    taken: set[tuple[str, str]] = set()
     for item in items:
         if BENCHMARKS in item.path.parents:
             item.add_marker(pytest.mark.benchmark)
-        if _repeats(item):
-            item.add_marker(pytest.mark.slow)
+        if sample := item.get_closest_marker("sample"):
+            test, _, parameters = item.nodeid.removesuffix("]").partition("[")
+            found = {(test, one) for one in sample.args if fnmatch.fnmatchcase(parameters, one)}
+            patterns, taken = patterns | {(test, one) for one in sample.args}, taken | found
+            if not found:
+                item.add_marker(pytest.mark.slow)
+    if patterns != taken and not any("::" in argument for argument in config.args):
+        raise pytest.UsageError(
+            f"these samples name no parameters of their tests: {sorted(patterns - taken)}"
+        )
     items.sort(key=lambda item: item.path.parent != TESTS)
-
-
-def _repeats(item: pytest.Item) -> bool:
-    """Whether other parameters of the same test are the sample that ``make test`` takes."""
-    sample = item.get_closest_marker("sample")
-    if sample is None or not isinstance(item, pytest.Function):
-        return False
-    return not any(fnmatch.fnmatchcase(item.callspec.id, pattern) for pattern in sample.args)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

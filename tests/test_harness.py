@@ -161,6 +161,24 @@ def test_tests_that_clean_up_pass(suite: pytest.Pytester) -> None:
     run(suite, CLEAN).assert_outcomes(passed=CLEAN.count("def test_"))
 
 
+SAMPLED = """
+    @pytest.mark.sample("a-*", "b-2")
+    @pytest.mark.parametrize("number", [1, 2])
+    @pytest.mark.parametrize("letter", ["a", "b"])
+    def test_of_which_some_are_slow(letter, number):
+        pass
+"""
+
+
+def test_parameters_that_are_not_in_the_sample_are_slow(suite: pytest.Pytester) -> None:
+    assert run(suite, SAMPLED, options="-m slow -v").stdout.str().count("[b-1] PASSED") == 1
+    run(suite, SAMPLED, options="--no-header").assert_outcomes(passed=4)
+    refused = run(suite, SAMPLED.replace("a-*", "c-*"))
+    refused.stderr.fnmatch_lines(
+        ["*these samples name no parameters of their tests: *test_of_which*, 'c-?'*"]
+    )
+
+
 @pytest.mark.parametrize(("environment", "repeatable"), [({"CI": "true"}, True), ({}, False)])
 def test_hypothesis_is_repeatable_in_ci(
     suite: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], repeatable: bool

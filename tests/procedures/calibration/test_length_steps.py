@@ -196,6 +196,7 @@ async def test_gauges_the_wrong_way_round_in_the_second_seat_are_told(make_lengt
     assert "the wrong way round in their seat" in found.result.reason
 
 
+@pytest.mark.sample("when0")
 @pytest.mark.parametrize("when", [(2,), (3,), (2, 3)])
 async def test_gauges_that_are_zeroed_between_the_seats_are_told(make_length_rig, when) -> None:
     """Also at every mounting, out of habit: then each first reading is zero."""
@@ -241,6 +242,7 @@ def killed(rig: Rig) -> None:
     rig.folder.journal.write_bytes(b"".join(lines[:-1]))
 
 
+@pytest.mark.sample("2-True", "3-False")
 @pytest.mark.parametrize("is_killed", [False, True])
 @pytest.mark.parametrize("mounting", [2, 3])
 async def test_a_check_resumed_between_the_seats_goes_on_there(

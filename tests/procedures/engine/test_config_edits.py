@@ -59,6 +59,7 @@ async def test_an_edit_is_noticed_before_the_next_move_and_the_file_and_line_are
     assert len([entry for entry in rig.controller.log if entry.startswith("move")]) == 3
 
 
+@pytest.mark.slow
 async def test_a_person_undoes_the_edit_and_retries(recording, replayed) -> None:
     person = Undoer()
     rig = replayed(recording.until(events.SetClosed), operator=person)

@@ -182,6 +182,7 @@ def test_a_run_that_was_stopped_several_times_is_reproduced(recording, replayed,
 NUMBERS = range(1, 26)
 
 
+@pytest.mark.sample("13")
 @pytest.mark.parametrize(
     "number", [pytest.param(n, marks=[] if n % 8 == 5 else pytest.mark.slow) for n in NUMBERS]
 )

@@ -55,6 +55,7 @@ async def test_a_person_is_told_how_to_move_the_gauge_and_the_set_begins_again(m
     assert failed.failure is FailureKind.MOUNTING
 
 
+@pytest.mark.slow
 async def test_a_gauge_that_does_not_tell_its_place_is_not_refused(make_rig) -> None:
     rig = make_rig()
     gauges = tuple(gauge.model_copy(update={"middle_mm": None}) for gauge in rig.cell.settings.gauges)

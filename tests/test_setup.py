@@ -13,7 +13,8 @@ import pytest
 CHECKOUT = Path(__file__).parent.parent
 
 MARKED = "not slow and not benchmark and not linuxcnc"
-THE_TESTS = f"-m pytest -n 4 --dist loadfile --no-loadscope-reorder -m {MARKED}"
+ELSEWHERE = "--ignore=tests/benchmarks --ignore=tests/linuxcnc"
+THE_TESTS = f"-m pytest -n 4 --dist loadfile --no-loadscope-reorder {ELSEWHERE} -m {MARKED}"
 """The arguments that ``make test`` gives to Python."""
 
 AT_LINUXCNC = "-m pytest tests/linuxcnc --timeout=1200 -m not slow"
@@ -229,7 +230,7 @@ def ci(newcomer: Newcomer, lint: int = 0, linuxcnc: int | None = None) -> tuple[
     """Status and lines of ``.ci/run``, where lint and the tests at LinuxCNC end as told; or without it."""
     (newcomer.checkout / ".venv/bin/python").write_text(
         '#!/bin/sh\necho "$CI $*"\n'
-        f'case "$*" in *ruff*) exit {lint} ;; *tests/linuxcnc*) exit {linuxcnc} ;; esac\n'
+        f'case "$*" in *ruff*) exit {lint} ;; *"pytest tests/linuxcnc"*) exit {linuxcnc} ;; esac\n'
     )
     lints = newcomer.checkout / ".venv/bin/lint-imports"
     lints.write_text("#!/bin/sh\n")

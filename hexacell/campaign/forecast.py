@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,9 +154,20 @@ class Forecaster:
     ) -> Array:
         if not any(planned.values()):
             return belief.covariance
-        information = PlannedInformation.of(self._sets_at(planned), belief)
+        information = self._information(belief, frozenset(planned))
         added = [information.added(state, point, more) for point, more in planned.items()]
         return add_information(belief.covariance, np.sum(added, axis=0))
+
+    def _information(self, belief: RobotBelief, points: frozenset[int]) -> PlannedInformation:
+        """Of the planned sets of some points; the last one is kept, for a decision asks for it twice."""
+        last = self._last_information
+        if not last or last[0][0] is not belief or last[0][1] != points:
+            last[:] = [(belief, points, PlannedInformation.of(self._sets_at(points), belief))]
+        return last[0][2]
+
+    @cached_property
+    def _last_information(self) -> list[tuple[RobotBelief, frozenset[int], PlannedInformation]]:
+        return []
 
     def _sets_at(self, points: Container[int]) -> list[PoseBatch]:
         """The planned sets of some points, and empty ones of the others, which would only take time."""

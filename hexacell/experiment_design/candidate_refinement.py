@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,15 +78,11 @@ class RatedRecords:
         records = PredictedRecords.concatenate([part.records for part in parts])
         return cls(records, np.concatenate([part.gains for part in parts]))
 
-    def __getitem__(self, rows: NDArray[np.intp]) -> RatedRecords:
+    def __getitem__(self, rows: NDArray[np.intp] | slice) -> RatedRecords:
         return RatedRecords(self.records[rows], self.gains[rows])
 
-    def best_first(self, most: int) -> RatedRecords:
-        """So many of them, ranked."""
-        return self[np.argsort(-self.gains, kind="stable")[:most]]
 
-
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class CandidateSpace:
     """The records that a point's poses could have: within the limits, and almost surely inside the travel.
 
@@ -105,7 +101,7 @@ class CandidateSpace:
         """The possible records of some orientations (n, 3, 3); none where the robot can take none."""
         belief, zero = self.belief, self.zero
         poses = PoseBatch.at(zero.reference, orientations)
-        targets = reachable_targets(belief, poses, zero.mode(belief))
+        targets = reachable_targets(belief, poses, self._mode)
         if not len(targets):
             return None
         records = predict_records(belief, zero, targets)
@@ -113,7 +109,7 @@ class CandidateSpace:
         return RatedRecords(records, self.gain(records))
 
     def refined(self, candidates: RatedRecords) -> RatedRecords:
-        """Some candidates, and the best of what their best ones were turned to."""
+        """Some candidates, and the best of what their best ones were turned to, the best first."""
         parts, apart = [candidates], APART
         orientations, gains = candidates.records.targets.poses.rotations, candidates.gains
         for each in ROUNDS:
@@ -127,12 +123,19 @@ class CandidateSpace:
                 gains = np.concatenate([gains, turned.gains])
         return _spread(RatedRecords.concatenate(parts), len(candidates))
 
+    @cached_property
+    def _mode(self) -> Array:
+        """The assembly mode (1,) that the estimated robot is on."""
+        return self.zero.mode(self.belief)
+
 
 def _spread(rated: RatedRecords, first: int) -> RatedRecords:
-    """The best of some records that are not near another, and all of the ``first`` ones."""
+    """The best of some records that are not near another, and all of the ``first`` ones, ranked."""
     ranking = np.argsort(-rated.gains, kind="stable")
     best = rows_apart(rated.records.targets.poses.rotations, ranking, KEPT, KEPT_APART)
-    return rated[np.concatenate([best, np.setdiff1d(np.arange(first), best)])]
+    is_kept = np.arange(len(rated)) < first
+    is_kept[best] = True
+    return rated[ranking[is_kept[ranking]]]
 
 
 def _turned(orientations: Array, how: Round) -> Array:

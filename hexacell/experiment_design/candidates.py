@@ -58,7 +58,7 @@ class ReachableTargets:
     def __len__(self) -> int:
         return len(self.joints)
 
-    def __getitem__(self, rows: Mask | NDArray[np.intp]) -> ReachableTargets:
+    def __getitem__(self, rows: Mask | NDArray[np.intp] | slice) -> ReachableTargets:
         return ReachableTargets(self.poses[rows], self.joints[rows])
 
 
@@ -124,7 +124,8 @@ def reachable_targets(belief: RobotBelief, poses: PoseBatch, mode: Array | None 
     clear, modes = margin_and_mode(belief.mechanism, belief.estimate, poses, joints, margin)
     if mode is not None:
         clear &= modes == mode
-    return ReachableTargets(poses, joints)[clear]
+    targets = ReachableTargets(poses, joints)
+    return targets if clear.all() else targets[clear]
 
 
 def commands_for(belief: RobotBelief, targets: ReachableTargets) -> tuple[PoseBatch, Mask]:

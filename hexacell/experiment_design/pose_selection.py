@@ -90,7 +90,7 @@ def select_pose(
     if candidates is None:
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
     if len(candidates):
-        candidates = space.refined(candidates).best_first(MOST_CANDIDATES)
+        candidates = space.refined(candidates)[:MOST_CANDIDATES]
     search = _PathSearch(TravelConstraint(belief, zero), planner)
     for ranked in _batches(np.arange(len(candidates)), *COMMAND_BATCHES):
         commands, found = commands_for(belief, candidates.records.targets[ranked])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ TRAVEL_SHARE = 0.9
 at this limit, thousands of 50,000 records; with three sigma one in some thousands left the travel."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class GaugeZero:
     """What is known of the zero of a point's gauges.
 
@@ -48,7 +49,7 @@ class GaugeZero:
     jacobian: Array
     covariance: Array
 
-    @property
+    @cached_property
     def target(self) -> ReachableTargets:
         """The reference as a target (1)."""
         return ReachableTargets(PoseBatch.at(self.reference, self.orientation[None]), self.joints[None])
@@ -124,7 +125,7 @@ class PredictedRecords:
     def __len__(self) -> int:
         return len(self.targets)
 
-    def __getitem__(self, rows: Mask | NDArray[np.intp]) -> PredictedRecords:
+    def __getitem__(self, rows: Mask | NDArray[np.intp] | slice) -> PredictedRecords:
         return PredictedRecords(
             self.targets[rows],
             self.jacobian[rows],

@@ -104,9 +104,8 @@ class CommandedRobot:
             start_geometry=self.actual,
             stage_counts=stages,
         )
-        error = np.abs(np.nan_to_num(self.joints(result.poses), nan=np.inf) - joints)
-        agrees = error.max(axis=-1, initial=0.0) < JOINT_TOLERANCE_MM
-        return ForwardResult(result.poses, result.found & agrees)
+        agrees = np.abs(self.joints(result.poses) - joints) < JOINT_TOLERANCE_MM  # not where it is NaN
+        return ForwardResult(result.poses, result.found & agrees.all(axis=-1))
 
     def _actual(self, commands: PoseBatch, joints: Array) -> ForwardResult:
         return continue_solution(

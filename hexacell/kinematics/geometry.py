@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -52,6 +52,12 @@ class Geometry:
             self._arrays[symbol] = self.parameters.array(self.vector, symbol)
         return self._arrays[symbol]
 
+    def once(self, name: str, compute: Callable[[], Array]) -> Array:
+        """What follows from the geometry alone, under a name that is no symbol: computed once."""
+        if name not in self._arrays:
+            self._arrays[name] = compute()
+        return self._arrays[name]
+
     def document(self) -> dict[str, Any]:
         """Nested lists under the symbols of the kinds, the form of every file."""
         return self.parameters.document(self.vector)
@@ -77,6 +83,12 @@ class GeometryBatch:
         if symbol not in self._arrays:
             self._arrays[symbol] = self.parameters.array(self.vectors, symbol)
         return self._arrays[symbol]
+
+    def once(self, name: str, compute: Callable[[], Array]) -> Array:
+        """What follows from the geometry alone, under a name that is no symbol: computed once."""
+        if name not in self._arrays:
+            self._arrays[name] = compute()
+        return self._arrays[name]
 
     def interpolate_from(self, start: Geometry, fraction: float) -> GeometryBatch:
         """Linear interpolation from one geometry: 0 gives ``start`` for each pose, 1 gives this batch."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.errors import UsageError
+from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.rotations import Array
 
 CLOSEST_JOINTS_MM = 1e-6
@@ -29,10 +30,15 @@ def by_pose(b: Array, n: Array) -> Array:
     return jacobian
 
 
-def mean_radius(platform_joints: Array) -> Array:
-    """Mean distance (...,), mm, of the platform joints (..., 6, 3) from the ball."""
-    radius: Array = np.sqrt(np.einsum("...i,...i->...", platform_joints, platform_joints)).mean(axis=-1)
-    return radius
+def mean_radius(geometry: Geometry | GeometryBatch, symbol: str) -> Array:
+    """Mean distance (...,), mm, of the platform joints (..., 6, 3) of that symbol from the ball."""
+
+    def compute() -> Array:
+        joints = geometry[symbol]
+        radius: Array = np.sqrt(np.einsum("...i,...i->...", joints, joints)).mean(axis=-1)
+        return radius
+
+    return geometry.once("mean radius", compute)
 
 
 def axes_through(first: Array, second: Array, third: Array, part: str) -> Array:

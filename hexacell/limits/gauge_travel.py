@@ -9,6 +9,7 @@ on the plates. Lengths are in mm, along base x, y, z.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -80,6 +81,7 @@ class GaugeTravel:
         pairs = zip(shown_mm, self.middle_mm, strict=True)
         return tuple(None if middle is None else shown - middle for shown, middle in pairs)
 
+    @lru_cache(maxsize=16)  # noqa: B019 - a program has few gauges
     def room(self, zero_mm: Three | None = None) -> GaugeRoom:
         """The room of gauges that showed ``zero_mm`` when they were zeroed.
 

@@ -153,7 +153,7 @@ class GoughStewart:
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        return mean_radius(geometry["platform"])
+        return mean_radius(geometry, "platform")
 
 
 def gough_stewart_geometry(base: ArrayLike, platform: ArrayLike, offset: ArrayLike) -> Geometry:

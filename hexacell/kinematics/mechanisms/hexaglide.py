@@ -159,7 +159,7 @@ class Hexaglide:
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        return mean_radius(geometry["B"])
+        return mean_radius(geometry, "B")
 
 
 def hexaglide_geometry(S: ArrayLike, B: ArrayLike, l: ArrayLike) -> Geometry:  # noqa: E741

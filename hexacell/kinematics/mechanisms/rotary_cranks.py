@@ -235,7 +235,7 @@ class RotaryCranks:
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        return mean_radius(geometry["platform"])
+        return mean_radius(geometry, "platform")
 
 
 def _cosine_and_sine(geometry: Geometry | GeometryBatch, joints: Array) -> tuple[Array, Array]:

@@ -194,7 +194,7 @@ class SixRails:
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        return mean_radius(geometry["B"])
+        return mean_radius(geometry, "B")
 
 
 def six_rails_geometry(S: ArrayLike, rail: ArrayLike, B: ArrayLike, l: ArrayLike) -> Geometry:  # noqa: E741

@@ -27,7 +27,15 @@ from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.length_result import LengthMeasurements, LengthResult, length_check
-from hexacell.reporting.model_evidence import ModelTest, confirmed, fails_narrowly, model_tests
+from hexacell.reporting.model_evidence import (
+    ZEROS_DOUBTED,
+    ModelTest,
+    confirmed,
+    doubts_zeros,
+    fails_narrowly,
+    model_tests,
+    with_zeros_doubted,
+)
 from hexacell.reporting.result import IdentificationResult
 from hexacell.robot_model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
@@ -162,6 +170,8 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
     if held_out.confirming is not None:
         updated = update(updated, robot.problem(held_out.confirming))
         tests = confirmed(tests, updated, np.isin(updated.problem.labels[:, 0], held_out.confirming.points))
+    if settings.encoders.are_of_controller and settings.controller.joints_include_zeros:
+        tests = with_zeros_doubted(tests)
     accuracy = verified_accuracy(settings, robot, found, updated, held_out.length)
     tests = (*tests, *_length_test(accuracy))
     worse = is_worse(before, after, _noise_in_mm(robot, updated))
@@ -215,7 +225,8 @@ def reason_of(verified: Verification) -> str:
     """Why a verdict is not that of the stated error."""
     failed = [test.sentence for test in verified.tests if not test.passed]
     if verified.is_worse:
-        return "worse than before"
+        doubt = f"; {ZEROS_DOUBTED.rstrip('.')}" if doubts_zeros(verified.tests) else ""
+        return f"worse than before{doubt}"
     if verified.verdict is Verdict.NOT_EVALUATED and failed:
         return failed[0].rstrip(".")
     if verified.verdict is Verdict.NOT_EVALUATED and verified.accuracy is not None:

@@ -14,6 +14,7 @@ from hexacell.application.calibration_run import preflight
 from hexacell.application.device_setup import open_devices
 from hexacell.cell.loader import Cell
 from hexacell.errors import DeviceError, ExitCode, WriteBackUndone
+from hexacell.reporting.model_evidence import ZEROS_DOUBTED
 from procedures.calibration.workflow import Mode
 from procedures.run import events
 from procedures.run.trips import Guard, GuardTripped
@@ -167,5 +168,8 @@ async def test_zeros_that_the_controller_does_not_run_are_not_calibrated_with(ma
         text.replace("[0.0, -155.0, 0.0],  # leg 1", "[0.5, -155.0, 0.0],  # leg 1")
     )
     edited = site.config
-    assert (await site.calibrate()).exit_code == ExitCode.OUT_OF_LIMITS
+    ended = await site.calibrate()
+    assert ended.exit_code == ExitCode.OUT_OF_LIMITS
+    assert "(The held-out records are " in ended.line
+    assert ZEROS_DOUBTED.rstrip(".") in ended.line
     assert site.config == edited

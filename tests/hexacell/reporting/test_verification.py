@@ -19,9 +19,11 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import MeasurementSet
 from hexacell.presentation.verification import verification_text
+from hexacell.reporting.model_evidence import ZEROS_DOUBTED
 from hexacell.reporting.result import IdentificationResult
-from hexacell.reporting.verification import HeldOut, Verification, outcome_line, verify
+from hexacell.reporting.verification import HeldOut, Verification, outcome_line, reason_of, verify
 from hexacell.robot_model import Robot, robot_of
+from tests.small_cell import changed
 
 NOISE_MM = 0.01
 FAR = [(3.0, 2.0, -1.0), (2.0, 2.0, 2.0)]
@@ -56,6 +58,13 @@ def held_out(visit):
         return HeldOut(MeasurementSet(records), before, after, left_travel)
 
     return measure
+
+
+@pytest.fixture
+def bent(paper):
+    """A machine two of whose legs have other lengths."""
+    lengths = paper.actual["l"] + np.array([0.4, 0.0, 0.0, -0.4, 0.0, 0.0])
+    return type(paper.actual).of(paper.actual.parameters, {**paper.actual.document(), "l": lengths})
 
 
 def test_a_good_result_passes_and_its_true_error_is_within_u(cell, result, held_out, paper):
@@ -121,9 +130,7 @@ def test_what_cannot_be_taught_adds_to_u(cell, result, held_out):
     assert shifted > about_z > free
 
 
-def test_held_out_records_that_were_not_predicted_are_no_evidence(cell, result, held_out, paper):
-    lengths = paper.actual["l"] + np.array([0.4, 0.0, 0.0, -0.4, 0.0, 0.0])
-    bent = type(paper.actual).of(paper.actual.parameters, {**paper.actual.document(), "l": lengths})
+def test_held_out_records_that_were_not_predicted_are_no_evidence(cell, result, held_out, bent):
     verified = verified_by(cell, result, held_out(bent))
     assert verified.verdict in {Verdict.NOT_EVALUATED, Verdict.FAIL, Verdict.CONDITIONAL_FAIL}
     failed = [test for test in verified.tests if not test.passed]
@@ -135,6 +142,28 @@ def test_held_out_records_that_were_not_predicted_are_no_evidence(cell, result, 
 def test_significantly_worse_is_a_fail_that_nobody_is_offered(cell, result, held_out):
     verified = verified_by(cell, result, held_out(before=NEAR, after=FAR))
     assert (verified.verdict, verified.is_worse, verified.is_offered) == (Verdict.FAIL, True, False)
+
+
+@pytest.mark.parametrize("is_worse", [False, True])
+def test_zeros_that_may_not_run_are_named_where_the_controller_reads_the_encoders(
+    cell, result, held_out, bent, is_worse
+):
+    measured = held_out(bent, before=NEAR if is_worse else FAR, after=FAR if is_worse else NEAR)
+    told = []
+    for protocol, includes_zeros in [("controller", True), ("controller", False), ("canopen", True)]:
+        changes = {"encoders.protocol": protocol, "controller.joints_include_zeros": includes_zeros}
+        settings = changed(cell.settings, changes)
+        verified = verified_by(replace(cell, settings=settings), result, measured)
+        assert verified.is_worse == is_worse
+        told.append(ZEROS_DOUBTED.rstrip(".") in reason_of(verified))
+    assert told == [True, False, False]
+
+
+def test_zeros_are_not_doubted_where_the_held_out_records_agree(cell, result, held_out):
+    changes = {"encoders.protocol": "controller", "controller.joints_include_zeros": True}
+    settings = changed(cell.settings, changes)
+    worse = verified_by(replace(cell, settings=settings), result, held_out(before=NEAR, after=FAR))
+    assert reason_of(worse) == "worse than before"
 
 
 def test_a_ball_that_left_its_plates_is_a_fail_that_nobody_is_offered(cell, result, held_out):

@@ -7,12 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hexacell.application.held_config import held_config
+from hexacell.application.proposals import COMMAND
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import diff_of_files
 from hexacell.controller_config.contents import Contents, are_same_files, fingerprint_of, read_contents
 from hexacell.controller_config.receipt import AFTER, BEFORE, Receipt
 from hexacell.controller_config.three_way import ConfigEditedSince, compare_versions
 from hexacell.controller_config.write_back import restore
+from hexacell.controller_config.write_record import (
+    Recording,
+    WriteCause,
+    WriteKind,
+    recorded_write,
+    stated_reason,
+)
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.robot_model import config_layout
 from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
@@ -29,24 +37,31 @@ class ConfigRollback:
         undone: the run whose geometry the config had; none where it had that of before all runs.
         restored: the files in a run folder that the config is a copy of now.
         change: the change of the text, as a unified diff; empty where nothing had to be written.
+        unrecorded: why the history has no record of it, in a sentence; empty if it has.
     """
 
     paths: tuple[Path, ...]
     undone: Path | None
     restored: tuple[Path, ...]
     change: str
+    unrecorded: str = ""
 
 
-def roll_back_config(cell: Cell, to: str | None = None) -> ConfigRollback:
+def roll_back_config(
+    cell: Cell, to: str | None = None, *, by: str = COMMAND, reason: str = ""
+) -> ConfigRollback:
     """Undo the latest write into the config, or restore what the run ``to`` wrote.
 
+    ``by`` is who decided on it, ``reason`` why, as the history of the config is to have both.
+
     Raises:
-        UsageError: nothing is to be undone, there is no such run, or it wrote nothing.
+        UsageError: nothing is to be undone, there is no such run, or it wrote nothing; or ``reason`` is no
+            line of text.
         ConfigEditedSince: the config was edited since it was written.
         CellBusy: the cell is in use.
         FileError: a file cannot be read or written, or the kept one is damaged.
     """
-    paths = cell.config_paths
+    paths, reason, recording = cell.config_paths, stated_reason(reason), Recording()
     with held_config(*cell.config_paths):
         receipts = list(_receipts(cell))
         found = read_contents(paths)
@@ -57,9 +72,19 @@ def roll_back_config(cell: Cell, to: str | None = None) -> ConfigRollback:
             restored, contents = _files_before(cell, undone, receipts)
         _require_known(cell, receipts, found)
         if contents != found:
-            restore(paths, contents, expected=found)
+            cause = _cause(restored[0], undone, to=to, by=by, reason=reason)
+            with recorded_write(runs_folder(cell), paths, config_layout(cell.settings), cause) as recording:
+                restore(paths, contents, expected=found)
     change = diff_of_files(paths, found, contents)
-    return ConfigRollback(paths, None if undone is None else undone.backup_folder, restored, change)
+    folder = None if undone is None else undone.backup_folder
+    return ConfigRollback(paths, folder, restored, change, recording.problem)
+
+
+def _cause(restored: Path, undone: Receipt | None, *, to: str | None, by: str, reason: str) -> WriteCause:
+    run = restored.parent.name
+    what = f"as {run} wrote it" if to is not None else f"as it was before {run}"
+    instead = "" if undone is None or to is None else f", in place of {undone.backup_folder.name}"
+    return WriteCause(WriteKind.ROLLED_BACK, by, run, f"by hand, {what}{instead}", reason)
 
 
 def _receipts(cell: Cell) -> Iterator[Receipt]:

@@ -16,6 +16,7 @@ from hexacell.controller_config.contents import are_same_files, fingerprint
 from hexacell.controller_config.layout import ConfigLayout
 from hexacell.controller_config.three_way import ConfigEditedSince, compare_versions
 from hexacell.controller_config.write_back import commit
+from hexacell.controller_config.write_record import WriteCause, WriteKind, recorded_write, stated_reason
 from hexacell.decision import Verdict
 from hexacell.errors import FileError, LimitError, UsageError
 from hexacell.kinematics.geometry import Geometry
@@ -63,10 +64,16 @@ class Proposal:
 
 @dataclass(frozen=True, slots=True)
 class AppliedProposal:
-    """A proposal that the config has now; ``by`` is who had it written, empty if it was there already."""
+    """A proposal that the config has now.
+
+    Attributes:
+        by: who had it written, empty if it was there already.
+        unrecorded: why the history has no record of it, in a sentence; empty if it has.
+    """
 
     proposal: Proposal
     by: str
+    unrecorded: str = ""
 
 
 def read_proposal(folder: RunFolder) -> Proposal:
@@ -107,7 +114,7 @@ def approval_question(proposal: Proposal) -> Question:
 
 
 async def apply_proposal(
-    proposal: Proposal, operator: Operator, *, typed_by: str = COMMAND
+    proposal: Proposal, operator: Operator, *, typed_by: str = COMMAND, reason: str = ""
 ) -> AppliedProposal:
     """Write a proposal into the controller's config, once a person has accepted what needs one.
 
@@ -115,14 +122,16 @@ async def apply_proposal(
         proposal: of a run of the cell.
         operator: who is asked where a gate needs a person.
         typed_by: who approves where none does.
+        reason: why, as the history of the config is to have it.
 
     Raises:
+        UsageError: ``reason`` is no line of text.
         LimitError: a gate refuses it, or the person declined.
         AnswerNeeded: a person must accept it, and nobody is there.
         ConfigEditedSince: the config was edited since the run began.
         CellBusy, FileError, WriteBackUndone: see :func:`~hexacell.controller_config.write_back.commit`.
     """
-    change = proposal.change
+    change, reason = proposal.change, stated_reason(reason)
     with held_config(*change.paths):
         if fingerprint(*change.paths) == change.sha256_after:
             return AppliedProposal(proposal, "")
@@ -130,12 +139,15 @@ async def apply_proposal(
         by = await _approval(proposal, operator, typed_by)
         approval = LaterApproval(by=by, at=now()[0], sha256_after=change.sha256_after)
         approval.save(_approval_path(proposal.folder), like=change.path)
+        cause = WriteCause(WriteKind.APPLIED, by, proposal.folder.name, _outcome(proposal.state), reason)
+        folder, layout = proposal.folder.siblings, proposal.layout
         try:
-            commit(change, proposal.folder.path)
+            with recorded_write(folder, change.paths, layout, cause) as recording:
+                commit(change, proposal.folder.path)
         except BaseException:
             _approval_path(proposal.folder).unlink(missing_ok=True)
             raise
-    return AppliedProposal(proposal, by)
+    return AppliedProposal(proposal, by, recording.problem)
 
 
 def later_approval(folder: RunFolder) -> LaterApproval | None:
@@ -157,6 +169,11 @@ async def _approval(proposal: Proposal, operator: Operator, typed_by: str) -> st
     if (name := await operator.ask(approval_question(proposal))) is None:
         raise LimitError("the new geometry was declined; nothing was applied")
     return name
+
+
+def _outcome(state: RunState) -> str:
+    """What the run itself said of the geometry."""
+    return "not verified by its run" if state.judged is None else state.judged.line
 
 
 def _verification_gate(state: RunState) -> AcceptanceGate:

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from hexacell.application.config_history import ConfigHistory, ConfigWrite
 from hexacell.application.config_rollback import ConfigRollback
 from hexacell.application.proposals import AppliedProposal
+from hexacell.controller_config.contents import names_of
 from hexacell.controller_config.receipt import BEFORE, kept_paths
 from hexacell.controller_config.three_way import ConfigVersions, NumberVersions
+from hexacell.controller_config.write_record import WriteKind, WriteRecord
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.teaching import teaching_line
 
@@ -29,6 +32,7 @@ def applied_text(applied: AppliedProposal) -> str:
             *teaching,
             wrapped(RELOAD),
             f"`hexacell rollback` undoes it; the old config is {files_named(kept)}.",
+            *_unrecorded_lines(applied.unrecorded),
         )
     )
 
@@ -41,7 +45,62 @@ def rollback_text(done: ConfigRollback) -> str:
     undone = "" if done.undone is None else f", which undoes the run {done.undone.name}"
     copies = zip(done.paths, done.restored, strict=True)
     back = ",\n".join(f"{path} is {copy} again" for path, copy in copies)
-    return f"{done.change}\n{back}, bit for bit{undone}.\n{wrapped(RELOAD)}"
+    lines = (done.change, f"{back}, bit for bit{undone}.", wrapped(RELOAD))
+    return "\n".join([*lines, *_unrecorded_lines(done.unrecorded)])
+
+
+def _unrecorded_lines(problem: str) -> list[str]:
+    return [wrapped(problem)] if problem else []
+
+
+NO_WRITES = "No run of this cell wrote its config."
+
+_TOLD = {
+    WriteKind.RESULT: "the result of {run} written",
+    WriteKind.APPLIED: "the proposal of {run} applied",
+    WriteKind.ROLLED_BACK: "rolled back",
+    WriteKind.TAKEN_BACK: "the result of {run} taken back by itself",
+    WriteKind.PROVISIONAL: "a provisional geometry of {run} written",
+    WriteKind.PROVISIONAL_TAKEN_BACK: "the provisional geometry of {run} taken back by itself",
+}
+
+
+def config_history_text(found: ConfigHistory) -> str:
+    """Each write into the config, the newest first: when and what; then who, how much and why."""
+    if not found.writes:
+        return NO_WRITES
+    return "\n".join(_write_text(one) for one in found.writes)
+
+
+def _write_text(write: ConfigWrite) -> str:
+    one = write.record
+    head = f"{one.at:%Y-%m-%d %H:%M:%S}  {_TOLD[one.kind].format(run=one.run)}"
+    parts = [
+        _who(one),
+        _how_much(one),
+        write.why or "no verdict on it is known",
+        f'given as the reason: "{one.reason}"',
+    ]
+    stated = parts if one.reason else parts[:-1]
+    return "\n".join([wrapped(head, indent=2), *(wrapped(f"  {part}", indent=4) for part in stated)])
+
+
+def _who(one: WriteRecord) -> str:
+    process = f", as {one.user} on {one.host}" if one.user else ""
+    return f"by {one.by}{process}"
+
+
+def _how_much(one: WriteRecord) -> str:
+    files = files_named([Path(name) for name in names_of(one.files)])
+    if one.numbers_changed is None:
+        return f"{files}: how many numbers is not known"
+    plural = "" if one.numbers_changed == 1 else "s"
+    told = f"{files}: {one.numbers_changed} number{plural}"
+    if one.largest is None:
+        return told
+    return (
+        f"{told}, most of all {one.largest.name} by {one.largest.change:+.4f} {one.largest.unit}".rstrip()
+    )
 
 
 def files_named(paths: Sequence[Path], verb: str = "", verb_of_several: str = "") -> str:

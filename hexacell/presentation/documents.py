@@ -8,6 +8,7 @@ from typing import Any
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.application.calibration_run import RunRequest
+from hexacell.application.config_history import ConfigHistory, ConfigWrite
 from hexacell.application.config_rollback import ConfigRollback
 from hexacell.application.drift_history import DriftHistory, FoundChange
 from hexacell.application.evidence_comparison import EvidenceComparison
@@ -171,6 +172,7 @@ def applied_document(applied: AppliedProposal) -> dict[str, Any]:
         "run": str(applied.proposal.folder.path),
         "sha256": change.sha256_after,
         "teach": None if moved is None else teaching_sentence(moved),
+        "recorded": not applied.unrecorded,
     }
 
 
@@ -182,6 +184,34 @@ def rollback_document(done: ConfigRollback) -> dict[str, Any]:
         "further_configs": [str(path) for path in done.paths[1:]],
         "from": str(done.restored[0]),
         "undone": None if done.undone is None else str(done.undone),
+        "recorded": not done.unrecorded,
+    }
+
+
+def config_history_document(found: ConfigHistory) -> dict[str, Any]:
+    """What ``history --changes --json`` prints: the writes, the newest first."""
+    return {"changes": [_write_document(one) for one in found.writes], "damaged_lines": list(found.damaged)}
+
+
+def _write_document(write: ConfigWrite) -> dict[str, Any]:
+    one = write.record
+    return {
+        "at": one.at.isoformat(),
+        "kind": one.kind.value,
+        "by": one.by,
+        "user": one.user or None,
+        "host": one.host or None,
+        "run": one.run or None,
+        "config": str(one.files[0]),
+        "further_configs": [str(path) for path in one.files[1:]],
+        "sha256_before": one.sha256_before or None,
+        "sha256_after": one.sha256_after or None,
+        "numbers_changed": one.numbers_changed,
+        "largest": None if one.largest is None else one.largest.model_dump(),
+        "verdict": None if write.verdict is None else write.verdict.value,
+        "why": write.why or None,
+        "reason": one.reason or None,
+        "recorded": write.is_recorded,
     }
 
 

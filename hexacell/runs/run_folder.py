@@ -33,6 +33,16 @@ class RunFolder:
     path: Path
 
     @property
+    def name(self) -> str:
+        """What the run is called among those of its cell."""
+        return self.path.absolute().name
+
+    @property
+    def siblings(self) -> Path:
+        """The folder that it is in: that of all runs of its cell."""
+        return self.path.absolute().parent
+
+    @property
     def journal(self) -> Path:
         """The run itself; all else can be derived from it."""
         return self.path / JOURNAL

@@ -152,7 +152,7 @@ def _note(descriptor: int, text: str) -> None:
 def _this_process() -> str:
     """The note of this process as the holder from now on; ``since`` is local time, ISO 8601."""
     since = datetime.now(UTC).astimezone().isoformat(timespec="seconds")
-    holder = {"pid": os.getpid(), "user": _user(), "host": socket.gethostname(), "since": since}
+    holder = {"pid": os.getpid(), "user": user_name(), "host": socket.gethostname(), "since": since}
     return json.dumps(holder) + "\n"
 
 
@@ -179,7 +179,8 @@ def _is_alive(note: dict[str, object]) -> bool:
     return True
 
 
-def _user() -> str:
+def user_name() -> str:
+    """Who runs this process; by number where the name is not known."""
     try:
         return getpass.getuser()
     except (KeyError, OSError):

@@ -8,7 +8,8 @@ applies a change, another reverts it::
     result        commit        roll back      <run>
 
 A transaction is begun in the journal by its step, written with a receipt that can undo it, read by the
-controller, and confirmed in the journal by its event. If the controller does not read a new geometry,
+controller, and confirmed in the journal by its event; each write of the file leaves a record beside the run
+folders (:mod:`~hexacell.controller_config.write_record`). If the controller does not read a new geometry,
 the file is restored before the error is raised. A crash or a cancellation in between leaves a whole file,
 old or new, and the receipt; applying and reverting may both be repeated from there.
 
@@ -19,6 +20,9 @@ carries out both.
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,6 +31,7 @@ from hexacell.controller_config.change import ConfigChange, propose
 from hexacell.controller_config.contents import fingerprint
 from hexacell.controller_config.receipt import RECEIPT, Receipt
 from hexacell.controller_config.write_back import commit, rollback
+from hexacell.controller_config.write_record import THE_RUN, WriteCause, WriteKind, recorded_write
 from hexacell.errors import AnswerNeeded, HexacellError, Interruption, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot_model import config_layout
@@ -41,6 +46,8 @@ from procedures.run.questions import Operator, ask_acceptance, ask_approval
 from procedures.run.state import RunState
 from procedures.run.steps import Compute
 from procedures.run.trips import may_still_move
+
+_log = logging.getLogger(__name__)
 
 TAKE_BACK = Compute(kind="take back")
 ROLL_BACK = Compute(kind="roll back")
@@ -78,7 +85,7 @@ class ConfigTransactions:
         await self._apply(
             await in_thread(self.change_to, self.calibration.robot.for_controller(geometry), state),
             self._provisional_backup,
-            "the provisional geometry",
+            self._cause(WriteKind.PROVISIONAL, "to measure the remaining points with it"),
             action="Correct that, or run without `provisional`",
         )
         return events.ProvisionalApplied(geometry=geometry.document(), folder=PROVISIONAL_FOLDER)
@@ -91,7 +98,8 @@ class ConfigTransactions:
             raise LimitError("the new geometry is refused: " + " ".join(refused))
         change = ConfigChange.load(self.folder.proposal)
         approved_by = await self._approval(state, change)
-        await self._apply(change, self.folder.path, "the new geometry")
+        cause = self._cause(WriteKind.RESULT, "its result, to be verified", by=approved_by)
+        await self._apply(change, self.folder.path, cause)
         return events.Committed(approved_by=approved_by)
 
     async def _approval(self, state: RunState, change: ConfigChange) -> str:
@@ -111,18 +119,40 @@ class ConfigTransactions:
         return name
 
     async def _apply(
-        self, change: ConfigChange, backup: Path, name: str, action: str | None = None
+        self, change: ConfigChange, backup: Path, cause: WriteCause, action: str | None = None
     ) -> None:
-        receipt = await in_thread(commit, change, backup)
+        receipt = await in_thread(self._commit, change, backup, cause)
         try:
             await self.startup.reload()
         except HexacellError as error:
-            await in_thread(rollback, receipt)
+            kind = _UNDOES[cause.kind]
+            undoing = self._cause(kind, f"the controller did not take it: {error}")
+            await in_thread(self._roll_back, receipt, undoing)
             raise WriteBackUndone(
-                f"the controller did not take {name} ({error}); its config is restored",
+                f"the controller did not take {_NAMES[cause.kind]} ({error}); its config is restored",
                 subject=receipt.path,
                 action=action if await self._reads_again() else "Restart the controller before it moves",
             ) from error
+
+    def _commit(self, change: ConfigChange, backup: Path, cause: WriteCause) -> Receipt:
+        with self._recorded(cause):
+            return commit(change, backup)
+
+    def _roll_back(self, receipt: Receipt, cause: WriteCause) -> None:
+        with self._recorded(cause):
+            rollback(receipt)
+
+    @contextmanager
+    def _recorded(self, cause: WriteCause) -> Iterator[None]:
+        """Record a write; where that fails the run goes on, with a warning: its journal has the write."""
+        layout = config_layout(self.cell.settings)
+        with recorded_write(self.folder.siblings, self.cell.config_paths, layout, cause) as recording:
+            yield
+        if recording.problem:
+            _log.warning("%s", recording.problem)
+
+    def _cause(self, kind: WriteKind, why: str, *, by: str = THE_RUN) -> WriteCause:
+        return WriteCause(kind, by, self.folder.name, why)
 
     async def _reads_again(self) -> bool:
         """Reload the restored config; whether the controller is known to have its old geometry."""
@@ -136,7 +166,8 @@ class ConfigTransactions:
         """Give the controller the geometry of before the provisional one."""
         written = holds_provisional(self.folder, self.cell.config_paths)
         if written:
-            await in_thread(rollback, Receipt.of(self._provisional_backup))
+            cause = self._cause(WriteKind.PROVISIONAL_TAKEN_BACK, "it was to be used in the run alone")
+            await in_thread(self._roll_back, Receipt.of(self._provisional_backup), cause)
         elif state.started and fingerprint(*self.cell.config_paths) != state.started.config_sha256:
             raise edited(self.cell.config_path)
         try:
@@ -148,7 +179,8 @@ class ConfigTransactions:
                 robot = self.calibration.robot
                 provisional = robot.for_controller(geometry_of(state.provisional, robot))
                 change = await in_thread(self.change_to, provisional, state)
-                await in_thread(commit, change, self._provisional_backup)
+                cause = self._cause(WriteKind.PROVISIONAL, "the controller does not take the old one here")
+                await in_thread(self._commit, change, self._provisional_backup, cause)
             raise
         return events.ProvisionalReverted()
 
@@ -164,15 +196,31 @@ class ConfigTransactions:
             return events.ResultAccepted(by=None, asked=False)
         return events.ResultAccepted(by=name)
 
-    async def revert_result(self) -> events.RolledBack:
+    async def revert_result(self, state: RunState) -> events.RolledBack:
         """Give the controller the geometry of before the run."""
-        await in_thread(rollback, Receipt.of(self.folder.path))
+        cause = self._cause(WriteKind.TAKEN_BACK, reason_to_take_back(state))
+        await in_thread(self._roll_back, Receipt.of(self.folder.path), cause)
         await self.startup.reload()
         return events.RolledBack()
 
     @property
     def _provisional_backup(self) -> Path:
         return self.folder.path / PROVISIONAL_FOLDER
+
+
+_NAMES = {WriteKind.RESULT: "the new geometry", WriteKind.PROVISIONAL: "the provisional geometry"}
+_UNDOES = {
+    WriteKind.RESULT: WriteKind.TAKEN_BACK,
+    WriteKind.PROVISIONAL: WriteKind.PROVISIONAL_TAKEN_BACK,
+}
+
+
+def reason_to_take_back(state: RunState) -> str:
+    """Why a written result does not stay."""
+    if state.judged is None:
+        return "it could not be verified"
+    nobody = state.accepted is not None and state.accepted.by is None
+    return f"nobody kept it: {state.judged.line}" if nobody else state.judged.line
 
 
 def holds_provisional(folder: RunFolder, config: tuple[Path, ...]) -> bool:

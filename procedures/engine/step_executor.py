@@ -325,7 +325,7 @@ class StepExecutor:
             case "accept":
                 return await self.config.ask_whether_kept(state)
             case "roll back":
-                return await self.config.revert_result()
+                return await self.config.revert_result(state)
 
 
 def _reading(

@@ -7,6 +7,7 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+from hexacell.controller_config.write_record import RECORDS
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 
@@ -110,7 +111,8 @@ class CellFolder:
         }
 
     def runs(self) -> list[Path]:
-        return sorted((self.path / "runs" / "simulated-hexaglide").glob("*"))
+        found = (self.path / "runs" / "simulated-hexaglide").glob("*")
+        return sorted(path for path in found if path.name != RECORDS)
 
     def rewound(self, run: Path, before: str) -> Path:
         """A run of this cell that got as far as ``run`` before a step."""

@@ -17,8 +17,8 @@ from tests.hexacell.controller_config.test_keyed_formats import write_hal, write
 GRAVE = AcceptanceGate(
     name="within tolerance", passed=False, sentence="Beyond: S1x.", needs_person=True, needs_cell_name=True
 )
-KEYS_APPLIED = {"applied", "by", "config", "further_configs", "run", "sha256", "teach"}
-KEYS_RESTORED = {"restored", "config", "further_configs", "from", "undone"}
+KEYS_APPLIED = {"applied", "by", "config", "further_configs", "run", "sha256", "teach", "recorded"}
+KEYS_RESTORED = {"restored", "config", "further_configs", "from", "undone", "recorded"}
 
 
 @dataclass(frozen=True)

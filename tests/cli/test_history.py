@@ -8,6 +8,7 @@ import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.controller_config.write_back import commit
+from hexacell.controller_config.write_record import RECORDS
 from tests.hexacell.application.proposed_runs import propose_run
 from tests.hexacell.application.recorded_nights import Nights
 from tests.hexacell.application.test_history import identified
@@ -145,3 +146,49 @@ def test_a_check_is_compared_by_its_records(cell, typed_here) -> None:
     assert set(document) == {"before", "after", "changed", "leg", "limit", "causes"}
     assert set(document["causes"][0]) == {"name", "unit", "leg", "change", "sigma", "score"}
     json.dumps(document, allow_nan=False)
+
+
+def test_every_write_into_the_config_is_listed(cell, typed_here) -> None:
+    assert typed_here("history", cell.path, "--changes").out == "No run of this cell wrote its config.\n"
+    run = propose_run(cell)
+    assert typed_here("apply", run.folder.path, "--reason", "new fixture").code == 0
+    assert typed_here("rollback", cell.path).code == 0
+    listed = typed_here("history", cell.path, "--changes")
+    heads = [line[21:] for line in listed.out.splitlines() if not line.startswith(" ")]
+    assert heads == ["rolled back", "the proposal of 2026-11-20T100000Z applied"]
+    assert all(len(line) <= 80 for line in listed.out.splitlines())
+    assert '  given as the reason: "new fixture"' in listed.out
+    document = typed_here("history", cell.path, "--changes", "--json").document
+    assert set(document) == {"changes", "damaged_lines"}
+    back, applied = document["changes"]
+    assert set(applied) == {
+        "at", "kind", "by", "user", "host", "run", "config", "further_configs", "sha256_before",
+        "sha256_after", "numbers_changed", "largest", "verdict", "why", "reason", "recorded",
+    }  # fmt: skip
+    assert (back["kind"], applied["kind"], applied["reason"]) == ("rolled back", "applied", "new fixture")
+    assert set(applied["largest"]) == {"name", "change", "unit"}
+    refused = typed_here("rollback", cell.path, "--reason", "two\nlines")
+    assert (refused.code, "one line" in refused.err) == (2, True)
+
+
+def test_a_damaged_record_is_warned_about(cell, typed_here) -> None:
+    run = propose_run(cell)
+    typed_here("apply", run.folder.path)
+    with (run.folder.siblings / RECORDS).open("ab") as stream:
+        stream.write(b'{"version":1,"at":"2026')
+    listed = typed_here("history", cell.path, "--changes")
+    assert (listed.code, "applied" in listed.out, "line 2: this record is torn" in listed.err) == (
+        0,
+        True,
+        True,
+    )
+
+
+def test_a_write_without_a_record_is_told_in_a_line(cell, typed_here) -> None:
+    run = propose_run(cell)
+    (run.folder.siblings / RECORDS).mkdir()
+    applied = typed_here("apply", run.folder.path)
+    assert (applied.code, cell.config_path.read_bytes()) == (0, run.after)
+    assert "the history has no record of it" in " ".join(applied.out.split())
+    back = typed_here("rollback", cell.path, "--json")
+    assert (back.code, back.document["recorded"], cell.config_path.read_bytes()) == (0, False, run.before)

@@ -58,7 +58,7 @@ def make_templates(folder: Path) -> Templates:
     """Sound cells in a folder: one is calibrated for it, among few poses."""
     small = _small(folder / "small")
     assert main(["run", str(small / CELL), "--unattended", "--mode", "optimise"]) in {0, 1}
-    [run] = (small / RUN).parent.iterdir()
+    [run] = (small / RUN).parent.glob("2*")
     run.rename(small / RUN)
     shutil.copy(small / RUN / "measurements.csv", small / RECORDS)
     plain = folder / "plain"

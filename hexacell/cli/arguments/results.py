@@ -5,7 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hexacell.cli.arguments.commands import add_archive, add_cell, add_command, add_file, add_json, add_run
+from hexacell.cli.arguments.commands import (
+    Parser,
+    add_archive,
+    add_cell,
+    add_command,
+    add_file,
+    add_json,
+    add_run,
+)
 
 
 def add_result_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
@@ -21,6 +29,7 @@ def _apply(commands: Any) -> None:  # noqa: ANN401
         commands, "apply", "write the proposal of a run into the controller's config", "config.apply_run"
     )
     add_run(parser)
+    _add_reason(parser)
     add_json(parser)
 
 
@@ -34,15 +43,22 @@ def _rollback(commands: Any) -> None:  # noqa: ANN401
         metavar="RUN",
         help="restore what this run wrote, by its folder or name (default: undo the latest write)",
     )
+    _add_reason(parser)
     add_json(parser)
+
+
+def _add_reason(parser: Parser) -> None:
+    parser.add_argument(
+        "--reason", default="", metavar="TEXT", help="why, for `history --changes`: one line of text"
+    )
 
 
 def _history(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "history", "list the runs of a cell, compare two, see what drifts")
     parser.usage = (
         "hexacell history [-h] [--compare RUN RUN | --show RUN | --refit RUN |\n"
-        "                        --keep DAYS [--delete] | --drift] [--archive URL]\n"
-        "                        [--json] [CELL]"
+        "                        --keep DAYS [--delete] | --drift | --changes]\n"
+        "                        [--archive URL] [--json] [CELL]"
     )  # argparse does not break a group
     parser.add_argument(
         "cell", type=Path, nargs="?", metavar="CELL", help="the cell file; without it all of --archive"
@@ -65,6 +81,11 @@ def _history(commands: Any) -> None:  # noqa: ANN401
         help="which runs that ended before may be deleted; those that wrote the config never may",
     )
     what.add_argument("--drift", action="store_true", help="the trend of every parameter over all runs")
+    what.add_argument(
+        "--changes",
+        action="store_true",
+        help="every write into the controller's config: when, who, what and why",
+    )
     parser.add_argument("--delete", action="store_true", help="with --keep: delete those")
     add_archive(
         parser, "the index over the runs: postgresql://user@host/database (default: as [archive] has it)"

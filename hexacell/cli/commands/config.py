@@ -29,7 +29,7 @@ def apply_run(options: argparse.Namespace) -> ExitCode:
         console.warn(settled)
     operator = TerminalOperator(console) if is_interactive() else UnattendedOperator()
     with _edits_shown(console):
-        applied = asyncio.run(apply_proposal(proposal, operator))
+        applied = asyncio.run(apply_proposal(proposal, operator, reason=options.reason))
     console.document(applied_document(applied))
     console.print(applied_text(applied))
     return ExitCode.DONE
@@ -39,7 +39,7 @@ def rollback_config(options: argparse.Namespace) -> ExitCode:
     """Undo the latest write, or restore what a run wrote."""
     console = Console(options.json)
     with _edits_shown(console):
-        done = roll_back_config(cell_at(options.cell, console), options.to)
+        done = roll_back_config(cell_at(options.cell, console), options.to, reason=options.reason)
     console.document(rollback_document(done))
     console.print(rollback_text(done))
     return ExitCode.DONE

@@ -1,10 +1,11 @@
-"""``hexacell history``: the runs of a cell, two of them compared, and what drifts."""
+"""``hexacell history``: the runs of a cell, two of them compared, what drifts, and writes of its config."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
 
+from hexacell.application.config_history import config_history
 from hexacell.application.drift_history import drift_history
 from hexacell.application.evidence_comparison import compare_evidence
 from hexacell.application.fleet import fleet_runs
@@ -18,8 +19,10 @@ from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.presentation.changes import evidence_comparison_text, watch_text
+from hexacell.presentation.config_changes import config_history_text
 from hexacell.presentation.documents import (
     comparison_document,
+    config_history_document,
     drift_document,
     evidence_comparison_document,
     history_document,
@@ -55,6 +58,8 @@ def main(options: argparse.Namespace) -> ExitCode:
         console.print(refit_text(refitted))
     elif options.keep is not None:
         _keep(cell, options, console)
+    elif options.changes:
+        _changes(cell, console)
     elif options.drift:
         index = _index(cell, options, console)
         found, watched = parameter_trends(cell, past_runs(cell, index), index), drift_history(cell, index)
@@ -75,8 +80,9 @@ def _index(cell: Cell, options: argparse.Namespace, console: Console) -> RunInde
 
 def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
     """The runs of all cells of an archive."""
-    others = (options.compare, options.show, options.refit, options.keep, options.drift or None)
-    if options.archive is None or any(one is not None for one in others):
+    named = (options.compare, options.show, options.refit, options.keep)
+    is_one_cells = options.drift or options.changes or any(one is not None for one in named)
+    if options.archive is None or is_one_cells:
         raise UsageError("no cell is named", action="Name a cell file, or --archive URL for all")
     runs = fleet_runs(archive_url(options.archive))
     console.document(fleet_history_document(runs))
@@ -93,6 +99,15 @@ def _keep(cell: Cell, options: argparse.Namespace, console: Console) -> None:
         delete_runs(cell, found.leaving)
     console.document(retention_document(found, is_deleted=options.delete))
     console.print(retention_text(found, is_deleted=options.delete))
+
+
+def _changes(cell: Cell, console: Console) -> None:
+    """Every write into the config."""
+    found = config_history(cell)
+    for line in found.damaged:
+        console.warn(f"{found.path}, line {line}: this record is torn, damaged or newer, and left out")
+    console.document(config_history_document(found))
+    console.print(config_history_text(found))
 
 
 def _show(run: RunFolder, console: Console) -> None:

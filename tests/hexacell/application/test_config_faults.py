@@ -16,6 +16,7 @@ from hexacell.application.proposals import apply_proposal, read_proposal
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.receipt import RECEIPT
 from hexacell.controller_config.write_back import commit
+from hexacell.controller_config.write_record import RECORDS
 from hexacell.storage.cell_lock import cell_lock
 from procedures.run.questions import UnattendedOperator
 from tests.hexacell.application.proposed_runs import ProposedRun, a_cell, propose_run
@@ -77,6 +78,7 @@ def test_a_proposal_is_applied_whole_or_not_at_all(cell, stride: int) -> None:
 
     def prepare() -> None:
         cell.config_path.write_bytes(run.before)
+        (run.folder.siblings / RECORDS).unlink(missing_ok=True)
         for name in ("applied.json", RECEIPT, "config-before", "config-after"):
             (run.folder.path / name).unlink(missing_ok=True)
 
@@ -94,6 +96,7 @@ def test_a_rollback_is_whole_or_not_at_all(cell, to, stride: int) -> None:
 
     def prepare() -> None:
         cell.config_path.write_bytes(runs[1].after)
+        (runs[1].folder.siblings / RECORDS).unlink(missing_ok=True)
 
     def job() -> None:
         if cell.config_path.read_bytes() == runs[1].after:  # who is told that it is done does not repeat it

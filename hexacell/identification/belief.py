@@ -9,7 +9,6 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.commanded_motion import ActualPoses, CommandedRobot
-from hexacell.kinematics.compiled.availability import is_compiled
 from hexacell.kinematics.forward import apply_twist
 from hexacell.kinematics.free_sensitivity import FreeSensitivity, free_sensitivity
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
@@ -146,13 +145,9 @@ class RobotBelief:
         the least ones; an unreachable pose (NaN) does not.
         """
         wanted = self.least_margins if wanted is None else wanted
-        if is_compiled():  # legs then cost least, and allow fewest
-            kept = self.limits.allow_legs(self.mechanism, self.estimate, poses, joints, wanted)
-            kept[kept] = self.limits.allow_poses(poses[kept], joints[kept])
-            return kept
-        kept = self.limits.allow_poses(poses, joints)
-        of_estimate = (self.mechanism, self.estimate, poses[kept], joints[kept])
-        kept[kept] = self.limits.allow_legs(*of_estimate, wanted)
+        # Legs allow fewest; what else there is, is asked of the poses that are left.
+        kept = self.limits.allow_legs(self.mechanism, self.estimate, poses, joints, wanted)
+        kept[kept] = self.limits.allow_poses(poses[kept], joints[kept])
         return kept
 
     def standing_at(

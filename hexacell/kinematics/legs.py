@@ -52,9 +52,13 @@ class Legs:
     @property
     def directions_in_carriers(self) -> Array:
         """The same unit vectors in the frames of what carries the joints at the base's end."""
+        return self.in_carriers(self.directions)
+
+    def in_carriers(self, directions: Array) -> Array:
+        """Vectors (n, 6, 3) of the legs in those frames, from the base frame."""
         if self.carriers is None:
-            return self.directions
-        seen: Array = np.einsum("nlij,nli->nlj", self.carriers, self.directions)
+            return directions
+        seen: Array = np.einsum("nlij,nli->nlj", self.carriers, directions)
         return seen
 
     @property

@@ -72,12 +72,15 @@ class LegLimits:
         least = self._least(wanted)
         if is_compiled():
             return self._keeps_compiled(legs, least)
-        at_platform = angles_between(legs.directions_in_platform, self.platform_axes)
+        directions = legs.directions
+        at_platform = angles_between(directions @ legs.rotations, self.platform_axes)
         kept = np.asarray((self.platform_cones - at_platform >= least[6:12]).all(axis=-1))
-        at_base = angles_between(legs[kept].directions_in_carriers, self.base_axes)
-        kept[kept] = (self.base_cones - at_base >= least[:6]).all(axis=-1)
+        legs = legs[kept]
+        at_base = angles_between(legs.in_carriers(directions[kept]), self.base_axes)
+        are_free = np.asarray((self.base_cones - at_base >= least[:6]).all(axis=-1))
         if self.distance_mm != 0.0:
-            kept[kept] = legs[kept].smallest_distance() - self.distance_mm >= least[12]
+            are_free[are_free] = legs[are_free].smallest_distance() - self.distance_mm >= least[12]
+        kept[kept] = are_free
         return kept
 
     def keeps_closed(self, closure: LegClosure, poses: PoseBatch, wanted: Array | float = 0.0) -> Mask:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,12 @@ def say() -> Say:
         print(f"\n  {figure:<58} {measured:>22}   ({target})", end="")
 
     return line
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _tracker_of_processes() -> None:
+    """A process that Python keeps beside all that it spawns, with a pipe to it."""
+    resource_tracker.ensure_running()
 
 
 @pytest.fixture

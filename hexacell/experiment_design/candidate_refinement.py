@@ -16,8 +16,12 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.experiment_design.candidates import reachable_targets, rows_apart
-from hexacell.experiment_design.predicted_records import GaugeZero, PredictedRecords, predict_records
+from hexacell.experiment_design.candidates import rows_apart, targets_within_limits
+from hexacell.experiment_design.predicted_records import (
+    GaugeZero,
+    PredictedRecords,
+    predict_clear_records,
+)
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import PoseBatch
@@ -101,11 +105,11 @@ class CandidateSpace:
         """The possible records of some orientations (n, 3, 3); none where the robot can take none."""
         belief, zero = self.belief, self.zero
         poses = PoseBatch.at(zero.reference, orientations)
-        targets = reachable_targets(belief, poses, self._mode)
-        if not len(targets):
+        targets = targets_within_limits(belief, poses)
+        records, clear = predict_clear_records(belief, zero, targets, self._mode)
+        if not clear.any():
             return None
-        records = predict_records(belief, zero, targets)
-        records = records[records.stay_inside(belief.limits)]
+        records = records[clear & records.stay_inside(belief.limits)]
         return RatedRecords(records, self.gain(records))
 
     def refined(self, candidates: RatedRecords) -> RatedRecords:

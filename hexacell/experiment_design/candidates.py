@@ -112,19 +112,23 @@ def rows_apart(rotations: Array, ranking: NDArray[np.intp], most: int, apart: fl
     return ranking[kept]
 
 
+def targets_within_limits(belief: RobotBelief, poses: PoseBatch) -> ReachableTargets:
+    """Those of the poses that the estimated robot takes within its limits, next to a singularity too."""
+    joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
+    rows = np.flatnonzero(belief.keeps_limits(poses, joints))
+    return ReachableTargets(poses[rows], joints[rows])
+
+
 def reachable_targets(belief: RobotBelief, poses: PoseBatch, mode: Array | None = None) -> ReachableTargets:
     """Those of the poses that the estimated robot takes within its limits.
 
     With an assembly ``mode`` (1,), only poses on that mode: no path leads to another one.
     """
-    joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
-    rows = np.flatnonzero(belief.keeps_limits(poses, joints))
-    poses, joints = poses[rows], joints[rows]
+    targets = targets_within_limits(belief, poses)
     margin = belief.limits.singularity_margin
-    clear, modes = margin_and_mode(belief.mechanism, belief.estimate, poses, joints, margin)
+    clear, modes = margin_and_mode(belief.mechanism, belief.estimate, targets.poses, targets.joints, margin)
     if mode is not None:
         clear &= modes == mode
-    targets = ReachableTargets(poses, joints)
     return targets if clear.all() else targets[clear]
 
 

@@ -19,7 +19,7 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import assembly_mode
-from hexacell.kinematics.free_sensitivity import POSITION, free_sensitivity
+from hexacell.kinematics.free_sensitivity import POSITION, free_sensitivity, sensitivity_and_margin
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_jacobian
@@ -156,7 +156,26 @@ class PredictedRecords:
 
 def predict_records(belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets) -> PredictedRecords:
     """The records of some targets at a point whose gauges were zeroed at ``zero``."""
-    by_parameters, by_joints = position_derivatives(belief, targets)
+    return _predicted(belief, zero, targets, *position_derivatives(belief, targets))
+
+
+def predict_clear_records(
+    belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets, mode: Array
+) -> tuple[PredictedRecords, Mask]:
+    """The same, and at which targets (n,) the robot has its singularity margin, on an assembly mode (1,).
+
+    At the others the records mean nothing.
+    """
+    at = belief.mechanism, belief.estimate, targets.poses, targets.joints
+    sensitivity, clear = sensitivity_and_margin(*at, POSITION, belief.limits.singularity_margin)
+    records = _predicted(belief, zero, targets, sensitivity.free, sensitivity.joints)
+    return records, clear & (sensitivity.mode == mode)
+
+
+def _predicted(
+    belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets, by_parameters: Array, by_joints: Array
+) -> PredictedRecords:
+    """The records by the derivatives of the ball's position, see :func:`position_derivatives`."""
     covariance = record_covariance(by_joints, belief.noise) + zero.covariance
     jacobian = by_parameters - zero.jacobian
     total = innovation_covariance(belief.covariance, jacobian, covariance)

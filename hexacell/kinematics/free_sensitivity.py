@@ -6,7 +6,7 @@ derivative is the sum of theirs: most are one number of one leg, so that they ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,8 @@ from hexacell.kinematics.compiled.availability import is_compiled, own
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import ConstraintDerivatives, Mechanism
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import inverse_and_mode
+from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.sensitivity import inverse_and_mode, inverse_has_margin
 
 POSITION = 3
 POSE = 6
@@ -51,6 +51,46 @@ def free_sensitivity(
     if is_compiled() and (found := _compiled(mechanism, linear, coordinates)):
         return found
     inverse, mode = inverse_and_mode(linear.pose)
+    return _by_inverse(mechanism, linear, inverse, mode, coordinates)
+
+
+def sensitivity_and_margin(
+    mechanism: Mechanism,
+    geometry: Geometry,
+    poses: PoseBatch,
+    joints: Array,
+    coordinates: int,
+    margin: float,
+) -> tuple[FreeSensitivity, Mask]:
+    """:func:`free_sensitivity`, and at which of n poses there is a ``margin`` to singularities.
+
+    One inverse of the pose Jacobian tells both. Exactly at a singularity, where there is no margin, the
+    derivatives mean nothing.
+    """
+    linear = mechanism.derivatives(geometry, poses, joints)
+    radius = float(mechanism.platform_radius(geometry))
+    if is_compiled() and (found := _compiled_with_margin(mechanism, linear, coordinates, radius, margin)):
+        return found
+    try:
+        inverse, mode = inverse_and_mode(linear.pose)
+        is_regular = np.ones(len(joints), dtype=bool)
+    except np.linalg.LinAlgError:
+        is_regular = np.linalg.det(linear.pose) != 0.0
+        linear = replace(linear, pose=np.where(is_regular[:, None, None], linear.pose, np.eye(6)))
+        inverse, mode = inverse_and_mode(linear.pose)
+    has_margin = inverse_has_margin(_dimensionless(inverse, radius), margin)
+    return _by_inverse(mechanism, linear, inverse, mode, coordinates), has_margin & is_regular
+
+
+def _dimensionless(inverse: Array, radius: float) -> Array:
+    """The inverses (n, 6, 6) of pose Jacobians with rotations scaled by a radius, mm."""
+    return np.concatenate([inverse[:, :3], radius * inverse[:, 3:]], axis=1)
+
+
+def _by_inverse(
+    mechanism: Mechanism, linear: ConstraintDerivatives, inverse: Array, mode: Array, coordinates: int
+) -> FreeSensitivity:
+    """The sensitivity by the inverses (n, 6, 6) of the pose Jacobians."""
     by_constraints = -inverse[:, :coordinates]
     by_joints = by_constraints * linear.joints[..., None, :]
     return FreeSensitivity(by_joints, _by_free(mechanism, by_constraints, linear), mode)
@@ -71,12 +111,41 @@ def _compiled(
     mechanism: Mechanism, linear: ConstraintDerivatives, coordinates: int
 ) -> FreeSensitivity | None:
     """The same, compiled; none where a pose is exactly at a singularity."""
+    found = _by_loops(mechanism, linear, coordinates, 1.0, 0.0)
+    return None if found is None else found[0]
+
+
+def _compiled_with_margin(
+    mechanism: Mechanism, linear: ConstraintDerivatives, coordinates: int, radius: float, margin: float
+) -> tuple[FreeSensitivity, Mask] | None:
+    """The same with the margins; the few poses that norms do not decide are decomposed here."""
+    found = _by_loops(mechanism, linear, coordinates, radius, margin)
+    if found is None:
+        return None
+    # Only where numba is installed.
+    from hexacell.kinematics.compiled.margins import ABOVE, UNDECIDED  # noqa: PLC0415
+
+    sensitivity, decided = found
+    has_margin = decided == ABOVE
+    rows = np.flatnonzero(decided == UNDECIDED)
+    if len(rows):
+        inverse = _dimensionless(inverse_and_mode(linear.pose[rows])[0], radius)
+        has_margin[rows] = inverse_has_margin(inverse, margin)
+    return sensitivity, has_margin
+
+
+def _by_loops(
+    mechanism: Mechanism, linear: ConstraintDerivatives, coordinates: int, radius: float, margin: float
+) -> tuple[FreeSensitivity, NDArray[np.int8]] | None:
+    """Compiled, with what norms decide of a margin (n,); none where a pose is exactly at a singularity."""
     # Only where numba is installed.
     from hexacell.kinematics.compiled.sensitivities import by_joints_and_free  # noqa: PLC0415
 
     count, size = len(linear.joints), len(mechanism.convention.free_rows())
     by_joints, by_free = np.empty((count, coordinates, 6)), np.zeros((count, coordinates, size))
-    determinants = np.empty(count)
-    numbers = own(linear.pose), own(linear.joints), own(linear.parameters)
-    by_joints_and_free(*numbers, mechanism.convention.leg_columns, by_joints, by_free, determinants)
-    return FreeSensitivity(by_joints, by_free, np.sign(determinants)) if determinants.all() else None
+    determinants, decided = np.empty(count), np.zeros(count, dtype=np.int8)
+    numbers = own(linear.pose), own(linear.joints), own(linear.parameters), mechanism.convention.leg_columns
+    by_joints_and_free(*numbers, radius, margin, by_joints, by_free, determinants, decided)
+    if not determinants.all():
+        return None
+    return FreeSensitivity(by_joints, by_free, np.sign(determinants)), decided

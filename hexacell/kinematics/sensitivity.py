@@ -122,7 +122,9 @@ def has_singularity_margin(
     mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array, margin: float
 ) -> Mask:
     """Whether :func:`singularity_margin` is at least ``margin`` at each of n poses, computed faster."""
-    return margin_and_mode(mechanism, geometry, poses, joints, margin)[0]
+    if closure := closure_to_compile(mechanism, geometry, joints):
+        return _compiled(closure, mechanism, geometry, poses, joints, margin)[0]
+    return _has_margin(_dimensionless(mechanism, geometry, poses, joints), margin)
 
 
 def margin_and_mode(
@@ -165,6 +167,11 @@ def _has_margin(jacobian: Array, margin: float) -> Mask:
         inverse = np.linalg.inv(jacobian)
     except np.linalg.LinAlgError:
         return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[..., -1] >= margin)
+    return inverse_has_margin(inverse, margin)
+
+
+def inverse_has_margin(inverse: Array, margin: float) -> Mask:
+    """:func:`has_singularity_margin` by the inverses (n, 6, 6) of dimensionless pose Jacobians."""
     bound = np.linalg.norm(inverse, axis=(-2, -1)) * margin
     has_margin: Mask = bound <= 1.0
     undecided = np.flatnonzero(~has_margin & (bound <= np.sqrt(6.0)))
@@ -172,7 +179,8 @@ def _has_margin(jacobian: Array, margin: float) -> Mask:
     bound = np.linalg.norm(gramian @ gramian, axis=(-2, -1)) ** 0.25 * margin
     has_margin[undecided] = bound <= 1.0
     undecided = undecided[(bound > 1.0) & (bound <= 6.0**0.125)]
-    has_margin[undecided] = np.linalg.svd(jacobian[undecided], compute_uv=False)[..., -1] >= margin
+    largest = np.linalg.svd(inverse[undecided], compute_uv=False)[..., 0]
+    has_margin[undecided] = largest * margin <= 1.0
     return has_margin
 
 

@@ -14,7 +14,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.compiled.availability import VARIABLE
 from hexacell.kinematics.forward import LARGEST_CONTRACTION, continue_solution, forward_kinematics, modes_of
-from hexacell.kinematics.free_sensitivity import POSE, POSITION, free_sensitivity
+from hexacell.kinematics.free_sensitivity import POSE, POSITION, free_sensitivity, sensitivity_and_margin
 from hexacell.kinematics.geometry import GeometryBatch
 from hexacell.kinematics.leg_closure import closure_to_compile
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -152,6 +152,33 @@ def test_poses_depend_alike_on_free_parameters(cell, coordinates):
     by_basis = every.parameters[:, :coordinates] @ robot.mechanism.convention.basis()
     np.testing.assert_allclose(found.free, by_basis, atol=1e-12 * np.abs(by_basis).max())
     np.testing.assert_array_equal(found.joints, every.joints[:, :coordinates])
+
+
+@pytest.mark.parametrize("share", [0.2, 0.999999, 1.000001, 3.0])
+def test_margins_beside_sensitivities_are_those_of_the_poses(cell, share):
+    robot, nominal, _, poses, joints = cell
+    least = share * float(np.median(singularity_margin(robot.mechanism, nominal, poses, joints)))
+    at = robot.mechanism, nominal, poses, joints
+    with compiled(False):
+        wanted, expected = margin_and_mode(*at, least)[0], free_sensitivity(*at, POSITION)
+    for found, has_margin in both(lambda: sensitivity_and_margin(*at, POSITION, least)):
+        np.testing.assert_array_equal(has_margin, wanted)
+        np.testing.assert_array_equal(found.mode, expected.mode)
+        np.testing.assert_allclose(found.free, expected.free, atol=1e-9 * np.abs(expected.free).max())
+        np.testing.assert_allclose(found.joints, expected.joints, atol=1e-9 * np.abs(expected.joints).max())
+
+
+def test_exactly_at_a_singularity_there_is_no_margin_and_the_others_have_theirs(cell, monkeypatch):
+    robot, nominal, _, poses, joints = cell
+    linear = robot.mechanism.derivatives(nominal, poses, joints)
+    linear.pose[2] = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+    monkeypatch.setattr(type(robot.mechanism), "derivatives", lambda *_: linear)
+    at = robot.mechanism, nominal, poses, joints, POSITION
+    least = 0.2 * float(np.median(singularity_margin(*at[:4])))
+    for found, has_margin in both(lambda: sensitivity_and_margin(*at, least)):
+        assert not has_margin[2]
+        assert has_margin[:2].any()
+        assert np.isfinite(found.free).all()
 
 
 def test_joints_and_derivatives_of_constraints_are_the_same_and_nan_out_of_reach(cell):

@@ -44,7 +44,7 @@ def margins_and_modes(
         _beside_identity(jacobian, radii[row if len(radii) > 1 else 0], system)
         determinant = eliminate(system)
         modes[row] = np.sign(determinant)
-        decided[row] = decide(system[:, 6:], margin) if determinant != 0.0 else UNDECIDED
+        decided[row] = margin_by_norms(system[:, 6:], margin) if determinant != 0.0 else UNDECIDED
 
 
 @compiled
@@ -59,7 +59,7 @@ def _beside_identity(jacobian: Array, radius: float, system: Array) -> None:
 
 
 @compiled
-def decide(inverse: Array, margin: float) -> int:
+def margin_by_norms(inverse: Array, margin: float) -> int:
     """Whether the smallest singular value is at least ``margin``, by two norms of the inverse."""
     squares = 0.0
     for row in range(6):

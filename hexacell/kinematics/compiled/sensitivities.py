@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.kinematics.compiled.margins import decide
+from hexacell.kinematics.compiled.margins import margin_by_norms
 from hexacell.kinematics.compiled.matrices import compiled, eliminate
 from hexacell.kinematics.rotations import Array
 
@@ -58,4 +58,4 @@ def _decide_scaled(inverse: Array, radius: float, margin: float) -> int:
     for axis in range(3, 6):
         for leg in range(6):
             inverse[axis, leg] *= radius
-    return int(decide(inverse, margin))
+    return int(margin_by_norms(inverse, margin))

@@ -36,6 +36,7 @@ MAY_LOOK = {
     "hexacell/application/fleet.py": "dates what a cell puts into a shared archive; says what is overdue",
     "hexacell/application/run_notices.py": "dates a notice",
     "hexacell/application/telling_people.py": "gives up notices that were tried and are days old",
+    "hexacell/controller_config/write_record.py": "dates what was written into a config",
     "hexacell/storage/cell_lock.py": "says since when somebody holds a cell",
     "procedures/journal/line_format.py": "dates a record",
     "drivers/wire_trace.py": "dates what went over a wire",

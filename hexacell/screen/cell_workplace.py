@@ -145,10 +145,10 @@ class CellWorkplace:
         applied = await apply_proposal(proposal, ConsentGiven(by), typed_by=by)
         return tuple(applied_text(applied).splitlines())
 
-    async def roll_back(self, run: str) -> tuple[str, ...]:
+    async def roll_back(self, run: str, by: str) -> tuple[str, ...]:
         """See :class:`Workplace`."""
         to = None if await self.is_in_controller(run) else run
-        done = await asyncio.to_thread(roll_back_config, self.cell, to)
+        done = await asyncio.to_thread(roll_back_config, self.cell, to, by=by)
         return tuple(rollback_text(done).splitlines())
 
     async def _past_runs(self) -> tuple[PastRun, ...]:

@@ -175,7 +175,7 @@ class SessionActions:
         return ""
 
     async def _roll_back(self, run: str) -> str:
-        return await self._change_config(partial(self._workplace.roll_back, run))
+        return await self._change_config(partial(self._workplace.roll_back, run, PERSON))
 
     async def _apply(self, run: str) -> str:
         return await self._change_config(partial(self._workplace.apply, run, PERSON))

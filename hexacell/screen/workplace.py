@@ -100,8 +100,10 @@ class Workplace(Protocol):
         """
         ...
 
-    async def roll_back(self, run: str) -> tuple[str, ...]:
+    async def roll_back(self, run: str, by: str) -> tuple[str, ...]:
         """Put back the config that a run wrote, or of before it if the controller has it; what was done.
+
+        ``by`` is who decided on it, as the history of the config is to have it.
 
         Raises:
             ConfigEditedSince: somebody has edited the config since.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 
+from hexacell.controller_config.write_record import RECORDS
 from tests.mutations.attempts import Attempt, Place, attempt
 from tests.mutations.texts import ANY, TOML, mutated
 from tests.mutations.trials import CELL, RUN, Templates, mutated_file
@@ -47,6 +48,16 @@ def earlier_runs_listed(templates: Templates, place: Place, draw: random.Random)
             ["status", cell],
         )
     )
+    return attempt([*command, *draw.choice(([], ["--json"]))], place)
+
+
+def config_writes_listed(templates: Templates, place: Place, draw: random.Random) -> Attempt:
+    """A cell whose records of writes into its config were mutated; they are listed, and one is added."""
+    place.refill(templates.small, templates.small)
+    path = place.cell / RUN.parent / RECORDS
+    path.write_bytes(mutated(path.read_bytes(), TOML, draw))
+    cell = place.cell / CELL
+    command = draw.choice((["history", cell, "--changes"], ["rollback", cell]))
     return attempt([*command, *draw.choice(([], ["--json"]))], place)
 
 

@@ -12,11 +12,13 @@ import pytest
 from textual.pilot import Pilot
 
 from hexacell.acceptance import AcceptanceGate
+from hexacell.application.config_history import config_history
 from hexacell.attach.snapshots import LiveSnapshot
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.write_back import commit
 from hexacell.errors import FileError
 from hexacell.presentation.config_changes import RELOAD
+from hexacell.presentation.screens.questions import PERSON
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.cell_workplace import CellWorkplace
 from hexacell.screen.overlays.confirm_overlay import ConfirmOverlay
@@ -73,6 +75,7 @@ async def test_the_config_of_before_the_latest_run_is_put_back(cell: Cell, runs:
         await until_shown(pilot, "again, bit for bit, which undoes the run 2026-11-21T100000Z")
         await until(lambda: [one.message for one in pilot.app._notifications] == [RELOAD])
     assert cell.config_path.read_bytes() == runs[1].before
+    assert config_history(cell).writes[0].record.by == PERSON
 
 
 async def test_an_earlier_config_is_gone_back_to(cell: Cell, runs: list[ProposedRun]) -> None:

@@ -151,7 +151,7 @@ class ToldWorkplace:
     begun: list[str] = field(default_factory=list)
     checked: list[str] = field(default_factory=list)
     removed: list[RemovedPoses] = field(default_factory=list)
-    rolled_back: list[str] = field(default_factory=list)
+    rolled_back: list[tuple[str, str]] = field(default_factory=list)
 
     async def watch(self) -> AsyncIterator[LiveSnapshot]:
         for one in self.live:
@@ -193,8 +193,8 @@ class ToldWorkplace:
     async def apply(self, run: str, by: str) -> tuple[str, ...]:
         raise NotImplementedError
 
-    async def roll_back(self, run: str) -> tuple[str, ...]:
-        self.rolled_back.append(run)
+    async def roll_back(self, run: str, by: str) -> tuple[str, ...]:
+        self.rolled_back.append((run, by))
         return (f"the config of before {run} is back",)
 
     async def open_run(self, run: str) -> RunConnection:

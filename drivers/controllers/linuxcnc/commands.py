@@ -16,6 +16,9 @@ from hexacell.kinematics.pose import Pose
 
 T = TypeVar("T")
 
+NO_REASON = "it is on, and gives no reason"
+"""Why a command is refused, as far as can be known, by a LinuxCNC that nothing keeps from executing it."""
+
 _MAX_ERRORS = 100
 _MAX_SHOWN = 4
 
@@ -150,7 +153,7 @@ class ControllerCommands:
     async def _state(self) -> str:
         if await self.is_on("estop"):
             return "it is in emergency stop"
-        return "it is on, and gives no reason" if await self.is_on("machine") else "it is switched off"
+        return NO_REASON if await self.is_on("machine") else "it is switched off"
 
     def _parsed(self, parse: Callable[[str], T], text: str) -> T:
         try:

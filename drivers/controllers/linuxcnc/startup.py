@@ -10,7 +10,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 
 from drivers.controllers.errors import CommandRefused, MotionInterrupted
-from drivers.controllers.linuxcnc.commands import ControllerCommands
+from drivers.controllers.linuxcnc.commands import NO_REASON, ControllerCommands
 from drivers.controllers.linuxcnc.protocol import parse_number, parse_positions
 from drivers.controllers.linuxcnc.settings import Timeouts, loop_time
 from drivers.interfaces import StartupAction
@@ -111,6 +111,23 @@ async def home_joints(
             problem = f"is not homed after {timeout_s:g} s: {await commands.reason()}"
             raise DeviceError(problem, subject=commands.subject, action="Home it at the machine")
         await asyncio.sleep(poll_s)
+
+
+async def restore_modes(commands: ControllerCommands, block: str) -> None:
+    """Execute a block that changes modes and moves nothing.
+
+    Once more where it is refused without a reason, as by LinuxCNC on a starved computer. A move must not be
+    repeated so: a person may have stopped it.
+
+    Raises:
+        CommandRefused: It is refused.
+    """
+    try:
+        await commands.set(f"mdi {block}")
+    except CommandRefused as refusal:
+        if refusal.reason != NO_REASON:
+            raise
+        await commands.set(f"mdi {block}")
 
 
 async def enter_mdi_mode(commands: ControllerCommands, timeouts: Timeouts) -> None:

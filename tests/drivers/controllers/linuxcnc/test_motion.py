@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused, PoseRefused
+from drivers.controllers.errors import (
+    CommandRefused,
+    ConnectionLost,
+    MotionInterrupted,
+    MoveRefused,
+    PoseRefused,
+)
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 from tests.drivers.controllers.linuxcnc.motion_dialogue import (
@@ -265,6 +271,30 @@ async def test_the_modes_of_before_are_restored_after_a_move(play):
     driver = await play.opened([*READY, *CHECKED, (MDI, ACK), ("get abs_act_pos", ARRIVED), RESTORED_HERE])
     await driver.prepare(frozenset())
     await driver.move(TARGET, MOVE_S)
+    await driver.close()
+
+
+REFUSED_TO_RESTORE = [
+    (RESTORED_HERE[0], b"SET MDI NAK\n\r"),
+    ("get enable", b"ENABLE ON\r\n"),
+]
+
+
+async def test_modes_that_are_not_restored_for_no_reason_are_asked_for_once_more(play):
+    state = [NO_ERROR, ("get estop", b"ESTOP OFF\r\n"), ("get machine", b"MACHINE ON\r\n")]
+    moved = [*READY, *CHECKED, (MDI, ACK), ("get abs_act_pos", ARRIVED)]
+    driver = await play.opened([*moved, *REFUSED_TO_RESTORE, *state, RESTORED_HERE])
+    await driver.prepare(frozenset())
+    await driver.move(TARGET, MOVE_S)
+
+
+async def test_modes_that_are_not_restored_for_a_reason_are_not_asked_for_again(play):
+    reason = [("get error", b"ERROR must be in MDI mode\r\n"), NO_ERROR]
+    moved = [*READY, *CHECKED, (MDI, ACK), ("get abs_act_pos", ARRIVED)]
+    driver = await play.opened([*moved, *REFUSED_TO_RESTORE, *reason, RESTORED_HERE])
+    await driver.prepare(frozenset())
+    with pytest.raises(CommandRefused, match="must be in MDI mode"):
+        await driver.move(TARGET, MOVE_S)
     await driver.close()
 
 

@@ -65,7 +65,7 @@ def gauges(protocol: str) -> list[GaugeSettings]:
             axis=axis,
             protocol=protocol,
             port="mux10" if protocol == "mux10" else axis,
-            channel=place,
+            channel=place if protocol == "mux10" else 1,
             travel_mm=TRAVEL_MM,
             request=ID_H if protocol == "request" else None,
         )
@@ -142,8 +142,7 @@ class Cell:
         self.indicators = [Indicator(self._plunger(place), TRAVEL_MM) for place in range(3)]
         by_port: dict[str, dict[int, Indicator]] = {}
         for one, indicator in zip(settings, self.indicators, strict=True):
-            channel = one.channel if protocol == "mux10" else 1
-            by_port.setdefault(str(one.port), {})[channel] = indicator
+            by_port.setdefault(str(one.port), {})[one.channel] = indicator
         have_lines(
             monkeypatch,
             {
@@ -220,7 +219,20 @@ async def opened(protocol: str, monkeypatch: pytest.MonkeyPatch) -> AsyncIterato
         await cell.ports.close()
 
 
-@pytest.mark.parametrize("protocol", ["sylvac", "mux10", "cdi", "request"])
+PROTOCOLS = (
+    "sylvac",
+    "mux10",
+    "cdi",
+    "request",
+    "digimatic-usb",
+    "heidenhain-nd",
+    "keyence-dl-rs1a",
+    "mitutoyo-id-h",
+)
+"""Whose gauges are asked; what streams or has checksums is left out."""
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
 async def test_no_damage_becomes_a_record(protocol: str, say, monkeypatch) -> None:
     async with opened(protocol, monkeypatch) as cell:
         outcome, memory = cell.outcome, [0.0]

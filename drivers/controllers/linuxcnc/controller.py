@@ -212,7 +212,7 @@ class LinuxcncrshController:
             raise MoveRefused(f"to move to {pose}", reason, subject=self._name, action=action)
 
     async def _restore_modes(self, commands: ControllerCommands) -> None:
-        await startup.restore_modes(commands, self._restoring)
+        await startup.restore_modes(commands, self._restoring, self._timeouts)
         self._has_changed_modes = False
 
     async def _restore_modes_unless_stopped(self, commands: ControllerCommands, stops: int) -> None:

@@ -113,21 +113,25 @@ async def home_joints(
         await asyncio.sleep(poll_s)
 
 
-async def restore_modes(commands: ControllerCommands, block: str) -> None:
+async def restore_modes(commands: ControllerCommands, block: str, timeouts: Timeouts) -> None:
     """Execute a block that changes modes and moves nothing.
 
-    Once more where it is refused without a reason, as by LinuxCNC on a starved computer. A move must not be
+    Again where it is refused without a reason, as by LinuxCNC on a starved computer. A move must not be
     repeated so: a person may have stopped it.
 
     Raises:
         CommandRefused: It is refused.
     """
-    try:
-        await commands.set(f"mdi {block}")
-    except CommandRefused as refusal:
-        if refusal.reason != NO_REASON:
-            raise
-        await commands.set(f"mdi {block}")
+    deadline = loop_time() + timeouts.command
+    while True:
+        try:
+            await commands.set(f"mdi {block}")
+        except CommandRefused as refusal:
+            if refusal.reason != NO_REASON or loop_time() > deadline:
+                raise
+            await asyncio.sleep(timeouts.poll)
+        else:
+            return
 
 
 async def enter_mdi_mode(commands: ControllerCommands, timeouts: Timeouts) -> None:

@@ -280,10 +280,11 @@ REFUSED_TO_RESTORE = [
 ]
 
 
-async def test_modes_that_are_not_restored_for_no_reason_are_asked_for_once_more(play):
+async def test_modes_that_are_not_restored_for_no_reason_are_asked_for_again(play):
     state = [NO_ERROR, ("get estop", b"ESTOP OFF\r\n"), ("get machine", b"MACHINE ON\r\n")]
     moved = [*READY, *CHECKED, (MDI, ACK), ("get abs_act_pos", ARRIVED)]
-    driver = await play.opened([*moved, *REFUSED_TO_RESTORE, *state, RESTORED_HERE])
+    refused = [*REFUSED_TO_RESTORE, *state]
+    driver = await play.opened([*moved, *refused, *refused, RESTORED_HERE])
     await driver.prepare(frozenset())
     await driver.move(TARGET, MOVE_S)
 

@@ -61,7 +61,8 @@ def go_to(client: ServerClient, commanded: np.ndarray) -> None:
     """
     words = " ".join(f"{axis}{value:.6f}" for axis, value in zip("XYZABC", commanded, strict=True))
     while not is_at(client, commanded):
-        client.ask(f"set mdi G0 {words}")
+        if not client.ask(f"set mdi G0 {words}").endswith("ACK"):
+            assert client.ask("get error") == "ERROR OK", words
         wait_until(partial(has_ended, client, commanded))
 
 

@@ -299,6 +299,19 @@ async def test_modes_that_are_not_restored_for_a_reason_are_not_asked_for_again(
     await driver.close()
 
 
+async def test_modes_that_are_never_restored_are_reported(play):
+    play.patience = play.IMPATIENT
+    driver = await play.opened([*READY, *CHECKED, (MDI, ACK), ("get abs_act_pos", ARRIVED)])
+    play.servers[0].afterwards = {
+        **dict([*REFUSED_TO_RESTORE, NO_ERROR]),
+        "get estop": b"ESTOP OFF\r\n",
+        "get machine": b"MACHINE ON\r\n",
+    }
+    await driver.prepare(frozenset())
+    with pytest.raises(CommandRefused, match="it is on, and gives no reason"):
+        await driver.move(TARGET, MOVE_S)
+
+
 async def test_an_inch_machine_is_commanded_in_mm_and_what_it_tells_is_converted(play):
     inches = ("get user_linear_units", b"USER_LINEAR_UNITS INCH\r\n")
     modes = ("get program_codes", b"PROGRAM_CODES G0 G17 G40 G20 G90 G94 G54 G49 F0 S0\r\n")

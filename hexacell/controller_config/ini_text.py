@@ -26,7 +26,10 @@ CONTINUED = "\\"
 _CONTINUATION = "the line before ends with a backslash and goes on in this one", "Remove the backslash"
 _SECOND_SECTION = "it does not look into a second section of that name", "Move it to the first one"
 
-_SECTION = re.compile(r"[ \t]*\[(?P<name>[^\]\n]*)\]")
+_UNCLOSED = "the line that begins its section has no ']'", "Close it"
+
+# A line that begins with "[" ends the section before it, closed or not.
+_SECTION = re.compile(r"[ \t]*\[(?P<name>[^\]\n]*)(?P<close>\])?")
 # Whatever stands between the name and the first "=" LinuxCNC skips; without one it looks no further.
 _VARIABLE = re.compile(
     r"[ \t]*(?P<name>[^=\s#;\[][^=\s]*)(?:[ \t][^=\n]*)?(?:=[ \t]*(?P<value>.*?))?[ \t\r]*(?:\n|\Z)"
@@ -109,17 +112,21 @@ class IniText:
 
     def _each_variable(self) -> Iterator[_Variable]:
         section, seen, start = "", set[str](), 0
-        is_first, is_continued = True, False
+        hidden_by_header: tuple[str, str] | None = None
+        is_continued = False
         for line, content in enumerate(self.text.split("\n"), start=1):
             was_continued, is_continued = is_continued, content.endswith(CONTINUED)
             if variable := _VARIABLE.fullmatch(content):
                 group = "value" if variable["value"] is not None else "name"
                 first, end = (start + place for place in variable.span(group))
                 token = NumberToken(variable[group], first, end, line)
-                hidden = _CONTINUATION if was_continued else None if is_first else _SECOND_SECTION
+                hidden = _CONTINUATION if was_continued else hidden_by_header
                 yield _Variable(section, variable["name"], token, hidden)
             elif (header := _SECTION.match(content)) and not was_continued:
-                section = header["name"]
-                is_first = section not in seen
-                seen.add(section)
+                section, hidden_by_header = header["name"], _SECOND_SECTION
+                if header["close"] is None:
+                    section, hidden_by_header = section.strip(), _UNCLOSED
+                elif section not in seen:
+                    hidden_by_header = None
+                    seen.add(section)
             start += len(content) + 1

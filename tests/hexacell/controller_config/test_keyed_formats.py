@@ -239,6 +239,15 @@ class TestWhatLinuxcncSees:
             self.FORM.read(written(text))
         assert caught.value.line == 13
 
+    @pytest.mark.parametrize("begin", ["[HEXAGLIDE", " [HEXAGLIDE \t"])
+    def test_a_section_whose_bracket_is_not_closed(self, written, begin) -> None:
+        rows = write_ini(lambda _: "1.5", " ")
+        text = "\n".join([*rows[:10], begin, *rows[10:]])
+        problem = r"does not see \[HEXAGLIDE\] S4X: the line that begins its section has no ']'"
+        with pytest.raises(FileError, match=problem) as caught:
+            self.FORM.read(written(text))
+        assert caught.value.line == 12
+
     @pytest.mark.parametrize("before", ["# millimetres \\", "NOTE = of the\\"])
     def test_a_line_behind_a_backslash(self, written, before) -> None:
         rows = write_ini(lambda _: "1.5", " ")

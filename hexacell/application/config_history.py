@@ -8,14 +8,15 @@ and why: its journal, and ``applied.json``.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from hexacell.application.config_rollback import receipts_of
 from hexacell.application.proposals import later_approval
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.contents import are_same_files
-from hexacell.controller_config.receipt import RECEIPT, Receipt
+from hexacell.controller_config.receipt import Receipt
 from hexacell.controller_config.write_record import (
     RECORDS,
     THE_RUN,
@@ -77,7 +78,7 @@ def config_history(cell: Cell) -> ConfigHistory:
     """
     folder = runs_folder(cell)
     records, damaged = read_records(folder)
-    runs = {run.name: run for run in _written_runs(cell, folder)}
+    runs = {run.name: run for run in _written_runs(cell)}
     found: list[ConfigWrite] = []
     for name in {*runs, *(record.run for record in records)}:
         own = [record for record in records if record.run == name]
@@ -120,14 +121,11 @@ def _unrecorded(told: Sequence[WriteRecord], records: Sequence[WriteRecord]) -> 
         yield from left
 
 
-def _written_runs(cell: Cell, folder: Path) -> Iterator[_Run]:
+def _written_runs(cell: Cell) -> Iterator[_Run]:
     """The runs that wrote the config; those that cannot be read are left out."""
-    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-        try:
-            if (path / RECEIPT).is_file() and are_same_files(Receipt.of(path).paths, cell.config_paths):
-                yield _read(RunFolder(path), Receipt.of(path))
-        except HexacellError:
-            continue
+    for receipt in receipts_of(cell):
+        with suppress(HexacellError):
+            yield _read(RunFolder(receipt.backup_folder), receipt)
 
 
 def _read(run: RunFolder, receipt: Receipt) -> _Run:

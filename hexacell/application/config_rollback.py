@@ -63,7 +63,7 @@ def roll_back_config(
     """
     paths, reason, recording = cell.config_paths, stated_reason(reason), Recording()
     with held_config(*cell.config_paths):
-        receipts = list(_receipts(cell))
+        receipts = list(receipts_of(cell))
         found = read_contents(paths)
         undone = _written_by(receipts, found)
         if to is not None:
@@ -87,7 +87,7 @@ def _cause(restored: Path, undone: Receipt | None, *, to: str | None, by: str, r
     return WriteCause(WriteKind.ROLLED_BACK, by, run, f"by hand, {what}{instead}", reason)
 
 
-def _receipts(cell: Cell) -> Iterator[Receipt]:
+def receipts_of(cell: Cell) -> Iterator[Receipt]:
     """Those of the cell's config, the oldest first; folders that cannot be read are left out."""
     folder = runs_folder(cell)
     for path in sorted(folder.iterdir()) if folder.is_dir() else ():

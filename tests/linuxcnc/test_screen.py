@@ -51,8 +51,10 @@ class Machine:
         return found
 
     def end(self) -> None:
+        """As a person does; AXIS may wait forever for a task that was ended together with it."""
+        has_quit = subprocess.run(["axis-remote", "--quit"], check=False).returncode == 0
         for process in self.started:
-            if process.poll() is None:
+            if not has_quit and process.poll() is None:
                 os.killpg(process.pid, signal.SIGTERM)
             process.wait()
         wait_until(lambda: not LOCK.exists())

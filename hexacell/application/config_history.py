@@ -80,11 +80,12 @@ def config_history(cell: Cell) -> ConfigHistory:
     records, damaged = read_records(folder)
     runs = {run.name: run for run in _written_runs(cell)}
     found: list[ConfigWrite] = []
-    for name in {*runs, *(record.run for record in records)}:
+    for name in sorted({*runs, *(record.run for record in records)}):
         own = [record for record in records if record.run == name]
         found += _writes_of(runs.get(name) or _Run(name), own)
-    newest_first = sorted(found, key=lambda one: one.record.at, reverse=True)
-    return ConfigHistory(tuple(newest_first), folder / RECORDS, damaged)
+    # Reversed only when sorted: of two in the same millisecond the later one stays the newer.
+    oldest_first = sorted(found, key=lambda one: _in_milliseconds(one.record.at))
+    return ConfigHistory(tuple(reversed(oldest_first)), folder / RECORDS, damaged)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,19 +107,28 @@ def _writes_of(run: _Run, records: Sequence[WriteRecord]) -> Iterator[ConfigWrit
             yield ConfigWrite(record, is_recorded)
 
 
-def _unrecorded(told: Sequence[WriteRecord], records: Sequence[WriteRecord]) -> Iterator[WriteRecord]:
-    """Those that have no record of their kind; each record is of the first that its run told after it.
+def _unrecorded(told: Sequence[WriteRecord], records: Sequence[WriteRecord]) -> list[WriteRecord]:
+    """Those without a record of their kind, in their order; each record is of the first that it fits."""
+    left = list(told)
+    for record in records:
+        fitting = (index for index, one in enumerate(left) if _is_of(record, one))
+        if (match := next(fitting, None)) is not None:
+            del left[match]
+    return left
 
-    A record is kept between the write and the line of the journal. ``applied.json`` is before both.
+
+def _is_of(record: WriteRecord, told: WriteRecord) -> bool:
+    """A record is kept between the write and the line of the journal. ``applied.json`` is before both.
+
+    Journals have milliseconds, so that what came after it may seem to have come before.
     """
-    for kind in WriteKind:
-        left = [one for one in told if one.kind is kind]
-        for record in (one for one in records if one.kind is kind):
-            is_told_before = kind is WriteKind.APPLIED
-            fitting = (one for one in left if (one.at <= record.at) is is_told_before)
-            if (match := next(fitting, None)) is not None:
-                left.remove(match)
-        yield from left
+    recorded_at, told_at = _in_milliseconds(record.at), _in_milliseconds(told.at)
+    in_order = told_at <= recorded_at if record.kind is WriteKind.APPLIED else recorded_at <= told_at
+    return record.kind is told.kind and in_order
+
+
+def _in_milliseconds(at: datetime) -> datetime:
+    return at.replace(microsecond=at.microsecond // 1000 * 1000)
 
 
 def _written_runs(cell: Cell) -> Iterator[_Run]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import shutil
+from datetime import UTC, datetime
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -12,6 +14,7 @@ from hexacell.application.config_history import config_history
 from hexacell.application.config_rollback import roll_back_config
 from hexacell.application.proposals import COMMAND, apply_proposal, read_proposal
 from hexacell.cell.loader import Cell
+from hexacell.controller_config import write_record
 from hexacell.controller_config.write_back import commit
 from hexacell.controller_config.write_record import (
     RECORDS,
@@ -26,6 +29,7 @@ from hexacell.errors import FileError, UsageError
 from hexacell.robot_model import config_layout
 from hexacell.runs.run_folder import runs_folder
 from hexacell.storage.cell_lock import user_name
+from procedures.journal import journal as journals
 from procedures.journal.journal import Journal
 from procedures.run import events
 from procedures.run.questions import UnattendedOperator
@@ -194,6 +198,24 @@ def test_folders_of_before_are_told_by_their_journals(cell) -> None:
     assert (written.is_recorded, written.verdict, written.record.user) == (False, Verdict.FAIL, "")
     assert written.record.sha256_after == run.change.sha256_after == back.record.sha256_before
     assert (back.record.kind, back.record.why) == (WriteKind.TAKEN_BACK, "0.3 mm: fail (worse than before)")
+
+
+@pytest.mark.parametrize("recorded_after_us", [0, 900])
+def test_writes_within_a_millisecond_stay_in_their_order_and_are_told_once(
+    cell, monkeypatch, recorded_after_us: int
+) -> None:
+    """Journals have milliseconds, records of writes microseconds: a fast computer does all that in one."""
+    run = propose_run(cell, verdict=None)
+    at = datetime(2026, 11, 20, 10, 5, tzinfo=UTC)
+    record_time = Mock(now=lambda zone: at.replace(microsecond=recorded_after_us))
+    monkeypatch.setattr(write_record, "datetime", record_time)
+    monkeypatch.setattr(journals, "now", lambda: (at.replace(microsecond=999), 1.0))
+    cause = WriteCause(WriteKind.RESULT, "a tester", run.folder.name, "")
+    with recorded_write(run.folder.siblings, cell.config_paths, config_layout(cell.settings), cause):
+        commit(run.change, run.folder.path)
+    judged = events.ResultValidated(verdict=Verdict.FAIL, line="0.3 mm: fail (worse than before)")
+    journalled(run, events.Committed(approved_by="a tester"), judged, events.RolledBack())
+    assert kinds(cell) == [WriteKind.TAKEN_BACK, WriteKind.RESULT]
 
 
 async def test_a_write_that_was_recorded_is_not_told_twice(cell, records) -> None:

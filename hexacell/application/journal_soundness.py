@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from hexacell.campaign.pilots import PER_DEPARTURE_TO_A_LIST, pilot_number
 from hexacell.cell.fields import LARGEST_NUMBER, GeometryDocument, SixNumbers
-from hexacell.cell.measuring import MOST_POINTS, MOST_POSES
+from hexacell.cell.measuring import MOST_POINTS, MOST_POSES, MOST_REVISITS
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ControllerLimits, JointRanges
 from hexacell.errors import FileError
@@ -26,7 +27,7 @@ from hexacell.kinematics.pose import AXES
 from procedures.journal.line_format import RESTORE
 from procedures.run import events
 from procedures.run.state import RunState, apply
-from procedures.run.steps import Move, Phase, Place, Sample, SetKey, StepOfSet
+from procedures.run.steps import Move, Phase, Pilot, Place, Sample, SetKey, StepOfSet
 
 LARGEST_COUNT = 2**63 - 1
 LARGEST_VARIANCE = 1e12
@@ -38,6 +39,7 @@ ANY_NUMBERS = (
     events.RecordRejected,
     events.ReferenceConfirmed,
     events.StandstillRead,
+    events.PilotTaken,
     events.ReferenceRepeated,
     events.SetClosed,
     events.SetInvalidated,
@@ -45,6 +47,16 @@ ANY_NUMBERS = (
     events.ProvisionalApplied,
 )
 """Events whose numbers are all used."""
+OF_PILOTS = (
+    Move,
+    Pilot,
+    events.Arrived,
+    events.PilotTaken,
+    events.RecordRejected,
+    events.PoseExcluded,
+)
+"""Steps and events that may be about a pilot pose."""
+MOST_PILOTS = PER_DEPARTURE_TO_A_LIST * MOST_REVISITS
 
 
 def require_sound(
@@ -118,12 +130,19 @@ class _Event:
         if isinstance(at, SetKey) and not 1 <= at.point <= self._points(at.phase):
             yield f"the cell file has no {at.station}"
         orientation = getattr(step, "orientation", getattr(event, "orientation", 1))
-        if not 0 <= orientation <= MOST_POSES:
+        if not 0 <= orientation <= MOST_POSES and not self._is_pilot(orientation):
             yield f"there is no orientation {orientation}"
         if isinstance(event, events.RecordTaken):
             taken = {sample.orientation for sample in self.state.set(event.at).samples}
             if event.orientation in {0, *taken} or (not taken and event.orientation != 1):
                 yield f"orientation {event.orientation} is not the next one"
+
+    def _is_pilot(self, orientation: int) -> bool:
+        """Whether a pilot pose is meant, and may be: it is left for, but is no record."""
+        event = self.event
+        told = event.step if isinstance(event, events.StepBegun | events.Failed) else event
+        number = pilot_number(orientation)
+        return isinstance(told, OF_PILOTS) and number is not None and number <= MOST_PILOTS
 
     def _points(self, phase: Phase) -> int:
         if not self.follows_plan:

@@ -66,11 +66,16 @@ def usual_move_seconds(settings: CellSettings) -> float:
     return MOVE_OVERHEAD_S + max(usual.joint_mm / limits.joint, by_edge)
 
 
-def noise_minutes(settings: CellSettings) -> float:
-    """To measure the noise at the first reference: readings at rest, then leaving it and coming back."""
+def noise_minutes(settings: CellSettings, pilots: int) -> float:
+    """To measure the noise at the first reference: readings at rest, then leaving it and coming back.
+
+    Some departures are for ``pilots``, poses at which the gauges are read.
+    """
     noise, timing = settings.noise, settings.timing
-    visit_s = 2.0 * usual_move_seconds(settings) + timing.window_s
-    return (noise.standstill_readings * timing.interval_s + noise.revisits * visit_s) / 60.0
+    departures = max(noise.revisits, pilots)
+    moves = (departures + noise.revisits) * usual_move_seconds(settings)
+    windows = (noise.revisits + pilots) * timing.window_s
+    return (noise.standstill_readings * timing.interval_s + moves + windows) / 60.0
 
 
 def _usual_moves(settings: CellSettings) -> float:

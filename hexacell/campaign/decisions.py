@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import hypot
 from typing import Literal
 
+from hexacell.campaign.pilots import with_pilots
 from hexacell.cell.fields import Frozen
 from hexacell.kinematics.pose import Pose
-from hexacell.measurements.records import Deviation, Joints, MeasurementSet
+from hexacell.measurements.records import Deviation, Joints, MeasurementSet, Record
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 
@@ -24,6 +26,7 @@ class CampaignState:
         rejections: records of the present point that could not be taken.
         zero_mm: what the gauges showed along base x, y, z when they were zeroed there; none if that
             is not known.
+        pilots: records that only steer the choice of poses.
     """
 
     measurements: MeasurementSet = field(default_factory=lambda: MeasurementSet(()))
@@ -32,6 +35,12 @@ class CampaignState:
     present: Pose | None = None
     rejections: int = 0
     zero_mm: Deviation | None = None
+    pilots: tuple[Record, ...] = ()
+
+    @cached_property
+    def steering(self) -> MeasurementSet:
+        """All records that poses are chosen by, pilot records included."""
+        return with_pilots(self.measurements, self.pilots)
 
     def records_at(self, point: int) -> int:
         """How many records a point has."""

@@ -87,6 +87,7 @@ class VirtualCampaign:
                 self._go_to_point(decision)
                 self.virtual_robot.zero_gauges()
                 self._measure(decision)
+                self._take_pilots()
             case MeasurePose():
                 self._go_to_pose(decision)
                 self._measure(decision)
@@ -95,6 +96,25 @@ class VirtualCampaign:
             case Finished(reason=reason):
                 self.reason = reason
         return decision
+
+    def _take_pilots(self) -> None:
+        """Leave the first reference, as to measure the noise, for pilot poses, and come back."""
+        reference = self.state.present
+        while (pilot := self.plan.pilot_pose(self.state)) is not None and reference is not None:
+            self._go_to_pose(pilot)
+            self._take_pilot(pilot)
+            if len(self.state.pilots) % self.plan.pilots_per_departure == 0 or self.state.rejections:
+                self._return_to(reference)
+                self.state = replace(self.state, present=reference)
+
+    def _take_pilot(self, pilot: MeasurePose) -> None:
+        state = replace(self.state, present=pilot.pose)
+        record = self.virtual_robot.measure(pilot.point, pilot.orientation)
+        if self.plan.robot.limits.room.holds(np.array(record.deviation)):
+            self.state = replace(state, pilots=(*state.pilots, record))
+        else:
+            self.outside += 1
+            self.state = replace(state, rejections=state.rejections + 1)
 
     def _go_to_point(self, start: StartPoint) -> None:
         self.virtual_robot.place(start.pose)
@@ -140,7 +160,8 @@ class VirtualCampaign:
             self.state = replace(self.state, present=reference)
             return
         done = self.state.done | {point}
-        self.state = CampaignState(self.state.measurements, done=done, present=reference)
+        measured, pilots = self.state.measurements, self.state.pilots
+        self.state = CampaignState(measured, done=done, present=reference, pilots=pilots)
         self._leave_point()
 
 
@@ -205,10 +226,10 @@ def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
         estimate, forecast = plan.estimate(campaign.state), plan.forecast(campaign.state)
     except HexacellError:
         return None
-    found = estimate.identification
+    found = estimate.of_records_alone()
     if found is None or not is_determined(found.problem):
         return None
-    zeros, belief = plan.robot.identified_zeros(found), estimate.belief
+    zeros, belief = plan.robot.identified_zeros(found), plan.robot.belief(found)
     belief = belief if zeros is None else replace(belief, covariance=zeros.free_covariance)
     budget = plan.task.budget(found, belief, plan.robot.effects, zeros=zeros)
     return _Outcome(campaign, forecast, budget, predicted_verdicts(plan, found, budget))
@@ -219,6 +240,7 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
         return DryRunResult(tried, 0, 0, 0, 0, None, 0.0)
     points = round(median(outcome.campaign.state.begun_points for outcome in identified))
     records = round(median(len(outcome.campaign.measurements) for outcome in identified))
+    pilots = round(median(len(outcome.campaign.state.pilots) for outcome in identified))
     errors = [outcome.forecast.now_mm for outcome in identified if outcome.forecast is not None]
     verdicts = [outcome.verdicts for outcome in identified if outcome.verdicts is not None]
     expanded = [outcome.budget.expanded_mm for outcome in identified if outcome.budget is not None]
@@ -234,7 +256,7 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
         records=records,
         outside=sum(outcome.campaign.outside for outcome in identified),
         worst_sigma_mm=median(errors) if errors else None,
-        minutes=noise_minutes(plan.settings)
+        minutes=noise_minutes(plan.settings, pilots)
         + plan.budget.time_model.minutes(records, points)
         + before
         + after,

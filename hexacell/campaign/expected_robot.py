@@ -35,4 +35,4 @@ def minutes_of(campaign: VirtualCampaign) -> float:
     """How long its records take, the look at the noise included, held-out poses not."""
     plan = campaign.plan
     measuring = plan.budget.time_model.minutes(len(campaign.measurements), campaign.state.begun_points)
-    return noise_minutes(plan.settings) + measuring
+    return noise_minutes(plan.settings, pilots=0) + measuring

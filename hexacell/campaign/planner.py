@@ -8,7 +8,7 @@ or nothing is left that is worth measuring.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,8 +24,9 @@ from hexacell.campaign.decisions import (
     StartPoint,
 )
 from hexacell.campaign.forecast import Forecaster, select_sets
+from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, PER_DEPARTURE, PER_DEPARTURE_TO_A_LIST
 from hexacell.campaign.planned_uncertainty import planned_systematic_mm
-from hexacell.campaign.pose_chooser import PoseChooser
+from hexacell.campaign.pose_chooser import PoseChooser, is_well_known
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.record_shares import shared_sizes
 from hexacell.campaign.recursive_estimator import OnlineEstimate, OnlineEstimator, RecordEstimator
@@ -62,6 +63,7 @@ class Plan:
         goal: what the records are for; none to identify the geometry as well as the settings ask for.
         earlier: what the systematic effects did to an earlier result that is the prior, by their names.
         left_points: points that are not measured, counted from 1.
+        most_turned: the largest tilt and twist of selected poses against a point's reference, rad.
     """
 
     settings: CellSettings
@@ -73,6 +75,7 @@ class Plan:
     goal: Goal | None = None
     earlier: Mapping[str, Array] = field(default_factory=dict)
     left_points: frozenset[int] = frozenset()
+    most_turned: float = np.pi
 
     def decide(self, state: CampaignState) -> Decision:
         """What to do now.
@@ -92,7 +95,52 @@ class Plan:
         Raises:
             IdentifiabilityError: they do not belong to it.
         """
-        return self._estimator.estimate(state.measurements)
+        return self._estimator.estimate(state.steering)
+
+    def pilot_pose(self, state: CampaignState) -> MeasurePose | None:
+        """Where to read the gauges next, only to steer the choice of poses; none where that is not wanted.
+
+        It is, at the first point, while the robot leaves the reference to measure its noise, as long as
+        little is known of it.
+
+        Raises:
+            HexacellError: no geometry fits the records.
+        """
+        is_first = state.point is not None and len(state.measurements) == 1
+        most = self.pilots_per_departure * self.settings.noise.revisits
+        is_enough = len(state.pilots) >= most or state.rejections > 0
+        if not is_first or is_enough or self.goal is not None:
+            return None
+        return self._cautious._pilot_pose(state, state.point or 0)
+
+    @property
+    def pilots_per_departure(self) -> int:
+        """At how many pilot poses the gauges are read before the robot comes back to the reference."""
+        return PER_DEPARTURE if self.pose_list is None else PER_DEPARTURE_TO_A_LIST
+
+    @cached_property
+    def _cautious(self) -> Plan:
+        """The same before the noise is measured, which may be larger than stated; poses are not listed."""
+        robot = replace(self.robot, noise=self.robot.noise.scaled(CAUTION))
+        listed = self.pose_list.at(self.points[0]) if self.pose_list is not None else ()
+        turns = (listed[0].angle_to(pose) for pose in listed)
+        return replace(
+            self,
+            robot=robot,
+            pose_list=None,
+            estimator=None,
+            with_forecast=False,
+            most_turned=max(turns, default=np.pi),
+        )
+
+    def _pilot_pose(self, state: CampaignState, point: int) -> MeasurePose | None:
+        estimate = self.estimate(state)
+        try:
+            if is_well_known(estimate.belief, estimate.gauge_zero(point)):
+                return None
+            return replace(self._next_pose(state, point), orientation=FIRST_PILOT + len(state.pilots))
+        except LimitError:
+            return None
 
     def allows_provisional(self, state: CampaignState) -> bool:
         """Whether the robot is known well enough for the controller to command with the estimate.
@@ -171,7 +219,13 @@ class Plan:
         """Chooses the next pose at a point."""
         known_then = None if self.goal else self.forecaster.known_beside_next
         return PoseChooser(
-            self.settings, self.robot, self.pose_list, self.task, self.candidates, known_then
+            self.settings,
+            self.robot,
+            self.pose_list,
+            self.task,
+            self.candidates,
+            known_then,
+            self.most_turned,
         )
 
     @cached_property

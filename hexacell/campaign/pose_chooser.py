@@ -14,6 +14,7 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.errors import LimitError
 from hexacell.experiment_design import candidates
+from hexacell.experiment_design.candidate_refinement import QUICK, THOROUGH
 from hexacell.experiment_design.candidates import Amplitudes
 from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion
 from hexacell.experiment_design.pose_selection import SelectedPose, select_from_list, select_pose
@@ -28,6 +29,9 @@ from hexacell.robot_model import Robot
 WELL_KNOWN_SIGMA = np.radians(0.5)
 """Standard deviation of the platform's orientation below which large rotations are safe, and most
 informative."""
+
+LATE_RECORDS = 44
+"""From so many on candidates are refined less, so that a decision with most to fit takes no longer."""
 
 SMALL_TILT_SHARE = 0.1
 """Of the largest tilt, for candidates where none of full size is safe."""
@@ -44,6 +48,7 @@ class PoseChooser:
         known_then: gives the covariance (p, p) once all that is planned is measured but the next record,
             which has to gain beside it as soon as the robot is well known; none where the plan may end
             sooner.
+        most_turned: the largest tilt and twist of selected poses against the reference, rad.
     """
 
     settings: CellSettings
@@ -52,6 +57,7 @@ class PoseChooser:
     task: Task
     candidates: int
     known_then: Callable[[RobotBelief, CampaignState], Array] | None = None
+    most_turned: float = np.pi
 
     def choose(
         self, belief: RobotBelief, zero: GaugeZero, state: CampaignState
@@ -114,17 +120,17 @@ class PoseChooser:
         if self.pose_list is not None:
             waiting = without_visited(self.pose_list.at(state.point or 0)[1:], _visited(state))
             return select_from_list(planner, zero, self.robot.from_commands(waiting), state.rejections)
-        tilt = tilt_share * belief.limits.tilt
-        target = zero.target
-        well_known = belief.orientation_sigma(target.poses, target.joints) <= WELL_KNOWN_SIGMA
+        tilt = min(tilt_share * belief.limits.tilt, self.most_turned)
+        well_known = is_well_known(belief, zero)
         # The best are refined: more candidates are needed only where few of them are safe.
         count = self.candidates // 2 if well_known else self.candidates
         amplitudes = Amplitudes.MOSTLY_LARGE if well_known else Amplitudes.ALL_SCALES
         orientations = candidates.orientations(
-            count, tilt, self._seed(state), amplitudes, belief.limits.turn
+            count, tilt, self._seed(state), amplitudes, min(belief.limits.turn, self.most_turned)
         )
         known_then = self.known_then(belief, state) if well_known and self.known_then else None
-        return select_pose(planner, zero, orientations, self._criterion(belief), known_then)
+        rounds = QUICK if len(state.measurements) >= LATE_RECORDS else THOROUGH
+        return select_pose(planner, zero, orientations, self._criterion(belief), known_then, rounds)
 
     def _criterion(self, belief: RobotBelief) -> Criterion:
         name = self.settings.identification.criterion
@@ -140,8 +146,14 @@ class PoseChooser:
     def _seed(self, state: CampaignState) -> int:
         """Different for every record and every attempt, and the same when they are repeated."""
         point = state.point or 0
-        attempt = state.records_at(point) + 100 * state.rejections
+        attempt = state.records_at(point) + 100 * state.rejections + 10_000 * len(state.pilots)
         return self.settings.identification.seed + 1000 * point + attempt
+
+
+def is_well_known(belief: RobotBelief, zero: GaugeZero) -> bool:
+    """Whether the platform's orientation at a zero is known so well that large rotations are safe."""
+    sigma = belief.orientation_sigma(zero.target.poses, zero.target.joints)
+    return bool(sigma <= WELL_KNOWN_SIGMA)
 
 
 def _as_visited(visited: list[Pose], waypoint: Pose) -> Pose:

@@ -9,10 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from hexacell.campaign.estimate_chain import ChainedEstimate, update_estimate
+from hexacell.campaign.pilots import are_counted
 from hexacell.errors import LimitError
 from hexacell.experiment_design.predicted_records import GaugeZero, gauge_zero_at
 from hexacell.identification.belief import RobotBelief
+from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import MeasurementSet, Record, RecordId
@@ -31,6 +35,14 @@ class OnlineEstimate:
     belief: RobotBelief
     identification: Identification | None
     false_records: frozenset[RecordId] = frozenset()
+
+    def of_records_alone(self) -> Identification | None:
+        """The identification without pilot records, from this one on; none before the first record."""
+        found = self.identification
+        if found is None or (counted := are_counted(found.problem)).all():
+            return found
+        problem, poses = found.problem.subset(counted), found.poses[np.flatnonzero(counted)]
+        return estimate_online(problem.starting_at(found.free, poses))
 
     def gauge_zero(self, point: int) -> GaugeZero:
         """Where a point's gauges were zeroed.

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from hexacell.campaign.decisions import CampaignState, MeasurePose
 from hexacell.campaign.forecast import Forecaster
+from hexacell.campaign.pilots import are_counted
 from hexacell.campaign.recursive_estimator import RecordEstimator
 from hexacell.cell.model import CellSettings
 from hexacell.identification.problem.data_requirements import is_determined
@@ -88,8 +89,11 @@ class StoppingRules:
         target = self.settings.identification.target_mm
         if target is None or not len(state.measurements):
             return None
-        estimate = self.estimator.estimate(state.measurements)
-        if estimate.identification is None or not is_determined(estimate.identification.problem):
+        estimate = self.estimator.estimate(state.steering)
+        if estimate.identification is None:
+            return None
+        problem = estimate.identification.problem
+        if not is_determined(problem.subset(are_counted(problem))):
             return None
         worst = self.forecaster.worst_error(state, estimate.belief)
         if worst is None or worst > target:
@@ -102,6 +106,6 @@ class StoppingRules:
         others = [other for other in sizes if other not in state.done and other != point]
         if not self.settings.identification.choose_points or not others:
             return None
-        belief = self.estimator.estimate(state.measurements).belief
+        belief = self.estimator.estimate(state.steering).belief
         best = self.forecaster.rank_points(state, belief, [point, *others]).best
         return None if best == point else f"point {best} gains more in the same time"

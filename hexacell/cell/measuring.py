@@ -18,6 +18,7 @@ from hexacell.cell.fields import (
 )
 
 MOST_POINTS, MOST_POSES, MOST_RECORDS = 100, 1000, 10_000
+MOST_REVISITS = 100
 """More would take longer than any machine stays as it is."""
 
 
@@ -238,7 +239,11 @@ class NoiseSettings(Section):
         description="at the first point, without moving, for the noise of readings; 0: none",
     )
     revisits: int = Field(
-        6, ge=0, le=100, description="of the first reference, from different directions; 0: none"
+        6,
+        ge=0,
+        le=MOST_REVISITS,
+        description="of the first reference, from different directions; while little is known of the robot "
+        "it leaves for poses at which the gauges are read, to choose the others by; 0: none",
     )
     averaged_windows: int = Field(
         1, ge=1, le=16, description="most settled windows that a record may be the mean of, if it pays"

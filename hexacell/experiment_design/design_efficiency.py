@@ -15,12 +15,15 @@ import numpy as np
 from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.experiment_design.continuous_design.measure import DesignMeasure, PointMeasure
 from hexacell.experiment_design.continuous_design.optimality import DOptimality, IOptimality, Optimality
-from hexacell.experiment_design.continuous_design.pose_bound import DesignBound, design_bound
+from hexacell.experiment_design.continuous_design.pose_bound import GAP, DesignBound, design_bound
 from hexacell.experiment_design.continuous_design.pose_domain import PoseDomain
 from hexacell.experiment_design.predicted_records import gauge_zero_at
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.rotations import Array
+
+D_GAP = 0.005
+"""Share by which a measure for D may exceed the best one found: this takes little longer than 0.03."""
 
 REFERENCES = 1
 """Records of a point that every design has."""
@@ -71,7 +74,7 @@ def design_efficiency(
         predictions: derivatives (r, p) of the positions at the task poses, mm.
     """
     campaign = CampaignMeasure.of(belief, found)
-    best = campaign.bound(DOptimality())
+    best = campaign.bound(DOptimality(), D_GAP)
     by_d = campaign.efficiency(DOptimality(), best)
     if predictions is None:
         return DesignEfficiency(by_d, None)
@@ -102,9 +105,9 @@ class CampaignMeasure:
         information = found.solution.information + precision
         return cls(DesignMeasure(tuple(points), precision), tuple(domains), information)
 
-    def bound(self, optimality: Optimality) -> DesignBound:
-        """The best design under the same limits."""
-        return design_bound(self.design, self.domains, optimality)
+    def bound(self, optimality: Optimality, gap: float = GAP) -> DesignBound:
+        """The best design under the same limits; a better one exceeds it by at most a share."""
+        return design_bound(self.design, self.domains, optimality, gap)
 
     def efficiency(self, optimality: Optimality, bound: DesignBound) -> Efficiency:
         """By a criterion, against a bound."""

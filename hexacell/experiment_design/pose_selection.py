@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.errors import LimitError
-from hexacell.experiment_design.candidate_refinement import CandidateSpace
+from hexacell.experiment_design.candidate_refinement import THOROUGH, CandidateSpace, Rounds
 from hexacell.experiment_design.candidates import commands_for, outcomes_of
 from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion
 from hexacell.experiment_design.predicted_records import GaugeZero, PredictedRecords, predict_records
@@ -64,6 +64,7 @@ def select_pose(
     orientations: Array,
     criterion: Criterion = D_OPTIMAL,
     known_then: Array | None = None,
+    rounds: Rounds = THOROUGH,
 ) -> SelectedPose:
     """The best by a criterion of some orientations (n, 3, 3), relative to the platform's at the reference.
 
@@ -77,6 +78,7 @@ def select_pose(
         criterion: what is best.
         known_then: covariance of the free parameters (p, p), mm^2, beside which a record has to gain; none
             for that of now.
+        rounds: of refinement.
 
     Raises:
         LimitError: none is reachable within the limits and almost surely inside the travel.
@@ -90,7 +92,7 @@ def select_pose(
     if candidates is None:
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
     if len(candidates):
-        candidates = space.refined(candidates)[:MOST_CANDIDATES]
+        candidates = space.refined(candidates, rounds)[:MOST_CANDIDATES]
     search = _PathSearch(TravelConstraint(belief, zero), planner)
     for ranked in _batches(np.arange(len(candidates)), *COMMAND_BATCHES):
         commands, found = commands_for(belief, candidates.records.targets[ranked])

@@ -58,6 +58,10 @@ class Pose:
         """The same position without tilt and turn."""
         return Pose(self.x, self.y, self.z)
 
+    def angle_to(self, other: Pose) -> float:
+        """By how much the platform turns from one to the other, rad."""
+        return float(np.linalg.norm(rotations.to_vector(other.rotation @ self.rotation.T)))
+
     def as_tuple(self) -> tuple[float, float, float, float, float, float]:
         """``(x, y, z, a, b, c)``, mm and deg."""
         return (self.x, self.y, self.z, self.a, self.b, self.c)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.campaign.decisions import Forecast
+from hexacell.campaign.pilots import pilot_number
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.length import length_text
 from hexacell.presentation.measured_noise import noise_and_averaging_text
@@ -15,7 +16,7 @@ from hexacell.presentation.verification import check_start_text, check_text, ver
 from hexacell.reporting.design_statement import design_sentence
 from procedures.run import events
 from procedures.run.state import RunState
-from procedures.run.steps import Compute, Move, Phase, Probe, Repeat, SetKey, Standstill, Try
+from procedures.run.steps import Compute, Move, Phase, Pilot, Probe, Repeat, SetKey, Standstill, Try
 
 SET_NAMES = {
     Phase.IDENTIFY: "point {}",
@@ -76,6 +77,13 @@ def set_name(key: SetKey) -> str:
     return SET_NAMES[key.phase].format(key.point)
 
 
+def pose_name(key: SetKey, orientation: int) -> str:
+    """Display name of a pose of a set: ``point 2, orientation 3``, ``point 1, pilot pose 2``."""
+    pilot = pilot_number(orientation)
+    pose = f"orientation {orientation}" if pilot is None else f"pilot pose {pilot}"
+    return f"{set_name(key)}, {pose}"
+
+
 def activity(event: events.Event) -> str | None:
     """A few words on what the run does from this event on; nothing where that does not change."""
     match event:
@@ -84,7 +92,9 @@ def activity(event: events.Event) -> str | None:
         case events.StepBegun(step=Probe() | Try() as step):
             return f"{set_name(step.at)}, trying the gauges"
         case events.StepBegun(step=Move() as step):
-            return f"{set_name(step.at)}, orientation {step.orientation}{_forecast_range(step)}"
+            return f"{pose_name(step.at, step.orientation)}{_forecast_range(step)}"
+        case events.StepBegun(step=Pilot() as step):
+            return pose_name(step.at, step.orientation)
         case events.StepBegun(step=Compute() as step):
             return COMPUTATIONS[step.kind]
         case _:
@@ -105,7 +115,7 @@ def event_text(event: events.Event, state: RunState) -> str | None:
         case events.SetInvalidated():
             return f"{set_name(event.at)} is measured again: {event.reason}"
         case events.RecordRejected():
-            return f"{set_name(event.at)}, orientation {event.orientation} left out: {event.reason}"
+            return f"{pose_name(event.at, event.orientation)} left out: {event.reason}"
         case events.Committed():
             return f"written to the controller, approved by {event.approved_by}"
         case events.ProvisionalApplied() | events.ProvisionalReverted() | events.RolledBack():
@@ -170,7 +180,7 @@ def _further_text(event: events.Event) -> str | None:
         case events.RecordDiscarded():
             return f"{set_name(event.at)}, orientation {event.orientation} is measured again"
         case events.PoseExcluded():
-            return f"{set_name(event.at)}, orientation {event.orientation}: {refusal_text(event)}"
+            return f"{pose_name(event.at, event.orientation)}: {refusal_text(event)}"
         case events.Failed():
             reason = "\n".join(wrapped(line, indent=2) for line in event.reason.splitlines())
             return f"{reason}\n  attempt {event.attempt}: {event.action.value}"

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hexacell.campaign.decisions import CampaignState, FinishPoint, MeasurePose, StartPoint
+from hexacell.campaign.decisions import FinishPoint, MeasurePose, StartPoint
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError
-from hexacell.experiment_design.predicted_records import GaugeZero
-from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import MeasurementSet
+from procedures.calibration.campaign_state import campaign_state
+from procedures.calibration.chosen_moves import move_to_chosen
 from procedures.calibration.noise_steps import NoiseSteps
-from procedures.calibration.set_steps import SetSteps, require_zero
+from procedures.calibration.set_steps import Known, SetSteps, require_zero
 from procedures.calibration.trial_steps import TrialSteps
-from procedures.run.state import RunState, record
-from procedures.run.steps import CloseSet, Compute, Expectation, Locate, Move, Phase, SetKey, Step
+from procedures.run.state import RunState
+from procedures.run.steps import CloseSet, Compute, Locate, Move, Phase, SetKey, Step
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +37,7 @@ class IdentificationSteps:
             case StartPoint() as start:
                 return self._start_point(state, start)
             case MeasurePose() as pose:
-                return _measure_pose(state, pose)
+                return move_to_chosen(state, pose)
             case FinishPoint() as finish:
                 return self._finish_point(state, finish)
             case _:
@@ -59,7 +57,7 @@ class IdentificationSteps:
             return self._at_or_to_reference(state, key)
         if trial := self.trials.next_step(state, key, self._ball(state, key)):
             return trial
-        measuring_noise = self.noise.next_step(state, key, self._ball(state, key))
+        measuring_noise = self.noise.next_step(state, key, self._known(state, key))
         # With several records to be taken again, one is, before the robot moves to the next of them.
         orientation, pose = measured.again[0] if measured.again else (None, None)
         if step := measuring_noise or self.sets.at_pose(state, key, orientation):
@@ -103,21 +101,20 @@ class IdentificationSteps:
         Raises:
             HexacellError: no safe path leads there.
         """
-        back = self.sets.paths.back(state, key, self._known(state, key))
-        return back or self.sets.to_reference(state, key, self._ball(state, key))
+        return self.sets.way_back(state, key, self._known(state, key))
 
     def _ball(self, state: RunState, key: SetKey) -> Array | None:
         """Where the ball was when the set's gauges were zeroed (3,), mm, if the records determine it."""
         known = self._known(state, key)
         return None if known is None else known[1].reference
 
-    def _known(self, state: RunState, key: SetKey) -> tuple[RobotBelief, GaugeZero] | None:
+    def _known(self, state: RunState, key: SetKey) -> Known | None:
         try:
             return self._estimated(state, key)
         except HexacellError:
             return None
 
-    def _estimated(self, state: RunState, key: SetKey) -> tuple[RobotBelief, GaugeZero]:
+    def _estimated(self, state: RunState, key: SetKey) -> Known:
         """The belief by now and the gauges' zero under it; raises ``HexacellError`` if there is none."""
         estimate = self.plan.estimate(campaign_state(state, key))
         belief = estimate.belief.zeroed_at(state.zero_shown(key))
@@ -131,59 +128,3 @@ def open_set(state: RunState) -> SetKey | None:
         if key.phase is Phase.IDENTIFY and not state.set(key).closed and not state.is_left(key):
             return key
     return None
-
-
-def campaign_state(state: RunState, key: SetKey | None) -> CampaignState:
-    """The run as the campaign knows it, with an open set or none.
-
-    Records are in the order in which their sets were measured.
-    """
-    sets = {at: measured for at, measured in state.sets.items() if at.phase is Phase.IDENTIFY}
-    records = tuple(record(sample) for measured in sets.values() for sample in measured.samples)
-    return CampaignState(
-        measurements=MeasurementSet(records),
-        point=None if key is None else key.point,
-        done=frozenset(at.point for at, measured in sets.items() if measured.closed) | _left_points(state),
-        present=_present_pose(state, key),
-        rejections=0 if key is None else state.set(key).rejections,
-        zero_mm=None if key is None else state.zero_shown(key),
-    )
-
-
-def _left_points(state: RunState) -> frozenset[int]:
-    """Points that cannot be measured, because the controller refuses their reference."""
-    keys = {refused.at for refused in state.excluded if refused.at.phase is Phase.IDENTIFY}
-    return frozenset(key.point for key in keys if state.is_left(key))
-
-
-def _present_pose(state: RunState, key: SetKey | None) -> Pose | None:
-    """The pose that the robot was commanded to last, that of a rejected record included.
-
-    Between points none where it was brought by somebody: it can be brought elsewhere, too.
-    """
-    if state.target is not None and (key is not None or state.at_pose is not None):
-        return Pose(*state.target)
-    if key is None:
-        return None
-    samples = state.set(key).samples
-    return Pose(*samples[-1].pose) if samples else None
-
-
-def _measure_pose(state: RunState, chosen: MeasurePose) -> Move:
-    """The move to the chosen pose, or to the first waypoint of its path."""
-    at = SetKey(phase=Phase.IDENTIFY, point=chosen.point)
-    if chosen.via:
-        pose = chosen.via[0].as_tuple()
-        by_pose = {sample.pose: sample.orientation for sample in state.set(at).samples}
-        return Move(at=at, orientation=by_pose.get(pose, 0), pose=pose)
-    return Move(
-        at=at,
-        orientation=state.set(at).next_orientation,
-        pose=chosen.pose.as_tuple(),
-        expected=Expectation(
-            deviation_mm=chosen.deviation,
-            sigma_mm=chosen.sigma,
-            gain=chosen.gain,
-            forecast=chosen.forecast,
-        ),
-    )

@@ -28,7 +28,7 @@ class Measuring:
         self.plan = plan
         sets = SetSteps(plan.robot)
         trials = TrialSteps(plan.settings.stations.trial_mm, sets)
-        noise = NoiseSteps(plan.settings.noise, sets)
+        noise = NoiseSteps(plan, sets)
         self.points = IdentificationSteps(
             plan, sets, plan.settings.identification.provisional, noise, trials
         )

@@ -1,4 +1,8 @@
-"""The steps that measure the noise, at the first reference: read at rest, leave and come back."""
+"""The steps that measure the noise, at the first reference: read at rest, leave and come back.
+
+As long as little is known of the robot it leaves for pilot poses, which steer the choice of the others
+(:mod:`hexacell.campaign.pilots`), and else for level ones beside the reference.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +12,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.campaign.noise_assessment import NoiseReadings
+from hexacell.campaign.pilots import FIRST_PILOT
+from hexacell.campaign.planner import Plan
 from hexacell.cell.devices import EncoderSettings
 from hexacell.cell.measuring import NoiseSettings
 from hexacell.identification.diagnostics.standstill import display_step
 from hexacell.kinematics.pose import Pose
-from hexacell.kinematics.rotations import Array
 from hexacell.motion.path_check import is_clear
-from procedures.calibration.set_steps import SetSteps, reference_pose
+from procedures.calibration.campaign_state import campaign_state
+from procedures.calibration.chosen_moves import move_to_chosen
+from procedures.calibration.set_steps import Known, SetSteps, reference_pose
 from procedures.run.events import Reading
 from procedures.run.set_state import SetState
 from procedures.run.state import RunState
-from procedures.run.steps import Compute, Move, Repeat, SetKey, SixNumbers, Standstill, Step
+from procedures.run.steps import Compute, Move, Pilot, Repeat, SetKey, SixNumbers, Standstill, Step
 
 DISTANCE_SHARE = 0.3
 """Of the gauges' travel: how far the robot leaves the reference, level as it is."""
@@ -26,35 +33,57 @@ DISTANCE_SHARE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class NoiseSteps:
-    """Decides on the steps of one robot's sets."""
+    """Decides on the steps of the sets of a plan's robot."""
 
-    settings: NoiseSettings
+    plan: Plan
     sets: SetSteps
 
-    def next_step(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
+    @property
+    def settings(self) -> NoiseSettings:
+        """What is to be measured."""
+        return self.plan.settings.noise
+
+    def next_step(self, state: RunState, key: SetKey, known: Known | None) -> Step | None:
         """The next step at the open set; None if the noise is measured, or not to be.
 
-        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
+        ``known`` is the robot, and where the ball was when the gauges were zeroed, if that is known.
         """
         measured = state.set(key)
         is_asked = self.settings.standstill_readings or self.settings.revisits
         if state.noise is not None or not is_asked or len(measured.samples) != 1:
             return None
         if state.at_pose != (key, 1):
-            return self.sets.to_reference(state, key, ball)
+            return self._away(state, key) or self.sets.way_back(state, key, known)
         if measured.has_left:
             return Repeat(at=key)
         if self.settings.standstill_readings and measured.standstill is None:
             return Standstill(at=key)
-        return self._leave(state, key, ball) or Compute(kind="assess noise")
+        return self._leave(state, key, known) or Compute(kind="assess noise")
 
-    def _leave(self, state: RunState, key: SetKey, ball: Array | None) -> Move | None:
+    def _away(self, state: RunState, key: SetKey) -> Step | None:
+        """What is left to do before the robot returns to the reference; none if nothing is."""
+        measured = state.set(key)
+        if measured.piloted == self.plan.pilots_per_departure or not measured.has_left:
+            return None
+        orientation = FIRST_PILOT + len(measured.pilots)
+        if state.at_pose == (key, orientation) and state.target is not None:
+            return Pilot(at=key, orientation=orientation, pose=state.target)
+        return self._to_pilot(state, key)
+
+    def _to_pilot(self, state: RunState, key: SetKey) -> Move | None:
+        """The next move to the next pilot pose; none if there is none."""
+        pilot = self.plan.pilot_pose(campaign_state(state, key))
+        return None if pilot is None else move_to_chosen(state, pilot)
+
+    def _leave(self, state: RunState, key: SetKey, known: Known | None) -> Move | None:
         """The move away from the reference before its next visit; none after the last one."""
         done = len(state.set(key).visits)
         if done >= self.settings.revisits:
             return None
+        if pilot := self._to_pilot(state, key):
+            return pilot
         reference = reference_pose(state, key)
-        beside = [pose for pose in self._beside(reference) if self._is_clear(state, key, pose, ball)]
+        beside = [pose for pose in self._beside(reference) if self._is_clear(state, key, pose, known)]
         if not beside:
             return None
         return Move(at=key, orientation=0, pose=beside[done % len(beside)])
@@ -66,11 +95,12 @@ class NoiseSteps:
         for dx, dy, dz in distance * np.concatenate([[row, -row] for row in np.eye(3)]):
             yield (x + float(dx), y + float(dy), z + float(dz), a, b, c)
 
-    def _is_clear(self, state: RunState, key: SetKey, pose: SixNumbers, ball: Array | None) -> bool:
+    def _is_clear(self, state: RunState, key: SetKey, pose: SixNumbers, known: Known | None) -> bool:
         """Whether the robot as it is known by now gets there and back within the limits."""
         reference = reference_pose(state, key)
         here, there = (self.sets.robot.from_commands([Pose(*one)]) for one in (reference, pose))
-        belief = self.sets.robot.belief().zeroed_at(state.zero_shown(key))
+        drawn = self.sets.robot.belief().zeroed_at(state.zero_shown(key))
+        belief, ball = (drawn, None) if known is None else (known[0], known[1].reference)
         return is_clear(belief, here, there, ball) and is_clear(belief, there, here, ball)
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hexacell.campaign.pilots import with_pilots
 from hexacell.errors import HexacellError, LimitError
 from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.identification.belief import RobotBelief
@@ -130,7 +131,7 @@ class RunPathPlanner:
         return replace(self.robot.belief(), free=np.asarray(free))
 
     def _by_records(self, state: RunState) -> RobotBelief:
-        measurements = state.measurements()
+        measurements = with_pilots(state.measurements(), state.pilots)
         if not len(measurements):
             return self.robot.belief()
         try:

@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.errors import LimitError
+from hexacell.experiment_design.predicted_records import GaugeZero
+from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of
 from hexacell.robot_model import Robot
@@ -24,6 +26,9 @@ from procedures.run.steps import (
     SixNumbers,
     Step,
 )
+
+Known = tuple[RobotBelief, GaugeZero]
+"""What is known of the robot, and where the ball was when a set's gauges were zeroed."""
 
 
 class TravelError(LimitError):
@@ -71,6 +76,15 @@ class SetSteps:
                 action="Widen the limits of the controller, then continue",
             )
         return self.paths.towards(state, move, ball)
+
+    def way_back(self, state: RunState, key: SetKey, known: Known | None) -> Move:
+        """The next move to the reference of the set in which the robot is.
+
+        Raises:
+            HexacellError: no safe path leads there.
+        """
+        back = self.paths.back(state, key, known)
+        return back or self.to_reference(state, key, None if known is None else known[1].reference)
 
 
 def reference_pose(state: RunState, key: SetKey) -> SixNumbers:

@@ -45,6 +45,7 @@ from procedures.run.steps import (
     Locate,
     Move,
     Phase,
+    Pilot,
     Place,
     Probe,
     Repeat,
@@ -60,7 +61,7 @@ SKEW_DECIMALS = 6
 MOST_REFUSALS = 40
 """Of poses of one set by the controller; then its limits are to be looked at, by a person."""
 
-RobotStep = Locate | Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat | Probe | Try
+RobotStep = Locate | Move | Place | Sample | Revisit | CloseSet | Standstill | Pilot | Repeat | Probe | Try
 """A step for which the robot must be where its config has it."""
 
 
@@ -146,6 +147,8 @@ class StepExecutor:
                 return await self._close(step, state)
             case Standstill():
                 return await self.read_standstill(step)
+            case Pilot():
+                return await self._pilot(step, state)
             case Repeat():
                 return events.ReferenceRepeated(at=step.at, reading=await self.read())
             case Probe():
@@ -225,12 +228,36 @@ class StepExecutor:
         return ask_placement(step.at, pose) if settings.stations.placement == "by-hand" else None
 
     async def _sample(self, step: Sample, state: RunState) -> events.Event:
+        windows = 1 if state.noise is None else state.noise.noise.windows
+        reading = await self._read_inside(step, state, windows)
+        if isinstance(reading, events.RecordRejected):
+            return reading
+        zero = state.zero(step.at) or reading
+        return events.RecordTaken(
+            at=step.at,
+            orientation=step.orientation,
+            pose=step.pose,
+            reading=reading,
+            deviation_mm=deviation_of(np.subtract(reading.gauges_mm, zero.gauges_mm)),
+        )
+
+    async def _pilot(self, step: Pilot, state: RunState) -> events.Event:
+        reading = await self._read_inside(step, state)
+        if isinstance(reading, events.RecordRejected):
+            return reading
+        return events.PilotTaken(at=step.at, orientation=step.orientation, pose=step.pose, reading=reading)
+
+    async def _read_inside(
+        self, step: Sample | Pilot, state: RunState, windows: int = 1
+    ) -> events.Reading | events.RecordRejected:
+        """Readings with the ball inside the gauges' travel."""
+        at = {"at": step.at, "orientation": step.orientation}
         try:
-            reading = await self.read(1 if state.noise is None else state.noise.noise.windows)
+            reading = await self.read(windows)
         except HexacellError as error:
             if not consists_only_of(error, GaugeAtEnd):
                 raise
-            return events.RecordRejected(at=step.at, orientation=step.orientation, reason=str(error))
+            return events.RecordRejected(**at, reason=str(error))
         zero = state.zero(step.at) or reading
         deviation = np.subtract(reading.gauges_mm, zero.gauges_mm)
         if state.zero(step.at) is None:
@@ -238,16 +265,8 @@ class StepExecutor:
         room = gauge_travel_of(self.cell.settings).room(zero.gauges_mm)
         if not room.holds(deviation):
             reason = f"the ball is {in_words(deviation)} mm from its reference, farther than {room}"
-            return events.RecordRejected(
-                at=step.at, orientation=step.orientation, reason=reason, reading=reading
-            )
-        return events.RecordTaken(
-            at=step.at,
-            orientation=step.orientation,
-            pose=step.pose,
-            reading=reading,
-            deviation_mm=deviation_of(deviation),
-        )
+            return events.RecordRejected(**at, reason=reason, reading=reading)
+        return reading
 
     def _try(self, step: Try, state: RunState) -> events.GaugesTried:
         measured = state.set(step.at)

@@ -23,7 +23,7 @@ from hexacell.cell.fields import first_mistake
 from hexacell.errors import FileError
 from procedures.run.events import Event
 
-VERSION = 17
+VERSION = 18
 """What this program writes; it reads this and all before. Version 1 had neither version nor ``s``, and
 versions 1 and 2 no verification; checks of version 3 measured held-out points; up to version 5 no noise was
 measured. Versions up to 6 had no length check. Up to 8 only the controller's pose was read where the robot
@@ -36,9 +36,10 @@ Up to 12 a record was the plain mean of its readings; neither limits of the cont
 and ports of devices were kept. Up to 13 the encoders were read after the gauges, and no skew was kept. Up
 to 14 lines were checked in the convention's frames, and candidates were examined in other batches. Up to
 15 a set was closed, and it was not told why, where no line led from its reference to the last record. Up
-to 16 candidates were not refined, and gained beside what was known."""
+to 16 candidates were not refined, and gained beside what was known. Up to 17 no pilot poses were visited,
+and candidates were refined less."""
 
-RULES_SINCE = 17
+RULES_SINCE = 18
 """The version since which runs are decided by the present rules; older ones are not resumed."""
 
 RESTORE = "Restore the run folder from a copy; it cannot be continued"

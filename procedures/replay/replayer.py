@@ -210,6 +210,7 @@ OUTCOME_KINDS: dict[str, frozenset[str]] = {
     "revisit": frozenset({"confirmed", "voided"}),
     "close": frozenset({"closed"}),
     "standstill": frozenset({"stood"}),
+    "pilot": frozenset({"piloted", "refused"}),
     "repeat": frozenset({"repeated"}),
     "probe": frozenset({"probed"}),
     "try": frozenset({"tried"}),

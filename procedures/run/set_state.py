@@ -17,7 +17,9 @@ class SetState:
         again: orientations and poses of discarded records, which are taken again.
         reference_unverified: the gauges were unwatched; their zero must be verified at the reference.
         standstill: readings at the reference without moving, and ``visits`` of it.
-        has_left: the robot has been at a waypoint since it was read last.
+        has_left: the robot has been elsewhere since it was read last.
+        pilots: readings elsewhere, which steer the choice of poses; ``piloted`` of them were tried since
+            the reference was read last.
         probes: readings beside the reference, which try the gauges; ``tried`` once they have passed, until
             the gauges are unwatched.
     """
@@ -31,6 +33,8 @@ class SetState:
     standstill: events.StandstillRead | None = None
     visits: tuple[events.ReferenceRepeated, ...] = ()
     has_left: bool = False
+    pilots: tuple[events.PilotTaken, ...] = ()
+    piloted: int = 0
     probes: tuple[events.GaugesProbed, ...] = ()
     tried: bool = False
 
@@ -63,12 +67,16 @@ class SetState:
 
     def with_visit(self, visit: events.ReferenceRepeated) -> SetState:
         """One more visit of the reference."""
-        return replace(self, visits=(*self.visits, visit), has_left=False)
+        return replace(self, visits=(*self.visits, visit), has_left=False, piloted=0)
+
+    def with_pilot(self, pilot: events.PilotTaken) -> SetState:
+        """One more pilot reading."""
+        return replace(self, pilots=(*self.pilots, pilot), piloted=self.piloted + 1)
 
     def with_rejection(self, orientation: int) -> SetState:
         """One more rejected record; its orientation is chosen again."""
         again = tuple(pair for pair in self.again if pair[0] != orientation)
-        return replace(self, rejections=self.rejections + 1, again=again)
+        return replace(self, rejections=self.rejections + 1, again=again, piloted=self.piloted + 1)
 
     def without(self, orientation: int) -> SetState:
         """One record less; a closed set is open again with its reference unverified."""

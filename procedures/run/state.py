@@ -6,10 +6,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import reduce
 
+import numpy as np
+
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.refused_commands import RefusedCommand, RefusedCommands
-from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.measurements.records import MeasurementSet, Record, deviation_of
 from procedures.run import events
 from procedures.run.set_state import SetState
 from procedures.run.steps import (
@@ -140,6 +142,17 @@ class RunState:
         return MeasurementSet(tuple(record(sample) for sample in self.samples(Phase.IDENTIFY)))
 
     @property
+    def pilots(self) -> tuple[Record, ...]:
+        """The pilot records, in the order taken."""
+        sets = [(key, measured) for key, measured in self.sets.items() if key.phase is Phase.IDENTIFY]
+        return tuple(
+            _pilot_record(pilot, zero)
+            for key, measured in sets
+            for pilot in measured.pilots
+            if (zero := self.zero(key)) is not None
+        )
+
+    @property
     def temperature_range_k(self) -> float | None:
         """The largest range that a thermometer showed with these records; none without readings."""
         shown: dict[str, list[float]] = {}
@@ -204,6 +217,8 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
             return _with_set(state, event.at, replace(state.set(event.at), reference_unverified=False))
         case events.StandstillRead():
             return _with_set(state, event.at, replace(state.set(event.at), standstill=event))
+        case events.PilotTaken():
+            return _with_set(state, event.at, state.set(event.at).with_pilot(event))
         case events.ReferenceRepeated():
             return _with_set(state, event.at, state.set(event.at).with_visit(event))
         case events.GaugesProbed():
@@ -250,7 +265,7 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
 
 def _arrived(state: RunState, event: events.Arrived) -> RunState:
     is_waypoint = event.orientation == 0
-    if is_waypoint and event.at in state.sets:
+    if event.orientation != 1 and event.at in state.sets:
         state = _with_set(state, event.at, replace(state.set(event.at), has_left=True))
     at_pose = None if is_waypoint else (event.at, event.orientation)
     return replace(
@@ -359,6 +374,11 @@ def _place_of(step: Step | None) -> str:
 
 def _with_set(state: RunState, key: SetKey, value: SetState) -> RunState:
     return replace(state, sets={**state.sets, key: value})
+
+
+def _pilot_record(pilot: events.PilotTaken, zero: events.Reading) -> Record:
+    deviation = deviation_of(np.subtract(pilot.reading.gauges_mm, zero.gauges_mm))
+    return Record(pilot.at.point, pilot.orientation, Pose(*pilot.pose), pilot.reading.joints, deviation)
 
 
 def record(sample: events.RecordTaken) -> Record:

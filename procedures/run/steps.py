@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from hexacell.campaign.decisions import Forecast
+from hexacell.campaign.pilots import pilot_number
 from hexacell.cell.fields import Frozen
 from hexacell.kinematics.pose import Pose
 
@@ -87,7 +88,10 @@ class StepOfSet(BaseStep):
 
 
 class StepAtPose(StepOfSet):
-    """A step at one pose of a set; the first orientation is its reference."""
+    """A step at one pose of a set; the first orientation is its reference.
+
+    Pilot poses have orientations that no record has (:mod:`hexacell.campaign.pilots`).
+    """
 
     orientation: int
     pose: SixNumbers
@@ -95,7 +99,9 @@ class StepAtPose(StepOfSet):
     @property
     def key(self) -> str:
         """Stable name of the step."""
-        return f"{self.at}/o{self.orientation:02d}/{self.kind}"
+        pilot = pilot_number(self.orientation)
+        pose = f"o{self.orientation:02d}" if pilot is None else f"pilot{pilot:02d}"
+        return f"{self.at}/{pose}/{self.kind}"
 
 
 class Locate(BaseStep):
@@ -155,6 +161,12 @@ class Standstill(StepOfSet):
     kind: Literal["standstill"] = "standstill"
 
 
+class Pilot(StepAtPose):
+    """Read the gauges where the reference was left: that steers the choice of poses, and nothing else."""
+
+    kind: Literal["pilot"] = "pilot"
+
+
 class Repeat(StepOfSet):
     """Back at a set's reference from another direction: read again, which shows how well it repeats."""
 
@@ -191,6 +203,17 @@ class Compute(BaseStep):
 
 
 Step = Annotated[
-    Locate | Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat | Probe | Try | Compute,
+    Locate
+    | Move
+    | Place
+    | Sample
+    | Revisit
+    | CloseSet
+    | Standstill
+    | Pilot
+    | Repeat
+    | Probe
+    | Try
+    | Compute,
     Field(discriminator="kind"),
 ]

@@ -14,6 +14,7 @@ from procedures.run.steps import (
     Locate,
     Move,
     Phase,
+    Pilot,
     Place,
     Probe,
     Repeat,
@@ -105,10 +106,10 @@ def _name(step: Step) -> str:
 
 
 def _of_a_set(  # noqa: PLR0911 - a case a step
-    step: Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat | Probe | Try,
+    step: Move | Place | Sample | Revisit | CloseSet | Standstill | Pilot | Repeat | Probe | Try,
 ) -> str:
     match step:
-        case Standstill() | Repeat():
+        case Standstill() | Pilot() | Repeat():
             return "measuring noise"
         case Probe() | Try():
             return "trying gauges"

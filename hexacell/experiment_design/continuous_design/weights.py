@@ -109,7 +109,8 @@ def _second_derivatives(design: DesignMeasure, at: Linearization, optimality: Op
         by_root.append(one.records.centred(centre, root))
         moved = np.swapaxes(one.records.rows[:, :, :c], -1, -2) @ centred
         normal = (one.fixed.normal() + one.records.normal(one.weights))[:c, :c]
-        parts.append(np.linalg.solve(np.linalg.cholesky(normal), moved).reshape(len(one.weights), -1))
+        whitened = np.linalg.solve(np.linalg.cholesky(normal), moved)
+        parts.append(whitened.reshape(len(whitened), np.prod(whitened.shape[1:], dtype=int)))
     products = _gram(np.concatenate(by_factor)) * _gram(np.concatenate(by_root))
     coordinates = by_root[0].shape[1]
     count = len(products) // coordinates

@@ -54,6 +54,10 @@ class Noise:
             gauge_shares=tuple(mm / gauge for mm in gauges_mm),
         )
 
+    def scaled(self, factor: float) -> Noise:
+        """The same with all readings noisier by a factor."""
+        return replace(self, encoder=factor * self.encoder, gauge_mm=factor * self.gauge_mm)
+
     def along(self, gauges: Array) -> Noise:
         """The same of gauges whose directions in the frame convention are the columns (3, 3)."""
         if not self.gauge_shares:

@@ -8,7 +8,7 @@ from statistics import median
 
 from hexacell.attach.messages import HostFailed
 from hexacell.cell.model import CellSettings
-from hexacell.presentation.events import activity, set_name
+from hexacell.presentation.events import activity, pose_name, set_name
 from hexacell.presentation.layout import duration
 from hexacell.presentation.screens.live import live_view
 from hexacell.presentation.screens.run_picture import RunPicture
@@ -114,7 +114,7 @@ def _pose_name(step: Move) -> str:
         return f"a waypoint on the way to {set_name(step.at)}"
     if step.orientation == 1:
         return f"the reference of {set_name(step.at)}"
-    return f"{set_name(step.at)}, orientation {step.orientation}"
+    return pose_name(step.at, step.orientation)
 
 
 def _following(picture: RunPicture, settings: CellSettings | None) -> str:

@@ -25,6 +25,7 @@ from procedures.run.events.measuring import (
     GaugesTried,
     Located,
     NoiseMeasured,
+    PilotTaken,
     PoseExcluded,
     Reading,
     RecordDiscarded,
@@ -65,6 +66,7 @@ __all__ = [
     "Located",
     "NoiseMeasured",
     "Paused",
+    "PilotTaken",
     "PoseExcluded",
     "Proposed",
     "ProvisionalApplied",
@@ -101,6 +103,7 @@ Event = Annotated[
     | RecordDiscarded
     | ReferenceConfirmed
     | StandstillRead
+    | PilotTaken
     | ReferenceRepeated
     | GaugesProbed
     | GaugesTried

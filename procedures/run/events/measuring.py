@@ -147,6 +147,16 @@ class StandstillRead(Frozen):
     skews_s: tuple[float, ...] = ()
 
 
+class PilotTaken(Frozen):
+    """The reference was left for a pilot pose, and the gauges were read there."""
+
+    kind: Literal["piloted"] = "piloted"
+    at: SetKey
+    orientation: int
+    pose: SixNumbers
+    reading: Reading
+
+
 class ReferenceRepeated(Frozen):
     """The reference was left, visited again from another direction, and read."""
 

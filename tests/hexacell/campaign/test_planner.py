@@ -88,7 +88,8 @@ def test_the_error_after_each_record_is_as_forecast(campaign):
     assert [forecast.records for forecast in forecasts] == [*range(15, 8, -1), *range(7, 0, -1)]
     assert all(forecast.end_mm <= forecast.next_mm <= forecast.now_mm for forecast in forecasts)
     assert forecasts[-1].end_mm == forecasts[-1].next_mm
-    assert 1.0 < forecasts[-1].end_mm / forecasts[0].end_mm < 20.0  # so few records grow late
+    # The sets that stand for the poses not chosen yet are those of the drawing.
+    assert 0.2 < forecasts[-1].end_mm / forecasts[0].end_mm < 5.0
 
 
 def test_poses_and_expectations_are_in_the_controllers_frames(campaign, two_points, paper):
@@ -269,11 +270,13 @@ def test_points_that_take_long_to_set_up_are_left_later(make_plan, carry_out):
 
 
 def test_no_provisional_geometry_before_the_robot_is_known_well_enough(campaign, make_plan):
-    """After two records the orientation is uncertain by degrees, too much to command with."""
+    """After two records alone the orientation is uncertain by degrees, too much to command with."""
     plan = make_plan(identification__points=TWO_POINTS, identification__orientations=8)
     by_records = {len(one.state.measurements): one.state for one in campaign}
     assert not plan.allows_provisional(CampaignState())
-    assert not plan.allows_provisional(by_records[2])
+    assert len(by_records[2].pilots) == 12
+    assert not plan.allows_provisional(replace(by_records[2], pilots=()))
+    assert plan.allows_provisional(by_records[2])
     assert plan.allows_provisional(by_records[13])
     assert plan.allows_provisional(campaign[-1].state)
 
@@ -283,7 +286,8 @@ def test_a_point_whose_reference_is_beyond_a_limit_is_left_and_an_uncertain_one_
 ):
     """No leg is turned by more than 17.6 deg at the references by the drawing, by 23.9 on the robot."""
     narrow = PassiveJointSettings(platform_cone_deg=23.0)
-    taken = carry_out(make_plan(limits__passive_joints=narrow, limits__tilt_deg=20.0), most=120)
+    plan = make_plan(limits__passive_joints=narrow, limits__tilt_deg=20.0, noise__revisits=0)
+    taken = carry_out(plan, most=120)
     begun = [one.decision.point for one in taken if isinstance(one.decision, StartPoint)]
     # After point 1 the robot is not known well enough for points 2 and 3.
     assert begun == [1, 4, 2, 3]

@@ -6,6 +6,7 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState, Finished, FinishPoint, MeasurePose, StartPoint
@@ -20,17 +21,26 @@ TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 
 
 @pytest.fixture(scope="module")
-def visited(campaign):
-    """The poses of a campaign, which are safe on its robot in their order."""
-    records = campaign[-1].state.measurements.records
+def visited(make_plan, carry_out):
+    """The poses of a campaign without pilot poses, which are safe on its robot in their order."""
+    return at_both_points(carry_out(two_points(make_plan, noise__revisits=0)))
+
+
+def at_both_points(taken):
+    """The poses of all records."""
+    records = taken[-1].state.measurements.records
     return tuple(tuple(r.pose for r in records if r.point == point) for point in (1, 2))
+
+
+def two_points(make_plan, **changes):
+    return make_plan(identification__points=TWO_POINTS, identification__orientations=8, **changes)
 
 
 @pytest.fixture
 def plan_of(make_plan):
-    def of(poses):
+    def of(poses, **changes):
         listed = PoseList(Path("list.csv"), poses)
-        return make_plan(identification__points=TWO_POINTS, listed=listed)
+        return two_points(make_plan, listed=listed, **changes)
 
     return of
 
@@ -54,11 +64,24 @@ def test_a_list_that_is_safe_is_visited_in_its_order(plan_of, visited, carry_out
     assert isinstance(taken[-1].decision, Finished)
 
 
+def test_a_list_without_small_rotations_is_visited_after_pilot_poses(plan_of, make_plan, carry_out):
+    """As one made of an earlier campaign, whose first poses already were chosen with them."""
+    poses = at_both_points(carry_out(two_points(make_plan)))
+    turned = [poses[0][0].angle_to(pose) for pose in poses[0][1:]]
+    assert min(turned) > np.radians(5.0)
+    assert len(carry_out(plan_of(poses, noise__revisits=0))[-1].state.measurements) == 2
+    state = carry_out(plan_of(poses))[-1].state
+    assert len(state.measurements) == 16
+    reference, pilots = poses[0][0], [record.pose for record in state.pilots]
+    # Refinement turns beyond the largest candidate.
+    assert max(map(reference.angle_to, pilots)) < 2.0 * max(turned)
+
+
 def test_a_pose_that_is_not_safe_yet_is_postponed(plan_of, visited, carry_out):
     """The widest pose listed first comes later, when enough is known."""
     reference, *others = visited[0]
     backwards = ((reference, *reversed(others)), visited[1])
-    taken = carry_out(plan_of(backwards))
+    taken = carry_out(plan_of(backwards, noise__revisits=0))
     there = poses_of(taken, 1)
     assert len(there) >= 5
     assert not _near(there[1], others[-1])

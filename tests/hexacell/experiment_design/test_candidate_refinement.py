@@ -8,7 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hexacell.experiment_design.candidate_refinement import CandidateSpace, RatedRecords
+from hexacell.experiment_design.candidate_refinement import (
+    QUICK,
+    THOROUGH,
+    CandidateSpace,
+    RatedRecords,
+    Rounds,
+)
 from hexacell.experiment_design.candidates import Amplitudes, orientations, rows_apart
 from hexacell.experiment_design.criteria import D_OPTIMAL
 from hexacell.experiment_design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE, gauge_zero_at
@@ -42,16 +48,33 @@ def candidates(space) -> RatedRecords:
     return rated(space, FEW)
 
 
+@pytest.fixture(scope="module", params=[QUICK, THOROUGH], ids=["quick", "thorough"])
+def rounds(request) -> Rounds:
+    found: Rounds = request.param
+    return found
+
+
 @pytest.fixture(scope="module")
-def refined(space, candidates) -> RatedRecords:
-    found: RatedRecords = space.refined(candidates)
+def refined(space, candidates, rounds) -> RatedRecords:
+    found: RatedRecords = space.refined(candidates, rounds)
     return found
 
 
 def test_few_refined_ones_gain_more_than_the_best_of_thirty_times_as_many(space) -> None:
-    few = [space.refined(rated(space, FEW, seed)).gains.max() for seed in SEEDS]
-    many = [rated(space, MANY, seed).gains.max() for seed in SEEDS]
-    assert np.mean(few) > np.mean(many)
+    many, quick, thorough = (
+        np.mean([found.gains.max() for found in each])
+        for each in (
+            [rated(space, MANY, seed) for seed in SEEDS],
+            [space.refined(rated(space, FEW, seed), QUICK) for seed in SEEDS],
+            [space.refined(rated(space, FEW, seed), THOROUGH) for seed in SEEDS],
+        )
+    )
+    assert many < quick < thorough
+
+
+def test_without_rounds_candidates_are_ranked_alone(space, candidates) -> None:
+    found = space.refined(candidates, ())
+    assert sorted(found.gains.tolist()) == sorted(candidates.gains.tolist())
 
 
 def test_all_candidates_stay_and_all_are_possible(space, candidates, refined) -> None:
@@ -63,8 +86,8 @@ def test_all_candidates_stay_and_all_are_possible(space, candidates, refined) ->
     assert used.max() <= TRAVEL_SHARE * space.belief.limits.gauge_travel_mm
 
 
-def test_refining_again_gives_the_same(space, candidates, refined) -> None:
-    np.testing.assert_array_equal(space.refined(candidates).gains, refined.gains)
+def test_refining_again_gives_the_same(space, candidates, refined, rounds) -> None:
+    np.testing.assert_array_equal(space.refined(candidates, rounds).gains, refined.gains)
 
 
 def test_the_best_come_first(refined) -> None:

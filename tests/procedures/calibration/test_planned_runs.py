@@ -9,8 +9,8 @@ import pytest
 
 from hexacell.campaign.pose_list import PoseList
 from hexacell.kinematics.pose import Pose
+from procedures.calibration.campaign_state import campaign_state
 from procedures.calibration.expected_records import expected_records
-from procedures.calibration.identification_steps import campaign_state
 from procedures.calibration.workflow import Calibration
 from procedures.run import events
 from procedures.run.state import fold

@@ -18,6 +18,7 @@ from hexacell.campaign.measured_noise import (
     MeasuredNoise,
     RepeatedApproaches,
 )
+from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.fields import Frozen
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.decision import Verdict
@@ -37,6 +38,7 @@ from procedures.run.steps import (
     Locate,
     Move,
     Phase,
+    Pilot,
     Place,
     Probe,
     Repeat,
@@ -65,6 +67,8 @@ P2 = SetKey(phase=Phase.IDENTIFY, point=2)
         (Sample(at=SetKey(phase=Phase.BEFORE, point=1), orientation=2, pose=POSE), "before-V1/o02/sample"),
         (Move(at=SetKey(phase=Phase.AFTER, point=12), orientation=1, pose=POSE), "after-V12/o01/move"),
         (Standstill(at=P2), "P2/standstill"),
+        (Pilot(at=P2, orientation=FIRST_PILOT + 2, pose=POSE), "P2/pilot03/pilot"),
+        (Move(at=P2, orientation=FIRST_PILOT, pose=POSE), "P2/pilot01/move"),
         (Repeat(at=P2), "P2/repeat"),
         (Probe(at=P2, moved_mm=(1.0, 0.0, 0.0)), "P2/probe"),
         (Try(at=P2), "P2/try"),
@@ -331,7 +335,17 @@ KINDS = (
     *("started", "begun", "arrived", "placed", "sampled", "refused", "closed", "voided", "identified"),
     *("lent", "taken back", "proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
     *("located", "undone", "confirmed", "paused", "resumed", "failed", "declined", "tripped"),
-    *("accepted", "stood", "repeated", "probed", "tried", "noise measured", "excluded", "recalled"),
-    "confirmation planned",
+    *(
+        "accepted",
+        "stood",
+        "piloted",
+        "repeated",
+        "probed",
+        "tried",
+        "noise measured",
+        "excluded",
+        "recalled",
+    ),
+    *("confirmation planned", "piloted"),
 )
 """Journals on disk say these words: they must never change."""

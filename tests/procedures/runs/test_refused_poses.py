@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from drivers.controllers.errors import PoseRefused
+from hexacell.campaign import planner
+from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.simulation import SoftLimits
 from hexacell.errors import ExitCode, IdentifiabilityError, Interruption
 from hexacell.kinematics.pose import Pose
@@ -126,7 +128,21 @@ async def test_a_held_out_point_whose_reference_is_refused_is_left(recording, re
     assert {key.point for key in keys if key.phase is not Phase.IDENTIFY} == {1}
 
 
-async def test_a_refused_visit_of_the_noise_measurement_is_replaced_by_another(make_rig) -> None:
+async def test_a_refused_pilot_pose_is_replaced_by_another(make_rig) -> None:
+    rig = make_rig(**limits(x=(-500.0, 100.5)), noise__revisits=6)
+    enough = on(events.NoiseMeasured, lambda: rig.engine.command(Abort()))
+    with pytest.raises(Interruption):
+        await rig.run(enough)
+    assert {refusal.axis for refusal in excluded(rig)} == {"x"}
+    assert all(refusal.orientation >= FIRST_PILOT for refusal in excluded(rig))
+    assert len(happened(rig, events.PilotTaken)) == 12
+    assert len(happened(rig, events.ReferenceRepeated)) == 6
+
+
+async def test_a_refused_visit_of_the_noise_measurement_is_replaced_by_another(
+    make_rig, monkeypatch
+) -> None:
+    monkeypatch.setattr(planner, "is_well_known", lambda *_: True)
     rig = make_rig(**limits(x=(-500.0, 100.5)), noise__revisits=6)
     enough = on(events.NoiseMeasured, lambda: rig.engine.command(Abort()))
     with pytest.raises(Interruption):

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hexacell.campaign.pilots import PER_DEPARTURE_TO_A_LIST, pilot_number
+from hexacell.campaign.pilots import FIRST_PILOT, PER_DEPARTURE_TO_A_LIST, pilot_number
 from hexacell.cell.fields import LARGEST_NUMBER, GeometryDocument, SixNumbers
 from hexacell.cell.measuring import MOST_POINTS, MOST_POSES, MOST_REVISITS
 from hexacell.cell.model import CellSettings
@@ -136,6 +136,10 @@ class _Event:
             taken = {sample.orientation for sample in self.state.set(event.at).samples}
             if event.orientation in {0, *taken} or (not taken and event.orientation != 1):
                 yield f"orientation {event.orientation} is not the next one"
+        if isinstance(event, events.PilotTaken):
+            due = FIRST_PILOT + len(self.state.set(event.at).pilots)
+            if event.orientation != due or not self.state.set(event.at).samples:
+                yield f"pilot pose {pilot_number(event.orientation)} is not the next one"
 
     def _is_pilot(self, orientation: int) -> bool:
         """Whether a pilot pose is meant, and may be: it is left for, but is no record."""
@@ -159,7 +163,7 @@ class _Event:
         if isinstance(event, ANY_NUMBERS):
             yield from _out_of_range(event.model_dump(), LARGEST_NUMBER, but=("counts", "forecasts"))
         step = event.step if isinstance(event, events.StepBegun) else None
-        if isinstance(step, Move | Place | Sample):
+        if isinstance(step, Move | Place | Sample | Pilot):
             yield from _out_of_range(step.pose, LARGEST_NUMBER)
         reading = event if isinstance(event, events.StandstillRead) else getattr(event, "reading", None)
         if reading is not None and not (reading.counts and all(map(_is_round, reading.counts))):

@@ -27,6 +27,9 @@ FIRST_PILOT = MOST_POSES + 1
 CAUTION = 3.0
 """By how much the noise may exceed what is stated, as far as pilot poses are concerned."""
 
+PILOT_CANDIDATES = 256
+"""Orientations that each is chosen from: with four times as many the records are as good."""
+
 PER_DEPARTURE, PER_DEPARTURE_TO_A_LIST = 2, 4
 """Pilot poses before the robot comes back to the reference; where a file lists the poses that are to be
 measured, more must be known before the first of them is safe."""

@@ -24,7 +24,13 @@ from hexacell.campaign.decisions import (
     StartPoint,
 )
 from hexacell.campaign.forecast import Forecaster, select_sets
-from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, PER_DEPARTURE, PER_DEPARTURE_TO_A_LIST
+from hexacell.campaign.pilots import (
+    CAUTION,
+    FIRST_PILOT,
+    PER_DEPARTURE,
+    PER_DEPARTURE_TO_A_LIST,
+    PILOT_CANDIDATES,
+)
 from hexacell.campaign.planned_uncertainty import planned_systematic_mm
 from hexacell.campaign.pose_chooser import PoseChooser, is_well_known
 from hexacell.campaign.pose_list import PoseList
@@ -128,6 +134,7 @@ class Plan:
             self,
             robot=robot,
             pose_list=None,
+            candidates=min(self.candidates, PILOT_CANDIDATES),
             estimator=None,
             with_forecast=False,
             most_turned=max(turns, default=np.pi),

@@ -7,7 +7,9 @@ from typing import Any
 
 import pytest
 
+from hexacell.application.journal_soundness import MOST_PILOTS
 from hexacell.application.replay_run import replay
+from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.controller_config.interface import ControllerLimits
 from hexacell.errors import FileError, HexacellError
 from procedures.journal.journal import Journal
@@ -35,6 +37,11 @@ def scaled(geometry: dict[str, Any], factor: float) -> dict[str, Any]:
 def reading_changed(history: History, **changes: Any) -> None:
     taken = next(event for event in reversed(history) if isinstance(event, events.RecordTaken))
     changed(history, events.RecordTaken, reading=taken.reading.model_copy(update=changes))
+
+
+def pilot_taken(history: History, orientation: int) -> events.PilotTaken:
+    taken = next(event for event in history if isinstance(event, events.RecordTaken))
+    return events.PilotTaken(at=taken.at, orientation=orientation, pose=taken.pose, reading=taken.reading)
 
 
 FAR = (0.0, 0.0, 5500.0, 0.0, 0.0, 0.0)
@@ -110,6 +117,18 @@ FORGERIES: dict[str, tuple[Callable[[History], None], str]] = {
     "a record taken twice": (
         lambda h: h.append(next(one for one in h if isinstance(one, events.RecordTaken))),
         "orientation 1 is not the next one",
+    ),
+    "a pilot pose as a record": (
+        lambda h: changed(h, events.RecordTaken, orientation=FIRST_PILOT),
+        "there is no orientation 1001",
+    ),
+    "a pilot pose too many": (
+        lambda h: h.append(pilot_taken(h, FIRST_PILOT + MOST_PILOTS)),
+        "there is no orientation 1401",
+    ),
+    "a pilot pose after none": (
+        lambda h: h.append(pilot_taken(h, FIRST_PILOT + 1)),
+        "pilot pose 2 is not the next one",
     ),
     "a pose beyond any machine": (
         lambda h: changed(h, events.Arrived, pose=(1e308,) * 6),

@@ -1,0 +1,140 @@
+"""Pilot records steer the choice of poses at the first point, and count for nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.decisions import CampaignState, StartPoint
+from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, are_counted, pilot_number, with_pilots
+from hexacell.campaign.planner import Plan
+from hexacell.campaign.stopping_rules import StoppingRules
+from hexacell.experiment_design.continuous_design.optimality import DOptimality
+from hexacell.experiment_design.design_efficiency import CampaignMeasure
+from hexacell.identification.estimator import estimate_online
+from hexacell.measurements.records import MeasurementSet
+from tests.hexacell.campaign.conftest import Campaign
+
+
+@pytest.fixture(scope="module")
+def at_first(campaign) -> CampaignState:
+    """The first reference is recorded, and all pilot poses are visited."""
+    found = next(one.state for one in campaign if len(one.state.measurements) == 1)
+    assert isinstance(found, CampaignState)
+    return found
+
+
+def before(state: CampaignState, pilots: int) -> CampaignState:
+    return replace(state, pilots=state.pilots[:pilots], present=state.measurements.records[0].pose)
+
+
+def test_they_follow_the_reference_of_their_point(campaign) -> None:
+    end = campaign[-1].state
+    ids = [record.id for record in end.steering.records]
+    assert ids[:13] == [(1, 1), *((1, FIRST_PILOT + number) for number in range(12))]
+    assert [one for one in ids if one[1] < FIRST_PILOT] == [one.id for one in end.measurements.records]
+    assert [pilot_number(orientation) for _, orientation in ids[:3]] == [None, 1, 2]
+
+
+def test_without_their_reference_they_mean_nothing(campaign) -> None:
+    end = campaign[-1].state
+    others = MeasurementSet(tuple(one for one in end.measurements.records if one.id != (1, 1)))
+    assert with_pilots(others, end.pilots) is others
+    assert with_pilots(end.measurements, ()) is end.measurements
+
+
+def test_they_turn_farther_and_farther_and_stay_inside(two_points, at_first) -> None:
+    reference = at_first.measurements.records[0].pose
+    turned = [reference.angle_to(one.pose) for one in at_first.pilots]
+    assert turned[0] < np.radians(5.0)
+    assert np.mean(turned[6:]) > 2.0 * np.mean(turned[:3])
+    largest = max(np.abs(one.deviation).max() for one in at_first.pilots)
+    assert largest < two_points.robot.limits.gauge_travel_mm
+
+
+def test_they_are_chosen_as_if_the_noise_were_larger_than_stated(two_points, at_first) -> None:
+    """What a pose would show is as uncertain as by a robot with so much noise."""
+    state = before(at_first, 6)
+    cautious = two_points.pilot_pose(state)
+    noisier = replace(two_points.robot, noise=two_points.robot.noise.scaled(CAUTION))
+    same = replace(two_points, robot=noisier, estimator=None).decide(state)
+    assert cautious.pose == same.pose
+    assert cautious.orientation == FIRST_PILOT + 6
+    assert two_points.decide(state).pose != cautious.pose
+
+
+def test_the_same_state_gives_the_same_one(two_points, at_first, make_plan) -> None:
+    state = before(at_first, 4)
+    again = make_plan(identification__points=((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)))
+    assert two_points.pilot_pose(state).pose == again.pilot_pose(state).pose
+
+
+def test_there_are_none_where_none_are_wanted(two_points, at_first, campaign, make_plan) -> None:
+    assert two_points.pilot_pose(at_first) is None, "all are visited"
+    state = before(at_first, 3)
+    assert two_points.pilot_pose(replace(state, rejections=1)) is None, "the estimate is misled"
+    assert two_points.pilot_pose(CampaignState()) is None
+    later = next(one.state for one in campaign if len(one.state.measurements) == 2)
+    assert two_points.pilot_pose(replace(later, pilots=())) is None
+    assert make_plan(noise__revisits=0).pilot_pose(before(at_first, 0)) is None
+
+
+def test_a_robot_that_is_well_known_needs_none(make_plan, paper) -> None:
+    fine = {f"tolerances__{key}": 0.05 for key in ("S_mm", "B_mm", "l_mm", "ball_mm")}
+    plan = make_plan(**fine)
+    (start, *_) = Campaign(plan, paper.nominal).run(most=2)
+    assert isinstance(start.decision, StartPoint)
+    (_, after) = Campaign(plan, paper.nominal).run(most=2)
+    assert after.state.pilots == ()
+
+
+def test_the_first_record_may_turn_far_by_what_they_tell(two_points, at_first) -> None:
+    reference = at_first.measurements.records[0].pose
+    by_all, by_none = (
+        reference.angle_to(two_points.decide(before(at_first, count)).pose) for count in (12, 0)
+    )
+    assert by_none < np.radians(5.0)
+    assert by_all > 2.0 * by_none
+
+
+def test_the_identification_without_them_is_that_of_the_records_alone(two_points, campaign) -> None:
+    end = campaign[-1].state
+    estimate = two_points.estimate(end)
+    assert not are_counted(estimate.identification.problem).all()
+    alone = estimate.of_records_alone()
+    anew = estimate_online(two_points.robot.problem(end.measurements))
+    assert alone.records == len(end.measurements)
+    sigma = np.sqrt(np.diag(anew.free_covariance))
+    assert np.abs((alone.free - anew.free) / sigma).max() < 0.01
+    without = two_points.estimate(replace(end, pilots=()))
+    assert without.of_records_alone() is without.identification
+
+
+def test_records_that_do_not_determine_the_robot_reach_no_target_with_them(make_plan, campaign) -> None:
+    plan: Plan = make_plan(
+        identification__points=((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),
+        identification__orientations=8,
+        identification__target_mm=100.0,
+    )
+    rules: StoppingRules = plan._stopping
+    by_records = {len(one.state.measurements): one.state for one in campaign}
+    few = next(state for count, state in by_records.items() if count >= 10)
+    assert rules.end_of_point(few, few.point or 0) is None, "24 equations of records, 60 with them"
+    assert "within 100" in (rules.end_of_point(by_records[15], 2) or "")
+
+
+def test_a_point_of_a_reference_alone_neither_adds_to_a_design_nor_breaks_its_bound(
+    two_points, campaign
+) -> None:
+    """As where no pose surely kept the ball inside the travel."""
+    records = campaign[-1].state.measurements.records
+    first = MeasurementSet(tuple(one for one in records if one.point == 1))
+    both = MeasurementSet((*first.records, next(one for one in records if one.id == (2, 1))))
+    bounds = []
+    for measured in (first, both):
+        found = estimate_online(two_points.robot.problem(measured))
+        measure = CampaignMeasure.of(two_points.robot.belief(found), found)
+        bounds.append(measure.efficiency(DOptimality(), measure.bound(DOptimality())))
+    assert bounds[1].value == pytest.approx(bounds[0].value, rel=0.02)

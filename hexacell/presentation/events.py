@@ -110,18 +110,27 @@ def _forecast_range(step: Move) -> str:
 def event_text(event: events.Event, state: RunState) -> str | None:
     """What an event reports, if anything."""
     match event:
+        case events.Committed():
+            return f"written to the controller, approved by {event.approved_by}"
+        case events.ProvisionalApplied() | events.ProvisionalReverted() | events.RolledBack():
+            return CONFIG_CHANGES[event.kind]
+        case _:
+            return _text_of_set(event, state) or _finding_text(event) or _further_text(event)
+
+
+def _text_of_set(event: events.Event, state: RunState) -> str | None:
+    """What was measured in a set, or could not be."""
+    match event:
         case events.SetClosed():
             return set_summary(event, state)
         case events.SetInvalidated():
             return f"{set_name(event.at)} is measured again: {event.reason}"
         case events.RecordRejected():
             return f"{pose_name(event.at, event.orientation)} left out: {event.reason}"
-        case events.Committed():
-            return f"written to the controller, approved by {event.approved_by}"
-        case events.ProvisionalApplied() | events.ProvisionalReverted() | events.RolledBack():
-            return CONFIG_CHANGES[event.kind]
+        case events.NoiseMeasured():
+            return _noise_text(event, state)
         case _:
-            return _finding_text(event) or _further_text(event)
+            return None
 
 
 def _basis_or_verdict(event: events.RunStarted | events.ResultValidated) -> str | None:
@@ -140,7 +149,7 @@ def _basis_or_verdict(event: events.RunStarted | events.ResultValidated) -> str 
 
 
 def _finding_text(event: events.Event) -> str | None:
-    """What a start, the measured noise, the quick level, a recall or a verdict reports."""
+    """What a start, the quick level, a recall or a verdict reports."""
     match event:
         case events.RunStarted() | events.ResultValidated():
             return _basis_or_verdict(event)
@@ -148,12 +157,19 @@ def _finding_text(event: events.Event) -> str | None:
             return _identified_text(event)
         case events.RunRecalled():
             return f"the run is to end: {event.reason}; back to the reference"
-        case events.NoiseMeasured():
-            return noise_and_averaging_text(event.noise)
         case events.ConfirmationPlanned():
             return confirmation_text(event)
         case _:
             return None
+
+
+def _noise_text(measured: events.NoiseMeasured, state: RunState) -> str:
+    """The noise, and what else was read meanwhile."""
+    told, pilots = noise_and_averaging_text(measured.noise), len(state.set(measured.at).pilots)
+    if not pilots:
+        return told
+    meanwhile = f"meanwhile {pilots} pilot poses were read, by which the next ones are chosen"
+    return f"{told}\n{wrapped(meanwhile, indent=2)}"
 
 
 def _identified_text(identified: events.Identified) -> str | None:

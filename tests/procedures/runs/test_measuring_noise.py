@@ -110,6 +110,8 @@ async def test_the_reference_is_left_for_two_pilot_poses_each_time(asked: Rig) -
     travel = asked.cell.settings.limits.gauge_travel_mm
     assert max(np.abs(one.deviation).max() for one in state.pilots) < travel
     assert {one.orientation for one in state.measurements().records} == {1, 2}
+    (found,) = happened(asked, events.NoiseMeasured)
+    assert "meanwhile 12 pilot poses were read" in (event_text(found, state) or "")
     assert len(visits) == 6
 
 

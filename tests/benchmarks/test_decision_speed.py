@@ -59,7 +59,7 @@ def seconds_of(moment: Moment) -> float:
     """The quickest of some repetitions of a decision, each with the estimate of before the last record."""
     plan, state, decided = moment
     estimator = OnlineEstimator(plan.robot)
-    estimator.estimate(MeasurementSet(state.measurements.records[:-1]))
+    estimator.estimate(MeasurementSet(state.steering.records[:-1]))
     taken = []
     for _ in range(REPEATS):
         again = replace(plan, estimator=copy.copy(estimator), with_forecast=True)

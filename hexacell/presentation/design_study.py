@@ -19,6 +19,8 @@ WAYS = (
     f"large as all of them stay inside. paper: angles within +-{PAPER_DEG:g} deg and any deviation."
 )
 GREY = "#777777"
+HEADROOM = 1.08
+"""Of an axis that begins at zero: the largest value is inside it."""
 STYLES = {
     OrientationChoice.ADAPTIVE: (AFTER, "s", "-"),
     OrientationChoice.FIXED: (INK, "^", "--"),
@@ -94,7 +96,7 @@ def _finite(value: Any) -> Any:  # noqa: ANN401 - any part of a document
 def design_picture(study: DesignStudy) -> str:
     """The largest error by the number of records, and adaptive campaigns by what limits them."""
     small = [(0.11 + 0.23 * place, 0.10, 0.16, 0.26) for place in range(len(study.sweeps))]
-    figure, (large, *others) = new_figure((7.2, 5.2), (0.11, 0.50, 0.86, 0.46), *small)
+    figure, (large, *others) = new_figure((7.2, 5.2), (0.11, 0.50, 0.86, 0.44), *small)
     for name, curve in study.choices.items():
         colour, marker, line = STYLES[OrientationChoice(name)]
         # A number of records that few robots have says more of these robots than of the number.
@@ -107,7 +109,9 @@ def design_picture(study: DesignStudy) -> str:
         large.semilogy(x, y, marker + line, color=colour, label=name, markersize=4)
     large.set_xlabel("records")
     large.set_ylabel("largest error of a parameter, mm")
-    large.legend(frameon=False, fontsize=7)
+    large.legend(
+        frameon=False, fontsize=7, ncols=len(STYLES), loc="lower center", bbox_to_anchor=(0.5, 1.0)
+    )
     plain_ticks(large.yaxis)
     for axes, (name, rows) in zip(others, study.sweeps.items(), strict=True):
         _draw_sweep(axes, name, rows)
@@ -127,5 +131,5 @@ def _draw_sweep(axes: Any, name: str, rows: Mapping[float, Spread]) -> None:  # 
         plain_ticks(axes.xaxis)
         axes.set_xticks(x[::2])
     else:
-        axes.set_ylim(bottom=0.0)
+        axes.set_ylim(0.0, HEADROOM * max(y, default=1.0))
     axes.tick_params(labelsize=7)

@@ -100,12 +100,19 @@ class VirtualCampaign:
     def _take_pilots(self) -> None:
         """Leave the first reference, as to measure the noise, for pilot poses, and come back."""
         reference = self.state.present
-        while (pilot := self.plan.pilot_pose(self.state)) is not None and reference is not None:
+        while reference is not None and self._depart():
+            self._return_to(reference)
+            self.state = replace(self.state, present=reference)
+
+    def _depart(self) -> bool:
+        """Visit the pilot poses of one departure; whether there is any."""
+        for taken in range(self.plan.pilots_per_departure):
+            pilot = self.plan.pilot_pose(self.state)
+            if pilot is None:
+                return taken > 0
             self._go_to_pose(pilot)
             self._take_pilot(pilot)
-            if len(self.state.pilots) % self.plan.pilots_per_departure == 0 or self.state.rejections:
-                self._return_to(reference)
-                self.state = replace(self.state, present=reference)
+        return True
 
     def _take_pilot(self, pilot: MeasurePose) -> None:
         state = replace(self.state, present=pilot.pose)

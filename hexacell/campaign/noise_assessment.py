@@ -56,6 +56,12 @@ def assess_noise(plan: Plan, readings: NoiseReadings) -> MeasuredNoise:
     return _NoiseAssessment(plan, readings).result()
 
 
+def visits_agree(plan: Plan, readings: NoiseReadings) -> bool:
+    """Whether the noise of a plan's robot, or of the readings at rest, explains the visits so far."""
+    scatter = _NoiseAssessment(plan, readings).scatter
+    return scatter is None or scatter.source is None
+
+
 @dataclass(frozen=True, eq=False)
 class _NoiseAssessment:
     """The parts of one assessment; arrays (9,) have gauges x, y, z, then the encoders."""
@@ -80,7 +86,7 @@ class _NoiseAssessment:
         )
 
     def result(self) -> MeasuredNoise:
-        scatter = self._scatter()
+        scatter = self.scatter
         by_windows = {windows: self._of_records(scatter, windows) for windows in WINDOWS}
         forecaster = AveragingForecaster(self.plan)
         forecasts = forecaster.forecasts({windows: self._noise(one) for windows, one in by_windows.items()})
@@ -96,7 +102,8 @@ class _NoiseAssessment:
             encoders_part_mm=forecaster.encoders_part(self._noise(by_windows[1])),
         )
 
-    def _scatter(self) -> ApproachScatter | None:
+    @property
+    def scatter(self) -> ApproachScatter | None:
         """What the visits show beyond the larger of stated noise and that of the readings."""
         robot, visits, least = self.plan.robot, self.readings.visits, self._at_least(self.stated)
         commands = robot.from_commands([self.readings.reference])

@@ -117,7 +117,7 @@ class Plan:
         is_enough = len(state.pilots) >= most or state.rejections > 0
         if not is_first or is_enough or self.goal is not None:
             return None
-        return self._cautious._pilot_pose(state, state.point or 0)
+        return self.cautious._pilot_pose(state, state.point or 0)
 
     @property
     def pilots_per_departure(self) -> int:
@@ -125,7 +125,7 @@ class Plan:
         return PER_DEPARTURE if self.pose_list is None else PER_DEPARTURE_TO_A_LIST
 
     @cached_property
-    def _cautious(self) -> Plan:
+    def cautious(self) -> Plan:
         """The same before the noise is measured, which may be larger than stated; poses are not listed."""
         robot = replace(self.robot, noise=self.robot.noise.scaled(CAUTION))
         listed = self.pose_list.at(self.points[0]) if self.pose_list is not None else ()

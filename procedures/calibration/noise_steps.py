@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.campaign.noise_assessment import NoiseReadings
+from hexacell.campaign.noise_assessment import NoiseReadings, visits_agree
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.campaign.planner import Plan
 from hexacell.cell.devices import EncoderSettings
@@ -71,7 +71,13 @@ class NoiseSteps:
         return self._to_pilot(state, key)
 
     def _to_pilot(self, state: RunState, key: SetKey) -> Move | None:
-        """The next move to the next pilot pose; none if there is none."""
+        """The next move to the next pilot pose; none if there is none, or the visits do not repeat.
+
+        A robot that shows other places each time it is at one is not known by what it shows.
+        """
+        visits = noise_readings(state.set(key), self.plan.settings.encoders)
+        if not visits_agree(self.plan.cautious, visits):
+            return None
         pilot = self.plan.pilot_pose(campaign_state(state, key))
         return None if pilot is None else move_to_chosen(state, pilot)
 

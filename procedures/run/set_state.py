@@ -18,8 +18,8 @@ class SetState:
         reference_unverified: the gauges were unwatched; their zero must be verified at the reference.
         standstill: readings at the reference without moving, and ``visits`` of it.
         has_left: the robot has been elsewhere since it was read last.
-        pilots: readings elsewhere, which steer the choice of poses; ``piloted`` of them were tried since
-            the reference was read last.
+        pilots: readings elsewhere, which steer the choice of poses; ``piloted`` of them since the reference
+            was read last.
         probes: readings beside the reference, which try the gauges; ``tried`` once they have passed, until
             the gauges are unwatched.
     """
@@ -76,7 +76,7 @@ class SetState:
     def with_rejection(self, orientation: int) -> SetState:
         """One more rejected record; its orientation is chosen again."""
         again = tuple(pair for pair in self.again if pair[0] != orientation)
-        return replace(self, rejections=self.rejections + 1, again=again, piloted=self.piloted + 1)
+        return replace(self, rejections=self.rejections + 1, again=again)
 
     def without(self, orientation: int) -> SetState:
         """One record less; a closed set is open again with its reference unverified."""

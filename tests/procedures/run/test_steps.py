@@ -335,17 +335,7 @@ KINDS = (
     *("started", "begun", "arrived", "placed", "sampled", "refused", "closed", "voided", "identified"),
     *("lent", "taken back", "proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
     *("located", "undone", "confirmed", "paused", "resumed", "failed", "declined", "tripped"),
-    *(
-        "accepted",
-        "stood",
-        "piloted",
-        "repeated",
-        "probed",
-        "tried",
-        "noise measured",
-        "excluded",
-        "recalled",
-    ),
+    *("accepted", "stood", "repeated", "probed", "tried", "noise measured", "excluded", "recalled"),
     *("confirmation planned", "piloted"),
 )
 """Journals on disk say these words: they must never change."""

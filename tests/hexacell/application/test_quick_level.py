@@ -7,6 +7,7 @@ import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hexacell.application.accepted_results import last_accepted_result
@@ -173,7 +174,9 @@ def test_what_effects_did_to_the_result_before_counts(corrected) -> None:
     whole, forgetful = (task.budget(found, belief, robot.effects, one) for one in (robot.known_effects, {}))
     assert whole is not None
     assert forgetful is not None
-    assert whole.systematic_mm != pytest.approx(forgetful.systematic_mm, rel=1e-3)
+    # At one pose, as the worst, it may happen to change nothing: by the noise of the run it is more or less.
+    by_pose = [np.linalg.norm(budget.systematic[:, :3], axis=(1, 2)) for budget in (whole, forgetful)]
+    assert not np.allclose(*by_pose, rtol=1e-3)
 
 
 async def test_it_is_resumed_in_its_mode(drifted, corrected) -> None:

@@ -174,7 +174,7 @@ def test_what_effects_did_to_the_result_before_counts(corrected) -> None:
     whole, forgetful = (task.budget(found, belief, robot.effects, one) for one in (robot.known_effects, {}))
     assert whole is not None
     assert forgetful is not None
-    # At one pose, as the worst, it may happen to change nothing: by the noise of the run it is more or less.
+    # By the noise of the run it is more or less, so that at one pose it may happen to change nothing.
     by_pose = [np.linalg.norm(budget.systematic[:, :3], axis=(1, 2)) for budget in (whole, forgetful)]
     assert not np.allclose(*by_pose, rtol=1e-3)
 

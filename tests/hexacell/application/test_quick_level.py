@@ -175,8 +175,10 @@ def test_what_effects_did_to_the_result_before_counts(corrected) -> None:
     assert whole is not None
     assert forgetful is not None
     # By the noise of the run it is more or less, so that at one pose it may happen to change nothing.
-    by_pose = [np.linalg.norm(budget.systematic[:, :3], axis=(1, 2)) for budget in (whole, forgetful)]
-    assert not np.allclose(*by_pose, rtol=1e-3)
+    remembered, forgotten = (
+        np.linalg.norm(budget.systematic[:, :3], axis=(1, 2)) for budget in (whole, forgetful)
+    )
+    assert not np.allclose(remembered, forgotten, rtol=1e-3)
 
 
 async def test_it_is_resumed_in_its_mode(drifted, corrected) -> None:

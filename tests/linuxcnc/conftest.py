@@ -153,7 +153,7 @@ class LinuxCNC:
             )
 
     def _answers_in_time(self, process: subprocess.Popen[bytes]) -> bool:
-        """Whether its server answers at last; nothing but time tells that one that still runs never will."""
+        """Whether its server answers; nothing but time tells that one that still runs never will."""
         given_up = time.monotonic() + STARTED_S
         wait_until(lambda: self._answers() or process.poll() is not None or time.monotonic() > given_up)
         return self._answers()

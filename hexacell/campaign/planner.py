@@ -69,7 +69,7 @@ class Plan:
         goal: what the records are for; none to identify the geometry as well as the settings ask for.
         earlier: what the systematic effects did to an earlier result that is the prior, by their names.
         left_points: points that are not measured, counted from 1.
-        most_turned: the largest tilt and twist of selected poses against a point's reference, rad.
+        most_turned: the largest angle from a point's reference to a selected pose, rad, by the estimate.
     """
 
     settings: CellSettings

@@ -14,13 +14,14 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.errors import LimitError
 from hexacell.experiment_design import candidates
-from hexacell.experiment_design.candidate_refinement import QUICK, THOROUGH
+from hexacell.experiment_design.candidate_refinement import QUICK, THOROUGH, Rounds
 from hexacell.experiment_design.candidates import Amplitudes
 from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion
 from hexacell.experiment_design.pose_selection import SelectedPose, select_from_list, select_pose
 from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.identified_zeros import ParameterChoice, zero_columns
+from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.motion.paths import PathPlanner, find_route
@@ -48,7 +49,7 @@ class PoseChooser:
         known_then: gives the covariance (p, p) once all that is planned is measured but the next record,
             which has to gain beside it as soon as the robot is well known; none where the plan may end
             sooner.
-        most_turned: the largest tilt and twist of selected poses against the reference, rad.
+        most_turned: the largest angle from the reference to a selected pose, rad, by the estimate.
     """
 
     settings: CellSettings
@@ -128,9 +129,15 @@ class PoseChooser:
         orientations = candidates.orientations(
             count, tilt, self._seed(state), amplitudes, min(belief.limits.turn, self.most_turned)
         )
+        angles = np.linalg.norm(rotations.to_vector(orientations), axis=1)
+        allowed = orientations[angles <= self.most_turned]
         known_then = self.known_then(belief, state) if well_known and self.known_then else None
-        rounds = QUICK if len(state.measurements) >= LATE_RECORDS else THOROUGH
-        return select_pose(planner, zero, orientations, self._criterion(belief), known_then, rounds)
+        return select_pose(planner, zero, allowed, self._criterion(belief), known_then, self._rounds(state))
+
+    def _rounds(self, state: CampaignState) -> Rounds:
+        if self.most_turned < np.pi:
+            return ()  # they would turn candidates further
+        return QUICK if len(state.measurements) >= LATE_RECORDS else THOROUGH
 
     def _criterion(self, belief: RobotBelief) -> Criterion:
         name = self.settings.identification.criterion

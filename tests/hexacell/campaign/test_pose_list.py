@@ -73,8 +73,8 @@ def test_a_list_without_small_rotations_is_visited_after_pilot_poses(plan_of, ma
     state = carry_out(plan_of(poses))[-1].state
     assert len(state.measurements) == 16
     reference, pilots = poses[0][0], [record.pose for record in state.pilots]
-    # Refinement turns beyond the largest candidate.
-    assert max(map(reference.angle_to, pilots)) < 2.0 * max(turned)
+    # The commanded angle is the one of the estimated robot but for its errors.
+    assert max(map(reference.angle_to, pilots)) < 1.02 * max(turned)
 
 
 def test_a_pose_that_is_not_safe_yet_is_postponed(plan_of, visited, carry_out):

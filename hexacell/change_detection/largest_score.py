@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import ndtri
 
+from hexacell.distributions import normal_limit
 from hexacell.kinematics.rotations import Array
 
 FALSE_ALARMS = 0.01
@@ -27,4 +27,4 @@ def largest_by_chance(unit: Array) -> float:
 
 def largest_of_independent(scores: int) -> float:
     """The same of so many scores whose correlations nobody looks at: it is exceeded no more often."""
-    return float(-ndtri(0.5 * FALSE_ALARMS / scores))
+    return normal_limit(0.5 * FALSE_ALARMS / scores)

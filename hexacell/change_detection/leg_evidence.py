@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 from hexacell.kinematics.rotations import Array
 
@@ -35,8 +34,8 @@ def possible_legs(scores: Array, sigmas: Array, legs: NDArray[np.int_]) -> tuple
 
 def legs_by_evidence(evidence: Array, legs: NDArray[np.int_]) -> tuple[int, ...]:
     """The same by the logarithm of the evidence (m,) for each cause."""
-    of_leg = {int(leg): float(logsumexp(evidence[legs == leg])) for leg in np.unique(legs)}
+    of_leg = {int(leg): float(np.logaddexp.reduce(evidence[legs == leg])) for leg in np.unique(legs)}
     ordered = sorted(of_leg, key=of_leg.__getitem__, reverse=True)
-    total = logsumexp(list(of_leg.values()))
+    total = np.logaddexp.reduce(list(of_leg.values()))
     together = np.cumsum([np.exp(of_leg[leg] - total) for leg in ordered])
     return tuple(ordered[: 1 + int(np.searchsorted(together, CERTAIN))])

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from hexacell.change_detection.carried_posterior import CarriedPosterior
 from hexacell.change_detection.causes import Causes
@@ -125,4 +124,4 @@ def _evidence_of_motion(rates: Array, covariance: Array) -> float:
     information = np.linalg.inv(covariance)
     precision = np.diag(information)
     of_each = 0.5 * ((information @ rates) ** 2 / precision - np.log(USUAL_RATE**2 * precision))
-    return float(logsumexp(of_each) - np.log(len(rates)))
+    return float(np.logaddexp.reduce(of_each) - np.log(len(rates)))

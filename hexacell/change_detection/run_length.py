@@ -10,7 +10,8 @@ of their run lengths add (Kemp, Journal of the Royal Statistical Society B 23, 1
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import ndtr
+
+from hexacell.distributions import normal_probability
 
 STATES = 250
 HIGHEST = 20.0
@@ -28,8 +29,8 @@ def one_sided_run_length(limit: float, reference: float, shift: float = 0.0) -> 
     width = 2.0 * limit / (2 * STATES - 1)
     centres = width * np.arange(STATES)
     steps = centres[None, :] - centres[:, None] + reference - shift
-    stays = ndtr(steps + 0.5 * width) - ndtr(steps - 0.5 * width)
-    stays[:, 0] = ndtr(steps[:, 0] + 0.5 * width)
+    stays = normal_probability(steps + 0.5 * width) - normal_probability(steps - 0.5 * width)
+    stays[:, 0] = normal_probability(steps[:, 0] + 0.5 * width)
     return float(np.linalg.solve(np.eye(STATES) - stays, np.ones(STATES))[0])
 
 

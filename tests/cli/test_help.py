@@ -13,7 +13,7 @@ from hexacell.cli.app import main
 from hexacell.cli.parser import make_parser
 
 SLOW_TO_IMPORT = {"numpy", "scipy", "textual", "matplotlib", "pydantic", "rich", "asyncio"}
-UNNEEDED_AT_START = {"sqlalchemy", "matplotlib", "textual", "scipy.stats", "scipy.optimize", "scipy.linalg"}
+UNNEEDED_AT_START = {"sqlalchemy", "matplotlib", "textual", "scipy"}
 COMMANDS = (
     "demo",
     "run",

@@ -9,8 +9,8 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.special import chdtri
 
+from hexacell.distributions import chi_square_limit
 from hexacell.identification.data_faults.fault_model import (
     PENALTY_PER_UNKNOWN,
     CorrectedFit,
@@ -206,12 +206,10 @@ def _zero_shift(model: LinearizedModel, scale: float) -> Iterator[ZeroShiftHypot
     statistics = ZeroShiftStatistics.of(model)
     if not len(statistics.rows):
         return
-    best, critical = (
-        int(np.argmax(statistics.gains)),
-        chdtri(3, FALSE_SHIFTS_PER_FILE / len(statistics.rows)),
-    )
+    best = int(np.argmax(statistics.gains))
+    critical = chi_square_limit(3, FALSE_SHIFTS_PER_FILE / len(statistics.rows))
     gain = float(statistics.gains[best])
-    if (significance := gain / scale / float(critical)) > 1.0:
+    if (significance := gain / scale / critical) > 1.0:
         point, orientation = model.problem.labels[statistics.rows[best]].tolist()
         yield ZeroShiftHypothesis(
             gain=gain,

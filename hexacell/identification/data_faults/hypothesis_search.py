@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 
 import numpy as np
-from scipy.special import chdtri
 
+from hexacell.distributions import chi_square_limit
 from hexacell.identification.data_faults.fault_model import CorrectedFit, FaultHypothesis
 from hexacell.identification.data_faults.hypotheses import (
     GaugeFaultHypothesis,
@@ -42,7 +42,7 @@ LARGEST_REJECTED_SHARE = 0.1
 
 TRIED_FROM_EACH_LIST = 3
 LARGEST_TRIMMED_SHARE = 0.25
-CRITICAL_STATISTIC = float(chdtri(3, 1e-4))
+SIGNIFICANCE = 1e-4
 
 
 def search(current: CorrectedFit) -> CorrectedFit | None:
@@ -165,7 +165,7 @@ class _ExpansionPoint:
             return None
         statistics = OutlierStatistics.of(model)
         worst = int(np.argmax(statistics.omnibus))
-        is_significant = statistics.omnibus[worst] > CRITICAL_STATISTIC * statistics.scale
+        is_significant = statistics.omnibus[worst] > chi_square_limit(3, SIGNIFICANCE) * statistics.scale
         return model.problem.labels[worst] if is_significant else None
 
     def _model(self, kept: Mask) -> LinearizedModel | None:

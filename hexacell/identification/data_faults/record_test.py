@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
 
+from hexacell.distributions import chi_square_limit
 from hexacell.identification.data_faults import messages
 from hexacell.identification.data_faults.gauge_faults import GAUGE_FAULTS
 from hexacell.identification.data_faults.hypotheses import record_ids, record_mask
@@ -126,9 +126,9 @@ def _simplest_cause(offset: Array, readings: Array, information: Array) -> tuple
         unexplained = [offset + fault.remedy @ readings - readings for fault in GAUGE_FAULTS]
         squares = [float(rest @ information @ rest) for rest in unexplained]
         best = int(np.argmin(squares))
-        if squares[best] < chdtri(3, SIGNIFICANCE):
+        if squares[best] < chi_square_limit(3, SIGNIFICANCE):
             return GAUGE_FAULTS[best].kind, GAUGE_FAULTS[best].gauges
     along = (information @ offset) ** 2 / np.maximum(np.diag(information), 1e-300)
     worst = int(np.argmax(along))
     others = float(offset @ information @ offset - along[worst])
-    return DataFaultKind.GROSS_ERROR, GAUGES[worst] if others < chdtri(2, SIGNIFICANCE) else ""
+    return DataFaultKind.GROSS_ERROR, GAUGES[worst] if others < chi_square_limit(2, SIGNIFICANCE) else ""

@@ -26,8 +26,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri, ndtri
 
+from hexacell.distributions import chi_square_limit, normal_limit
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.linearized_model import LinearizedModel
 from hexacell.kinematics.rotations import Array
@@ -75,8 +75,9 @@ class OutlierStatistics:
         """
         records = len(self.omnibus)
         rate = min(FALSE_ALARMS_PER_RECORD, FALSE_ALARMS_PER_FILE / records) * (found_before + 1) / 2.0
-        along_a_gauge = self.along_gauges.max(axis=-1) / ndtri(rate / 6.0) ** 2
-        threshold_ratio: Array = np.maximum(along_a_gauge, self.omnibus / chdtri(3, rate)) / self.scale
+        along_a_gauge = self.along_gauges.max(axis=-1) / normal_limit(rate / 6.0) ** 2
+        in_space = self.omnibus / chi_square_limit(3, rate)
+        threshold_ratio: Array = np.maximum(along_a_gauge, in_space) / self.scale
         return threshold_ratio
 
 

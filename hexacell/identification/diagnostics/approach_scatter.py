@@ -24,8 +24,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.special import chdtrc, chdtri
 
+from hexacell.distributions import chi_square_exceedance, chi_square_limit
 from hexacell.identification.diagnostics.standstill import SIGNIFICANCE
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
@@ -104,7 +104,7 @@ class ApproachScatter:
     @property
     def ratio_at_most(self) -> float:
         """Upper limit of the true multiple, with 95 % confidence."""
-        return float(np.sqrt(self.chi_square / chdtri(self.degrees_of_freedom, CONFIDENCE)))
+        return float(np.sqrt(self.chi_square / chi_square_limit(self.degrees_of_freedom, CONFIDENCE)))
 
 
 def approach_scatter(
@@ -125,7 +125,7 @@ def approach_scatter(
     visits = _Visits.of(shown, by_joints, np.diag(np.concatenate([gauges_mm, encoders]) ** 2))
     freedom, chi_square = 3 * visits.freedom, visits.unexplained()
     found = ApproachScatter(len(deviations), freedom, visits.ball_mm, chi_square)
-    if float(chdtrc(freedom, chi_square)) >= SIGNIFICANCE:
+    if chi_square_exceedance(freedom, chi_square) >= SIGNIFICANCE:
         return found
     excesses = {source: visits.excess(source) for source in ScatterSource}
     source = _named(excesses)

@@ -11,8 +11,8 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
 
+from hexacell.distributions import chi_square_limit
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 
@@ -44,7 +44,7 @@ class Repeatability:
     def at_least_mm(self) -> float:
         """Lower limit of the distance, with 95 % confidence."""
         freedom = 3 * self.degrees_of_freedom
-        return self.distance_mm * float(np.sqrt(freedom / chdtri(freedom, 1.0 - CONFIDENCE)))
+        return self.distance_mm * float(np.sqrt(freedom / chi_square_limit(freedom, 1.0 - CONFIDENCE)))
 
     def dominates(self, error_mm: float) -> bool:
         """Whether an error (root mean square distance, mm) is significantly smaller than the scatter."""

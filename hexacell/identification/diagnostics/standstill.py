@@ -20,8 +20,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri, stdtr, stdtrit
 
+from hexacell.distributions import chi_square_limit, student_exceedance, student_limit
 from hexacell.kinematics.rotations import Array, Mask
 
 SMALLEST_SERIES = 8
@@ -73,7 +73,7 @@ class ReadingNoise:
     def exceeds(self, stated: float, readings: int, significance: float = SIGNIFICANCE) -> bool:
         """Whether the mean of successive readings is significantly noisier than stated (chi-square)."""
         freedom = self.degrees_of_freedom * (1.0 - self.correlation) / (1.0 + self.correlation)
-        most = stated**2 * float(chdtri(freedom, significance)) / freedom
+        most = stated**2 * chi_square_limit(freedom, significance) / freedom
         return self.of_mean(readings) ** 2 > most
 
 
@@ -93,7 +93,7 @@ def reading_noise(values: Array, step_mm: float) -> ReadingNoise:
     sigma = max(float(np.sqrt(line.squares / line.freedom)), floor)
     correlation = _correlation(line.residuals[kept]) if sigma > floor else 0.0
     slope_sigma = sigma * np.sqrt((1.0 + correlation) / (1.0 - correlation)) / line.lever
-    beyond = 2.0 * float(stdtr(line.freedom, -abs(line.slope) / slope_sigma))
+    beyond = 2.0 * student_exceedance(line.freedom, abs(line.slope) / slope_sigma)
     drift = line.slope * (len(values) - 1) if beyond < SIGNIFICANCE else 0.0
     outliers = len(values) - int(kept.sum())
     return ReadingNoise(sigma, line.freedom, float(drift), outliers, correlation)
@@ -157,7 +157,7 @@ def _is_extreme(line: _Line, row: int, step_mm: float) -> bool:
     variance = max(others / freedom, step_mm**2 / 12.0)
     statistic = abs(line.residuals[row]) / np.sqrt(variance * share)
     readings = line.freedom + 2
-    return bool(statistic > -stdtrit(freedom, 0.5 * SIGNIFICANCE / readings))
+    return bool(statistic > student_limit(freedom, 0.5 * SIGNIFICANCE / readings))
 
 
 def _correlation(residuals: Array) -> float:

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import chdtri
 
+from hexacell.distributions import chi_square_limit
 from hexacell.identification.problem.problem import Tolerances
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
@@ -238,7 +238,7 @@ class _Step:
 def _limit(holding: int) -> float:
     """Of T, held by a number of tolerances; that of a single one is exceeded to one side only."""
     probability = 2.0 * PROBABILITY if holding <= 1 else PROBABILITY
-    return float(chdtri(max(holding, 1), probability))
+    return chi_square_limit(max(holding, 1), probability)
 
 
 def _rank(columns: Array) -> int:

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from scipy.special import chdtr, chdtrc
+
+from hexacell.distributions import chi_square_exceedance
 
 SMALLEST_PROBABILITY = 1e-3
 CONTRADICTED_RATIO = 10.0
@@ -50,7 +51,7 @@ class ChiSquareTest:
     @property
     def probability(self) -> float:
         """Probability of residuals at least this large, if model and stated noise are right."""
-        return float(chdtrc(self.expected, self.chi2)) if self.expected > 0.0 else 1.0
+        return chi_square_exceedance(self.expected, self.chi2) if self.expected > 0.0 else 1.0
 
     @property
     def ratio(self) -> float:
@@ -65,7 +66,7 @@ class ChiSquareTest:
         smallest, largest = RATIOS_THAT_MATTER
         if self.ratio > largest and self.probability < SMALLEST_PROBABILITY:
             return ChiSquareVerdict.TOO_LARGE
-        if self.ratio < smallest and chdtr(self.expected, self.chi2) < SMALLEST_PROBABILITY:
+        if self.ratio < smallest and 1.0 - self.probability < SMALLEST_PROBABILITY:
             return ChiSquareVerdict.TOO_SMALL
         return ChiSquareVerdict.AGREES
 

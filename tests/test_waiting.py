@@ -23,6 +23,7 @@ ALLOWED = {
     "drivers/simulated/linuxcnc/conftest.py": "how fast a fake machine moves, and that nothing is said",
     "faults/conftest.py": "how long a whole run takes, of which moments are drawn",
     "faults/driver.py": "kills at a drawn moment",
+    "linuxcnc/conftest.py": "how long LinuxCNC may take before it is started again",
     "packages/scale_box/hexacell_scale_box.py": "is a driver, which waits for no answer longer than it may",
     "procedures/journal/test_journal.py": "compares a moment with those in a journal",
 }

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hexacell.campaign.pilots import FIRST_PILOT, PER_DEPARTURE_TO_A_LIST, pilot_number
+from hexacell.campaign.pilots import FIRST_PILOT, most_pilots, pilot_number
 from hexacell.cell.fields import LARGEST_NUMBER, GeometryDocument, SixNumbers
 from hexacell.cell.measuring import MOST_POINTS, MOST_POSES, MOST_REVISITS
 from hexacell.cell.model import CellSettings
@@ -56,7 +56,7 @@ OF_PILOTS = (
     events.PoseExcluded,
 )
 """Steps and events that may be about a pilot pose."""
-MOST_PILOTS = PER_DEPARTURE_TO_A_LIST * MOST_REVISITS
+MOST_PILOTS = most_pilots(MOST_REVISITS, is_listed=True)
 
 
 def require_sound(

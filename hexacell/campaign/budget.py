@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from hexacell.campaign.pilots import pilots_per_departure
 from hexacell.campaign.speed_limits import speed_limits
 from hexacell.cell.model import CellSettings
 from hexacell.kinematics.parameters import JointUnit
@@ -72,7 +73,8 @@ def noise_minutes(settings: CellSettings, pilots: int) -> float:
     Some departures are for ``pilots``, poses at which the gauges are read.
     """
     noise, timing = settings.noise, settings.timing
-    departures = max(noise.revisits, pilots)
+    for_pilots = math.ceil(pilots / pilots_per_departure(settings.identification.poses is not None))
+    departures = pilots + max(0, noise.revisits - for_pilots)
     moves = (departures + noise.revisits) * usual_move_seconds(settings)
     windows = (noise.revisits + pilots) * timing.window_s
     return (noise.standstill_readings * timing.interval_s + moves + windows) / 60.0

@@ -30,9 +30,22 @@ CAUTION = 3.0
 PILOT_CANDIDATES = 256
 """Orientations that each is chosen from: with four times as many the records are as good."""
 
-PER_DEPARTURE, PER_DEPARTURE_TO_A_LIST = 2, 4
-"""Pilot poses before the robot comes back to the reference; where a file lists the poses that are to be
-measured, more must be known before the first of them is safe."""
+PER_DEPARTURE, MOST_PILOTS = 3, 14
+"""Pilot poses before the robot comes back to the reference, and in all."""
+
+PER_DEPARTURE_TO_A_LIST, MOST_TO_A_LIST = 4, 24
+"""The same where a file lists the poses to measure: more must be known before the first of them is safe."""
+
+
+def pilots_per_departure(is_listed: bool) -> int:
+    """At how many pilot poses the gauges are read before the robot comes back to the reference."""
+    return PER_DEPARTURE_TO_A_LIST if is_listed else PER_DEPARTURE
+
+
+def most_pilots(departures: int, is_listed: bool) -> int:
+    """At how many in all, if the reference is left so often."""
+    most = MOST_TO_A_LIST if is_listed else MOST_PILOTS
+    return min(most, departures * pilots_per_departure(is_listed))
 
 
 def pilot_number(orientation: int) -> int | None:

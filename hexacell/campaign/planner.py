@@ -27,9 +27,9 @@ from hexacell.campaign.forecast import Forecaster, select_sets
 from hexacell.campaign.pilots import (
     CAUTION,
     FIRST_PILOT,
-    PER_DEPARTURE,
-    PER_DEPARTURE_TO_A_LIST,
     PILOT_CANDIDATES,
+    most_pilots,
+    pilots_per_departure,
 )
 from hexacell.campaign.planned_uncertainty import planned_systematic_mm
 from hexacell.campaign.pose_chooser import PoseChooser, is_well_known
@@ -113,7 +113,7 @@ class Plan:
             HexacellError: no geometry fits the records.
         """
         is_first = state.point is not None and len(state.measurements) == 1
-        most = self.pilots_per_departure * self.settings.noise.revisits
+        most = most_pilots(self.settings.noise.revisits, self.pose_list is not None)
         is_enough = len(state.pilots) >= most or state.rejections > 0
         if not is_first or is_enough or self.goal is not None:
             return None
@@ -122,7 +122,7 @@ class Plan:
     @property
     def pilots_per_departure(self) -> int:
         """At how many pilot poses the gauges are read before the robot comes back to the reference."""
-        return PER_DEPARTURE if self.pose_list is None else PER_DEPARTURE_TO_A_LIST
+        return pilots_per_departure(self.pose_list is not None)
 
     @cached_property
     def cautious(self) -> Plan:

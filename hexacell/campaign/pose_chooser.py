@@ -24,6 +24,7 @@ from hexacell.identification.identified_zeros import ParameterChoice, zero_colum
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
+from hexacell.limits.limits import Limits
 from hexacell.motion.paths import PathPlanner, find_route
 from hexacell.robot_model import Robot
 
@@ -33,6 +34,10 @@ informative."""
 
 LATE_RECORDS = 44
 """From so many on candidates are refined less, so that a decision with most to fit takes no longer."""
+
+FIRST_TURN = np.radians(0.3)
+"""Of the first pose of all, rad. Of robots within the tolerances that can stand at the first reference, two
+in a thousand have less than a degree left there to the end of a passive joint, and nothing tells which."""
 
 SMALL_TILT_SHARE = 0.1
 """Of the largest tilt, for candidates where none of full size is safe."""
@@ -121,23 +126,25 @@ class PoseChooser:
         if self.pose_list is not None:
             waiting = without_visited(self.pose_list.at(state.point or 0)[1:], _visited(state))
             return select_from_list(planner, zero, self.robot.from_commands(waiting), state.rejections)
-        tilt = min(tilt_share * belief.limits.tilt, self.most_turned)
         well_known = is_well_known(belief, zero)
+        is_blind = len(state.steering) == 1 and not well_known
+        most = min(self.most_turned, FIRST_TURN) if is_blind else self.most_turned
+        turns = self._turns(belief.limits, state, well_known, most, tilt_share)
+        known_then = self.known_then(belief, state) if well_known and self.known_then else None
+        rounds = () if most < np.pi else _rounds(state)  # they would turn candidates further
+        return select_pose(planner, zero, turns, self._criterion(belief), known_then, rounds)
+
+    def _turns(
+        self, limits: Limits, state: CampaignState, well_known: bool, most: float, tilt_share: float
+    ) -> Array:
+        """Candidates (n, 3, 3), relative to the platform's orientation at the reference."""
         # The best are refined: more candidates are needed only where few of them are safe.
         count = self.candidates // 2 if well_known else self.candidates
         amplitudes = Amplitudes.MOSTLY_LARGE if well_known else Amplitudes.ALL_SCALES
-        orientations = candidates.orientations(
-            count, tilt, self._seed(state), amplitudes, min(belief.limits.turn, self.most_turned)
-        )
-        angles = np.linalg.norm(rotations.to_vector(orientations), axis=1)
-        allowed = orientations[angles <= self.most_turned]
-        known_then = self.known_then(belief, state) if well_known and self.known_then else None
-        return select_pose(planner, zero, allowed, self._criterion(belief), known_then, self._rounds(state))
-
-    def _rounds(self, state: CampaignState) -> Rounds:
-        if self.most_turned < np.pi:
-            return ()  # they would turn candidates further
-        return QUICK if len(state.measurements) >= LATE_RECORDS else THOROUGH
+        tilt, turn = min(tilt_share * limits.tilt, most), min(limits.turn, most)
+        turns = candidates.orientations(count, tilt, self._seed(state), amplitudes, turn)
+        allowed: Array = turns[np.linalg.norm(rotations.to_vector(turns), axis=1) <= most]
+        return allowed
 
     def _criterion(self, belief: RobotBelief) -> Criterion:
         name = self.settings.identification.criterion
@@ -155,6 +162,10 @@ class PoseChooser:
         point = state.point or 0
         attempt = state.records_at(point) + 100 * state.rejections + 10_000 * len(state.pilots)
         return self.settings.identification.seed + 1000 * point + attempt
+
+
+def _rounds(state: CampaignState) -> Rounds:
+    return QUICK if len(state.measurements) >= LATE_RECORDS else THOROUGH
 
 
 def is_well_known(belief: RobotBelief, zero: GaugeZero) -> bool:

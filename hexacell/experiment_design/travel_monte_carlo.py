@@ -13,7 +13,9 @@ approach to chance constraints (Calafiore & Campi, IEEE Trans. Automatic Control
 variates. How cautious the evaluation is depends on the standard deviation s of the orientation:
 
 - s <= ``UNCERTAIN_SIGMA``: few samples. All of them, and their mean and ``SIGMAS`` standard deviations,
-  must be inside ``travel / (1 + s / HALF_TRAVEL_SIGMA)``: the less is known, the heavier the tails.
+  must be inside ``travel / (1 + s / HALF_TRAVEL_SIGMA)``: the less is known, the heavier the tails. Of what
+  passive joints have left few samples show too little in some directions, and just such poses would be
+  chosen: there ``MARGIN_SIGMAS`` standard deviations by linear propagation count.
 - above: many samples, of which all but the worst must stay within ``UNCERTAIN_SHARE`` of the travel.
 
 The constants were chosen so that of 1,000 simulated robots none left the travel.
@@ -54,6 +56,10 @@ STAGES_UNCERTAIN = (24, 96)
 """After how many samples the targets that they exclude are left out."""
 
 SIGMAS = 4.0
+
+MARGIN_SIGMAS = 5.0
+"""Standard deviations, by linear propagation, of what passive joints and legs have left. After the first
+dozen of poses its errors are up to 1.45 times as large: second derivatives count while so much is open."""
 
 FEWEST_SAMPLES = 6
 """Sampled robots that can take the reference pose; fewer are not sufficient."""
@@ -116,7 +122,21 @@ class TravelConstraint:
         sampled = _sample(belief, _standard_normal(SAMPLES, len(belief.free)), joints, poses, sensitivity)
         if len(sampled.found) < FEWEST_SAMPLES:
             return np.zeros(len(targets), dtype=bool)
-        return _all_within(sampled, belief.limits, 1.0 / (1.0 + sigma / HALF_TRAVEL_SIGMA))
+        holds = _all_within(sampled, belief.limits, 1.0 / (1.0 + sigma / HALF_TRAVEL_SIGMA))
+        holds[holds] = self._margins_suffice(targets[holds])
+        return holds
+
+    def _margins_suffice(self, targets: ReachableTargets) -> Mask:
+        """At which of n targets passive joints and legs have enough left for what is not known of them."""
+        belief, suffice = self.belief, self._legs_are_free(targets)
+        if suffice.all():
+            return suffice
+        near = targets[~suffice]
+        at = (belief.mechanism, belief.estimate, near.poses, near.joints)
+        sigmas = belief.margin_sigmas(near.poses, near.joints, free_sensitivity(*at))
+        wanted = np.maximum(belief.least_margins, MARGIN_SIGMAS * sigmas)
+        suffice[~suffice] = (belief.limits.leg_margins(*at) >= wanted).all(axis=-1)
+        return suffice
 
     @cached_property
     def is_uncertain(self) -> bool:

@@ -107,21 +107,26 @@ class RobotBelief:
         margins = np.tile(self.least_margins, (len(at.joints), 1))
         known = np.flatnonzero(self._orientation_sigmas(sensitivity.free) <= UNCERTAIN_SIGMA)
         if len(known):
-            margins[known] += SPARE_SIGMAS * self._margin_sigmas(at[known], sensitivity[known])
+            there = at[known]
+            sigmas = self.margin_sigmas(there.poses, there.joints, sensitivity[known])
+            margins[known] += SPARE_SIGMAS * sigmas
         return margins
 
-    def _margin_sigmas(self, at: ActualPoses, sensitivity: FreeSensitivity) -> Array:
-        """Standard deviations (n, m) of the margins of passive joints and legs at n poses."""
+    def margin_sigmas(self, poses: PoseBatch, joints: Array, sensitivity: FreeSensitivity) -> Array:
+        """Standard deviations (n, m) of the margins of passive joints and legs at n poses.
+
+        By linear propagation, from the ``sensitivity`` there.
+        """
         changes = np.vstack([np.zeros(len(self.free)), self._principal_changes])
-        count, every = len(at.joints), len(changes)
+        count, every = len(joints), len(changes)
         rows = np.arange(count).repeat(every)
         robots = GeometryBatch(
             self.mechanism.parameters, np.tile(self.estimate.vector + changes @ self.basis.T, (count, 1))
         )
         steps = changes @ np.swapaxes(sensitivity.free, -1, -2)
-        moved = apply_twist(at.poses[rows], steps.reshape(-1, 6))
-        margins = self.limits.leg_margins(self.mechanism, robots, moved, at.joints[rows])
-        margins = margins.reshape(count, every, -1)
+        moved = apply_twist(poses[rows], steps.reshape(-1, 6))
+        margins = self.limits.leg_margins(self.mechanism, robots, moved, joints[rows])
+        margins = margins.reshape(count, every, margins.shape[-1])
         sigmas: Array = np.linalg.norm(margins[:, 1:] - margins[:, :1], axis=1)
         return sigmas
 

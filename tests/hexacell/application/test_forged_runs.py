@@ -124,7 +124,7 @@ FORGERIES: dict[str, tuple[Callable[[History], None], str]] = {
     ),
     "a pilot pose too many": (
         lambda h: h.append(pilot_taken(h, FIRST_PILOT + MOST_PILOTS)),
-        "there is no orientation 1401",
+        "there is no orientation 1025",
     ),
     "a pilot pose after none": (
         lambda h: h.append(pilot_taken(h, FIRST_PILOT + 1)),

@@ -59,7 +59,9 @@ def test_minutes_are_of_everything_that_is_measured(result, make_plan):
     timing, move_s = plan.settings.timing, usual_move_seconds(plan.settings)
     poses = 3 * (6 + 1) + 3 * (6 + 5 + 1)
     held_out = poses * (move_s + timing.window_s) / 60.0
-    noise = (40 * 0.1 + (12 + 6) * (move_s + 0.6)) / 60.0  # to two pilot poses, and back
+    noise = (
+        40 * 0.1 + (14 + 1 + 6) * move_s + (14 + 6) * 0.6
+    ) / 60.0  # to pilot poses, once beside, and back
     records = plan.budget.time_model.minutes(result.records, 2)
     assert result.minutes == pytest.approx(noise + records + held_out)
 

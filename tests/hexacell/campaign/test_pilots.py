@@ -33,7 +33,7 @@ def before(state: CampaignState, pilots: int) -> CampaignState:
 def test_they_follow_the_reference_of_their_point(campaign) -> None:
     end = campaign[-1].state
     ids = [record.id for record in end.steering.records]
-    assert ids[:13] == [(1, 1), *((1, FIRST_PILOT + number) for number in range(12))]
+    assert ids[:15] == [(1, 1), *((1, FIRST_PILOT + number) for number in range(14))]
     assert [one for one in ids if one[1] < FIRST_PILOT] == [one.id for one in end.measurements.records]
     assert [pilot_number(orientation) for _, orientation in ids[:3]] == [None, 1, 2]
 
@@ -137,4 +137,4 @@ def test_a_point_of_a_reference_alone_neither_adds_to_a_design_nor_breaks_its_bo
         found = estimate_online(two_points.robot.problem(measured))
         measure = CampaignMeasure.of(two_points.robot.belief(found), found)
         bounds.append(measure.efficiency(DOptimality(), measure.bound(DOptimality())))
-    assert bounds[1].value == pytest.approx(bounds[0].value, rel=0.02)
+    assert bounds[1].value == pytest.approx(bounds[0].value, rel=0.04)

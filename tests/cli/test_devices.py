@@ -67,6 +67,8 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulated instruments share a busy machine with other tests; real ones answer at once."""
     monkeypatch.setattr("drivers.discovery.gauges.TIMEOUT_S", 2.0)
+    monkeypatch.setattr("drivers.discovery.encoders.TIMEOUT_S", 2.0)
+    monkeypatch.setattr("drivers.discovery.encoders.FIRST_RESPONSE_S", 30.0)
     monkeypatch.setattr("drivers.discovery.controllers.TIMEOUT_S", 10.0)
 
 

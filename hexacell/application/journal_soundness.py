@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from hexacell.campaign.pilots import FIRST_PILOT, most_pilots, pilot_number
+from hexacell.campaign.pilots import FIRST_PILOT, MOST_TO_A_LIST, pilot_number
 from hexacell.cell.fields import LARGEST_NUMBER, GeometryDocument, SixNumbers
-from hexacell.cell.measuring import MOST_POINTS, MOST_POSES, MOST_REVISITS
+from hexacell.cell.measuring import MOST_POINTS, MOST_POSES
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ControllerLimits, JointRanges
 from hexacell.errors import FileError
@@ -56,7 +56,6 @@ OF_PILOTS = (
     events.PoseExcluded,
 )
 """Steps and events that may be about a pilot pose."""
-MOST_PILOTS = most_pilots(MOST_REVISITS, is_listed=True)
 
 
 def require_sound(
@@ -146,7 +145,7 @@ class _Event:
         event = self.event
         told = event.step if isinstance(event, events.StepBegun | events.Failed) else event
         number = pilot_number(orientation)
-        return isinstance(told, OF_PILOTS) and number is not None and number <= MOST_PILOTS
+        return isinstance(told, OF_PILOTS) and number is not None and number <= MOST_TO_A_LIST
 
     def _points(self, phase: Phase) -> int:
         if not self.follows_plan:

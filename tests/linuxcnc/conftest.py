@@ -68,8 +68,8 @@ class LinuxCNC:
     def start(self) -> None:
         """Start it and wait until its server answers.
 
-        LinuxCNC itself may fail to start: its task gives up where the first commands to the motion are not
-        taken in time, as on a machine that is busy with other things. It is then started again.
+        One that ends or stays silent is started again: that was seen once, on a machine that had just
+        installed it, and not why.
         """
         for _ in range(STARTS):
             self._process = self._started()

@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from hexacell.application.journal_soundness import MOST_PILOTS
 from hexacell.application.replay_run import replay
-from hexacell.campaign.pilots import FIRST_PILOT
+from hexacell.campaign.pilots import FIRST_PILOT, MOST_TO_A_LIST
 from hexacell.controller_config.interface import ControllerLimits
 from hexacell.errors import FileError, HexacellError
 from procedures.journal.journal import Journal
@@ -123,7 +122,7 @@ FORGERIES: dict[str, tuple[Callable[[History], None], str]] = {
         "there is no orientation 1001",
     ),
     "a pilot pose too many": (
-        lambda h: h.append(pilot_taken(h, FIRST_PILOT + MOST_PILOTS)),
+        lambda h: h.append(pilot_taken(h, FIRST_PILOT + MOST_TO_A_LIST)),
         "there is no orientation 1025",
     ),
     "a pilot pose after none": (

@@ -15,13 +15,13 @@ Lengths are mm, angles in files deg. Errors are :class:`HexacellError`, with a m
 next action. Nothing here moves a robot.
 """
 
-from hexacell.application.offline import NextPose, fit_measurements, next_pose
-from hexacell.application.reported_run import ReportedRun, reported_run
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.errors import HexacellError
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.reporting.assessment import Assessment
+from hexacell.services.history.reported_run import ReportedRun, reported_run
+from hexacell.services.records.offline import NextPose, fit_measurements, next_pose
+from hexacell.verdict.assessment import Assessment
 
 __all__ = [
     "Assessment",

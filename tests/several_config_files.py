@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.controller_config.hal_pins import HalPins
-from hexacell.controller_config.layout import ConfigLayout, FormatOfFile
-from hexacell.controller_config.linuxcnc_ini import LinuxcncIni
-from hexacell.controller_config.toml_format import NativeToml
+from hexacell.config.hal_pins import HalPins
+from hexacell.config.layout import ConfigLayout, FormatOfFile
+from hexacell.config.linuxcnc_ini import LinuxcncIni
+from hexacell.config.toml_format import NativeToml
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS
 from tests.cli.cell_folder import CONFIGS

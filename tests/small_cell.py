@@ -15,7 +15,7 @@ from hexacell.campaign import feasibility
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
-from hexacell.experiment_design.continuous_design import pose_bound
+from hexacell.design.continuous_design import pose_bound
 from procedures.calibration import measuring, workflow
 from procedures.run import events
 

@@ -15,7 +15,7 @@ from drivers.simulated.served_device import Closeable
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
-from hexacell.controller_config.layout import ConfigLayout
+from hexacell.config.layout import ConfigLayout
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import Pose
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from drivers.simulated.gauge_places import GaugePlaces
-from hexacell.controller_config.contents import fingerprint
+from hexacell.config.contents import fingerprint
 from hexacell.errors import FileError
 from hexacell.kinematics.rotations import Array
 from hexacell.storage.atomic_files import write_atomically

@@ -17,7 +17,7 @@ from drivers.simulated.gauge_places import GaugePlaces
 from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
-from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import ReachError
 from hexacell.kinematics.forward import continue_solution, forward_kinematics
 from hexacell.kinematics.geometry import Geometry

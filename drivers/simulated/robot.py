@@ -11,8 +11,8 @@ from drivers.simulated.linuxcnc.state import KinematicsFailure, SoftLimitExceede
 from drivers.simulated.physics import RobotPhysics
 from hexacell.cell.simulation import SoftLimits
 from hexacell.clock import CellClock
-from hexacell.controller_config.interface import ControllerGeometry
-from hexacell.controller_config.layout import ConfigLayout
+from hexacell.config.interface import ControllerGeometry
+from hexacell.config.layout import ConfigLayout
 from hexacell.errors import FileError
 from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import continue_solution

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.measurements.records import Record, deviation_of, joints_of
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 
 
 def exact_records(robot: Robot, point: int, poses: PoseBatch) -> Iterator[Record]:

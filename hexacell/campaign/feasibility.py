@@ -10,15 +10,15 @@ import numpy as np
 
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.planner import Plan
+from hexacell.design.predicted_records import GaugeZero, estimate_gauge_zero
 from hexacell.errors import HexacellError, LimitError, ReachError, UsageError
-from hexacell.experiment_design.predicted_records import GaugeZero, estimate_gauge_zero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.identified_zeros import ParameterChoice, zeros_by_noise
 from hexacell.identification.solver.result import UNDETERMINED_RATIO
 from hexacell.kinematics.pose import Pose
 from hexacell.motion.path_check import is_clear
-from hexacell.pose_limits import broken_limits
-from hexacell.virtual_robot import VirtualRobot, robots_within_tolerances
+from hexacell.robot.pose_limits import broken_limits
+from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 
 ROBOTS = 32
 """Number of robots drawn within the tolerances."""

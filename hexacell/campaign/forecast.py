@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from hexacell.campaign.budget import Budget
 from hexacell.campaign.decisions import CampaignState, Forecast
 from hexacell.campaign.task_accuracy import Task, TaskError
-from hexacell.experiment_design import candidates
-from hexacell.experiment_design.candidates import ReachableTargets, reachable
-from hexacell.experiment_design.criteria import D_OPTIMAL, add_information, covariance_update
-from hexacell.experiment_design.pose_selection import SelectedPose
-from hexacell.experiment_design.predicted_records import position_derivatives
+from hexacell.design import candidates
+from hexacell.design.candidates import ReachableTargets, reachable
+from hexacell.design.criteria import D_OPTIMAL, add_information, covariance_update
+from hexacell.design.pose_selection import SelectedPose
+from hexacell.design.predicted_records import position_derivatives
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.kinematics.pose import Pose, PoseBatch

@@ -11,7 +11,7 @@ from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 
 
 def planned_systematic_mm(

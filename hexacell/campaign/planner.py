@@ -46,7 +46,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Record, deviation_of, joints_of
 from hexacell.motion.paths import find_route
 from hexacell.motion.standing import stands_within_limits
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 
 CANDIDATES = 1024
 PROVISIONAL_SIGMA = float(np.radians(2.0))

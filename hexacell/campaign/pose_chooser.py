@@ -12,13 +12,13 @@ from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.pose_list import PoseList, without_visited
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
+from hexacell.design import candidates
+from hexacell.design.candidate_refinement import QUICK, THOROUGH, Rounds
+from hexacell.design.candidates import Amplitudes
+from hexacell.design.criteria import D_OPTIMAL, Criterion
+from hexacell.design.pose_selection import SelectedPose, select_from_list, select_pose
+from hexacell.design.predicted_records import GaugeZero
 from hexacell.errors import LimitError
-from hexacell.experiment_design import candidates
-from hexacell.experiment_design.candidate_refinement import QUICK, THOROUGH, Rounds
-from hexacell.experiment_design.candidates import Amplitudes
-from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion
-from hexacell.experiment_design.pose_selection import SelectedPose, select_from_list, select_pose
-from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.identified_zeros import ParameterChoice, zero_columns
 from hexacell.kinematics import rotations
@@ -26,7 +26,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
 from hexacell.motion.paths import PathPlanner, find_route
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 
 WELL_KNOWN_SIGMA = np.radians(0.5)
 """Standard deviation of the platform's orientation below which large rotations are safe, and most

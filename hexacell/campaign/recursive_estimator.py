@@ -13,14 +13,14 @@ import numpy as np
 
 from hexacell.campaign.estimate_chain import ChainedEstimate, update_estimate
 from hexacell.campaign.pilots import are_counted
+from hexacell.design.predicted_records import GaugeZero, gauge_zero_at
 from hexacell.errors import LimitError
-from hexacell.experiment_design.predicted_records import GaugeZero, gauge_zero_at
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import MeasurementSet, Record, RecordId
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.cell.model import CellSettings
-from hexacell.experiment_design.candidates import workspace_poses
+from hexacell.design.candidates import workspace_poses
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.pose_accuracy import error_jacobian
 from hexacell.identification.identified_zeros import HeldParameters, IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.scale_observation import ScaleObservation

@@ -8,8 +8,12 @@ import termios
 from collections.abc import Coroutine
 from typing import Any
 
-from hexacell.attach.connection import RunConnection
-from hexacell.attach.messages import (
+from hexacell.cli.console import Console
+from hexacell.cli.run_status import RunStatus
+from hexacell.cli.terminal import APPROVER, KeyboardCommands
+from hexacell.errors import ExitCode, HexacellError
+from hexacell.run_process.connection import RunConnection
+from hexacell.run_process.messages import (
     ControlChanged,
     EventRecorded,
     HostFailed,
@@ -19,22 +23,18 @@ from hexacell.attach.messages import (
     RunDescribed,
     StatusChanged,
 )
-from hexacell.attach.snapshots import LiveSnapshot
-from hexacell.cli.console import Console
-from hexacell.cli.run_status import RunStatus
-from hexacell.cli.terminal import APPROVER, KeyboardCommands
-from hexacell.errors import ExitCode, HexacellError
-from hexacell.presentation.answers import request_text, typed_answer
-from hexacell.presentation.events import EventFormatter
-from hexacell.presentation.layout import wrapped
-from hexacell.presentation.line_face import (
+from hexacell.run_process.snapshots import LiveSnapshot
+from hexacell.text.answers import request_text, typed_answer
+from hexacell.text.events import EventFormatter
+from hexacell.text.layout import wrapped
+from hexacell.text.line_face import (
     DETACHABLE_LETTERS,
     attached_resume_hint,
     control_text,
     gauges_text,
     record_text,
 )
-from hexacell.presentation.run import question_text
+from hexacell.text.run import question_text
 from procedures.run import events
 from procedures.run.commands import Answer, Command
 from procedures.run.questions import Question

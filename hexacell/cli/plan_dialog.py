@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 
-from hexacell.application.plan_draft import PlanDraft, preview_of, try_mode
 from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell
 from hexacell.cli.console import Console
 from hexacell.errors import AnswerNeeded, UsageError
-from hexacell.presentation.layout import wrapped
-from hexacell.presentation.plan_draft import REQUEST, mode_trial_lines, plan_rows, removed_text
-from hexacell.presentation.planning import TRYING_PLAN
+from hexacell.services.preflight.plan_draft import PlanDraft, preview_of, try_mode
+from hexacell.text.layout import wrapped
+from hexacell.text.plan_draft import REQUEST, mode_trial_lines, plan_rows, removed_text
+from hexacell.text.planning import TRYING_PLAN
 from procedures.calibration.workflow import Mode
 
 

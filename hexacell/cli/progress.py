@@ -11,9 +11,9 @@ from rich.console import Console as RichConsole
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hexacell.cli.console import Console
-from hexacell.presentation.events import EventFormatter, activity
-from hexacell.presentation.layout import wrapped
-from hexacell.presentation.line_face import record_text
+from hexacell.text.events import EventFormatter, activity
+from hexacell.text.layout import wrapped
+from hexacell.text.line_face import record_text
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Place

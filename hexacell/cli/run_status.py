@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from hexacell.campaign.decisions import Forecast
-from hexacell.presentation.events import activity
-from hexacell.presentation.line_face import run_status_text
+from hexacell.text.events import activity
+from hexacell.text.line_face import run_status_text
 from procedures.engine.command_loop import Status
 from procedures.run import events
 from procedures.run.state import RunState

@@ -7,9 +7,9 @@ from collections.abc import Coroutine
 from types import TracebackType
 from typing import Any, Self
 
-from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.cli.console import Console
-from hexacell.presentation.line_face import gauges_text
+from hexacell.run_process.run_device_watch import RunDeviceWatch
+from hexacell.text.line_face import gauges_text
 from procedures.run.cancellation import cancel_and_wait
 
 

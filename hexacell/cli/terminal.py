@@ -11,9 +11,9 @@ from typing import Any, TextIO, TypeVar
 
 from hexacell.cli.console import Console
 from hexacell.errors import AnswerNeeded
-from hexacell.presentation.answers import request_text, typed_answer
-from hexacell.presentation.line_face import LETTERS
-from hexacell.presentation.run import question_text
+from hexacell.text.answers import request_text, typed_answer
+from hexacell.text.line_face import LETTERS
+from hexacell.text.run import question_text
 from procedures.run import events
 from procedures.run.commands import Abort, Command, MeasureAgain, Pause, Resume, Undo
 from procedures.run.questions import Question

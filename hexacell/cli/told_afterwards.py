@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from hexacell.application.calibration_run import RunRequest
-from hexacell.application.cell_status import cell_status
-from hexacell.application.run_notices import RunEnd, notice_of_end, notice_of_failure
-from hexacell.application.telling_people import tell_people
 from hexacell.cell.loader import Cell
 from hexacell.cli.archive_argument import publish_or_warn
 from hexacell.cli.console import Console
-from hexacell.presentation.notices import NEXT_TIME, telling_line
+from hexacell.services.history.cell_status import cell_status
+from hexacell.services.notify.run_notices import RunEnd, notice_of_end, notice_of_failure
+from hexacell.services.notify.telling_people import tell_people
+from hexacell.services.run.calibration_run import RunRequest
+from hexacell.text.notices import NEXT_TIME, telling_line
 
 
 @dataclass

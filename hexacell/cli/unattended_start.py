@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from hexacell.application.calibration_run import RunRequest
-from hexacell.application.unattended_runs import local_now, refuse_quiet_hours, refused_start
 from hexacell.cli.console import Console
 from hexacell.cli.signal_commands import SignalCommands
 from hexacell.errors import HexacellError
-from hexacell.presentation.run import next_try_text
+from hexacell.services.run.calibration_run import RunRequest
+from hexacell.services.schedule.unattended_runs import local_now, refuse_quiet_hours, refused_start
+from hexacell.text.run import next_try_text
 from procedures.run import events
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from hexacell.application.history import past_runs
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError
 from hexacell.result_server.published_result import PublishedResult, published_result
 from hexacell.runs.folder_stamps import folder_stamps
 from hexacell.runs.run_folder import runs_folder
+from hexacell.services.history.history import past_runs
 
 
 class NewResults:

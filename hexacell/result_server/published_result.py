@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from enum import IntEnum
 
-from hexacell.application.history import PastRun
-from hexacell.decision import Verdict
+from hexacell.services.history.history import PastRun
+from hexacell.verdict.decision import Verdict
 
 
 class ResultEvaluation(IntEnum):

@@ -16,7 +16,6 @@ from textual.css.query import NoMatches
 from textual.screen import Screen
 
 from hexacell.errors import HexacellError
-from hexacell.presentation.screens.views import FaultView
 from hexacell.screen.assistant_screen import Assistant, AssistantScreen
 from hexacell.screen.backend import ONCE, Backend, ScreenAction
 from hexacell.screen.cell_screen import CellScreen
@@ -35,6 +34,7 @@ from hexacell.screen.review_screen import ReviewScreen
 from hexacell.screen.tab_screen import TabScreen
 from hexacell.screen.themes import SCREEN_THEMES
 from hexacell.screen.widgets.key_line import KeyLine
+from hexacell.text.screens.views import FaultView
 
 DRAWN_EVERY_S = 0.1
 LEAVING_TAKES_S = 6.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hexacell.application.first_cell import CellDraft
 from hexacell.errors import HexacellError
-from hexacell.presentation.screens.first_questions import first_question
-from hexacell.presentation.screens.views import FirstQuestionView
+from hexacell.services.devices.first_cell import CellDraft
+from hexacell.text.screens.first_questions import first_question
+from hexacell.text.screens.views import FirstQuestionView
 
 
 class FirstCellAssistant:

@@ -12,8 +12,8 @@ from textual.containers import Vertical
 from textual.screen import Screen
 from textual.widgets import Input
 
-from hexacell.presentation.screens.views import FirstQuestionView, Urgency
 from hexacell.screen.widgets.text_panel import TextPanel
+from hexacell.text.screens.views import FirstQuestionView, Urgency
 
 
 class Assistant(Protocol):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Protocol
 
-from hexacell.presentation.screens.views import (
+from hexacell.text.screens.views import (
     CellView,
     ChecklistView,
     FaultView,

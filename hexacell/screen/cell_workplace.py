@@ -6,32 +6,32 @@ import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from hexacell.application.config_rollback import roll_back_config
-from hexacell.application.held_config import settle_config
-from hexacell.application.history import PastRun, compare_runs, parameter_trends, past_runs
-from hexacell.application.interrupted_runs import LATEST, run_to_resume
-from hexacell.application.journal_soundness import require_sound
-from hexacell.application.plan_draft import PlanPreview
-from hexacell.application.proposals import apply_proposal, approval_question, read_proposal
-from hexacell.application.security_warnings import exposure_warnings
-from hexacell.attach.client import connect_to_run, start_host
-from hexacell.attach.connection import RunConnection
-from hexacell.attach.device_watch import watch_devices
-from hexacell.attach.recorded import RecordedRun
-from hexacell.attach.run_socket import socket_path
-from hexacell.attach.snapshots import LiveSnapshot
 from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.passwords import password_warnings
 from hexacell.errors import UsageError
-from hexacell.presentation.config_changes import applied_text, rollback_text
-from hexacell.presentation.history import comparison_text, drift_text
-from hexacell.presentation.screens.past import history_entries
-from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.run_process.client import connect_to_run, start_host
+from hexacell.run_process.connection import RunConnection
+from hexacell.run_process.device_watch import watch_devices
+from hexacell.run_process.recorded import RecordedRun
+from hexacell.run_process.run_socket import socket_path
+from hexacell.run_process.snapshots import LiveSnapshot
 from hexacell.runs.run_folder import find_run, new_run
 from hexacell.screen.backend import RESUME, WITH_LENGTH
 from hexacell.screen.child_process import run_child
 from hexacell.screen.workplace import Preflight, TriedPlan
+from hexacell.services.history.history import PastRun, compare_runs, parameter_trends, past_runs
+from hexacell.services.preflight.plan_draft import PlanPreview
+from hexacell.services.preflight.security_warnings import exposure_warnings
+from hexacell.services.recorded.journal_soundness import require_sound
+from hexacell.services.run.interrupted_runs import LATEST, run_to_resume
+from hexacell.services.write_back.config_rollback import roll_back_config
+from hexacell.services.write_back.held_config import settle_config
+from hexacell.services.write_back.proposals import apply_proposal, approval_question, read_proposal
+from hexacell.text.config_changes import applied_text, rollback_text
+from hexacell.text.history import comparison_text, drift_text
+from hexacell.text.screens.past import history_entries
+from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
 from procedures.calibration.workflow import Mode
 from procedures.journal.journal import read_journal
 from procedures.run.events import RunStarted

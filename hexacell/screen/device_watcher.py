@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
-from hexacell.attach.snapshots import LiveSnapshot
 from hexacell.errors import HexacellError
+from hexacell.run_process.snapshots import LiveSnapshot
 from procedures.run.cancellation import cancel_and_wait
 
 AGAIN_AFTER_S = 3.0

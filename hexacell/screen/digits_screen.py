@@ -8,10 +8,10 @@ from textual.app import ComposeResult
 from textual.binding import BindingType
 from textual.screen import Screen
 
-from hexacell.presentation.screens.block_digits import ROWS, block_text
-from hexacell.presentation.screens.views import GaugeReadout
 from hexacell.screen.backend import Backend
 from hexacell.screen.widgets.text_panel import TextPanel
+from hexacell.text.screens.block_digits import ROWS, block_text
+from hexacell.text.screens.views import GaugeReadout
 
 GAUGES = 3
 OTHER_ROWS = 5

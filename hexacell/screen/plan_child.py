@@ -7,12 +7,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from hexacell.application.offline import try_plan
-from hexacell.application.plan_draft import preview_of
 from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import load_cell
 from hexacell.errors import HexacellError
-from hexacell.presentation.planning import plan_trial_lines
+from hexacell.services.preflight.plan_draft import preview_of
+from hexacell.services.records.offline import try_plan
+from hexacell.text.planning import plan_trial_lines
 
 
 def tried_plan_document(path: Path, removed: RemovedPoses) -> dict[str, Any]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 
-from hexacell.application.plan_draft import PlanDraft
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.errors import UsageError
-from hexacell.presentation.plan_draft import removed_text
-from hexacell.presentation.screens.checklists import TRYING
 from hexacell.screen.workplace import TriedPlan, Workplace
+from hexacell.services.preflight.plan_draft import PlanDraft
+from hexacell.text.plan_draft import removed_text
+from hexacell.text.screens.checklists import TRYING
 
 
 class PlanTrials:

@@ -8,12 +8,12 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
-from hexacell.application.calibration_run import preflight
 from hexacell.cell.loader import load_cell
 from hexacell.errors import HexacellError
-from hexacell.presentation.planning import device_line
-from hexacell.presentation.screens.checklists import failed_items, passed_items
-from hexacell.presentation.screens.views import ChecklistItem
+from hexacell.services.run.calibration_run import preflight
+from hexacell.text.planning import device_line
+from hexacell.text.screens.checklists import failed_items, passed_items
+from hexacell.text.screens.views import ChecklistItem
 from procedures.calibration.workflow import Mode
 
 

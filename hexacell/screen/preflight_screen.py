@@ -7,10 +7,10 @@ from typing import ClassVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from hexacell.presentation.screens.lines import checklist_lines
 from hexacell.screen.backend import WITH_LENGTH, Backend
 from hexacell.screen.tab_screen import TabScreen
 from hexacell.screen.widgets.text_panel import TextList, TextPanel
+from hexacell.text.screens.lines import checklist_lines
 
 
 class PreflightScreen(TabScreen):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from hexacell.attach.connection import RunConnection
-from hexacell.attach.messages import HostFailed, HostMessage, StatusChanged
 from hexacell.errors import HexacellError, UsageError
-from hexacell.presentation.screens.run_picture import RunPicture, picture_after
+from hexacell.run_process.connection import RunConnection
+from hexacell.run_process.messages import HostFailed, HostMessage, StatusChanged
+from hexacell.text.screens.run_picture import RunPicture, picture_after
 from procedures.engine.command_loop import Status
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.commands import Command

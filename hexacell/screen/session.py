@@ -8,16 +8,21 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from hexacell.cell.loader import describe
-from hexacell.presentation.screens.checklists import RUNNING, STARTING, checklist_view
-from hexacell.presentation.screens.faults import fault_view
-from hexacell.presentation.screens.headers import header_view
-from hexacell.presentation.screens.live import live_view
-from hexacell.presentation.screens.measuring import measure_view
-from hexacell.presentation.screens.past import PROPOSAL_WAITS, history_view, rollback_question
-from hexacell.presentation.screens.planned_poses import plan_view
-from hexacell.presentation.screens.questions import question_view
-from hexacell.presentation.screens.reviewing import review_view
-from hexacell.presentation.screens.views import (
+from hexacell.screen.backend import ScreenAction
+from hexacell.screen.device_watcher import DeviceWatcher
+from hexacell.screen.run_follower import RunFollower
+from hexacell.screen.session_actions import SessionActions
+from hexacell.screen.workplace import Workplace
+from hexacell.text.screens.checklists import RUNNING, STARTING, checklist_view
+from hexacell.text.screens.faults import fault_view
+from hexacell.text.screens.headers import header_view
+from hexacell.text.screens.live import live_view
+from hexacell.text.screens.measuring import measure_view
+from hexacell.text.screens.past import PROPOSAL_WAITS, history_view, rollback_question
+from hexacell.text.screens.planned_poses import plan_view
+from hexacell.text.screens.questions import question_view
+from hexacell.text.screens.reviewing import review_view
+from hexacell.text.screens.views import (
     CellView,
     ChecklistView,
     FaultView,
@@ -29,11 +34,6 @@ from hexacell.presentation.screens.views import (
     QuestionView,
     ReviewView,
 )
-from hexacell.screen.backend import ScreenAction
-from hexacell.screen.device_watcher import DeviceWatcher
-from hexacell.screen.run_follower import RunFollower
-from hexacell.screen.session_actions import SessionActions
-from hexacell.screen.workplace import Workplace
 from procedures.run.commands import Answer
 
 

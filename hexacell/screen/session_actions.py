@@ -6,18 +6,18 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import partial
 
-from hexacell.attach.connection import RunConnection
-from hexacell.attach.recorded import RecordedRun
-from hexacell.controller_config.three_way import ConfigEditedSince
+from hexacell.config.three_way import ConfigEditedSince
 from hexacell.errors import HexacellError, UsageError
-from hexacell.presentation.config_changes import RELOAD, versions_text
-from hexacell.presentation.screens.questions import PERSON
-from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry
+from hexacell.run_process.connection import RunConnection
+from hexacell.run_process.recorded import RecordedRun
 from hexacell.screen.backend import ONCE, ScreenAction
 from hexacell.screen.device_watcher import DeviceWatcher
 from hexacell.screen.plan_trials import PlanTrials
 from hexacell.screen.run_follower import RunFollower
 from hexacell.screen.workplace import Workplace
+from hexacell.text.config_changes import RELOAD, versions_text
+from hexacell.text.screens.questions import PERSON
+from hexacell.text.screens.views import ChecklistItem, HistoryEntry
 from procedures.calibration.workflow import Mode
 from procedures.engine.command_loop import Status
 from procedures.run.commands import Abort, Command, MeasureAgain, Pause, Resume, Undo

@@ -6,12 +6,12 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from hexacell.application.plan_draft import PlanPreview
-from hexacell.attach.connection import RunConnection
-from hexacell.attach.snapshots import LiveSnapshot
 from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell
-from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry
+from hexacell.run_process.connection import RunConnection
+from hexacell.run_process.snapshots import LiveSnapshot
+from hexacell.services.preflight.plan_draft import PlanPreview
+from hexacell.text.screens.views import ChecklistItem, HistoryEntry
 from procedures.run.questions import Question
 
 

@@ -19,7 +19,7 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import has_singularity_margin
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 
 BATCH = 64
 BATCHES = 60

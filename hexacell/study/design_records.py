@@ -8,26 +8,26 @@ from enum import StrEnum
 
 import numpy as np
 
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.cell.model import CellSettings
-from hexacell.errors import LimitError
-from hexacell.experiment_design.candidates import ReachableTargets, commands_for, reachable_targets
-from hexacell.experiment_design.continuous_design.pose_domain import PoseDomain
-from hexacell.experiment_design.criteria import D_OPTIMAL, covariance_update
-from hexacell.experiment_design.predicted_records import (
+from hexacell.design.candidates import ReachableTargets, commands_for, reachable_targets
+from hexacell.design.continuous_design.pose_domain import PoseDomain
+from hexacell.design.criteria import D_OPTIMAL, covariance_update
+from hexacell.design.predicted_records import (
     GaugeZero,
     estimate_gauge_zero,
     predict_records,
 )
+from hexacell.dry_run.campaign import VirtualCampaign
+from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
+from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.study.data_sets import unlimited_travel
-from hexacell.virtual_robot import VirtualRobot
 
 RANDOM_DEG = (20.0, 14.0, 10.0, 7.0, 5.0, 3.5, 2.5, 1.8, 1.2, 0.9, 0.6, 0.4)
 """Amplitudes of random angles, the largest first."""

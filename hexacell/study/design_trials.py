@@ -14,15 +14,15 @@ import numpy as np
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
+from hexacell.design.design_efficiency import DesignEfficiency, design_efficiency
 from hexacell.errors import HexacellError
-from hexacell.experiment_design.design_efficiency import DesignEfficiency, design_efficiency
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot_model import Robot, robot_of
+from hexacell.robot.model import Robot, robot_of
+from hexacell.robot.virtual_robot import random_robot
 from hexacell.study.design_records import ChosenRecords, OrientationChoice, chosen_records
-from hexacell.virtual_robot import random_robot
 
 RECORDS = 55
 SEED = 18

@@ -25,7 +25,7 @@ from hexacell.identification.problem.problem import Noise, Problem
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import Robot, robot_of
+from hexacell.robot.model import Robot, robot_of
 from hexacell.study.data_sets import DataSet, unlimited_travel
 from hexacell.study.paper_simulation import NOISE_MM, SEED
 from hexacell.study.reference_solvers import gauss_newton

@@ -24,7 +24,7 @@ from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot_model import Robot, robot_of
+from hexacell.robot.model import Robot, robot_of
 from hexacell.study.data_sets import unlimited_travel
 from hexacell.study.reference_solvers import gauss_newton_steps
 

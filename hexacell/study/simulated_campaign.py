@@ -9,16 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.campaign.decisions import MeasurePose, StartPoint
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.cell.model import CellSettings
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.motion.paths import next_return_move
-from hexacell.robot_model import Robot
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.model import Robot
+from hexacell.robot.virtual_robot import VirtualRobot
 
 
 class SimulatedCampaign(VirtualCampaign):

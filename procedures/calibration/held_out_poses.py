@@ -14,15 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.cell.model import CellSettings
+from hexacell.design import candidates
+from hexacell.design.validation_poses import select_near, select_validation_poses
 from hexacell.errors import LimitError
-from hexacell.experiment_design import candidates
-from hexacell.experiment_design.validation_poses import select_near, select_validation_poses
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 from procedures.run.steps import SixNumbers
 
 CONFIRMING_SEED = 1_000_003

@@ -7,14 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.model import CellSettings
 from hexacell.errors import DeviceError, joined
-from hexacell.identification.diagnostics.gauge_trial import (
+from hexacell.kinematics.rotations import Array
+from hexacell.noise.gauge_trial import (
     GaugeMistake,
     TrialFinding,
     judge_response,
     response_of,
 )
-from hexacell.kinematics.rotations import Array
-from hexacell.stated_limits import gauge_travel_of
+from hexacell.robot.stated_limits import gauge_travel_of
 from procedures.run.steps import ThreeNumbers
 
 MISTAKES: Mapping[GaugeMistake, tuple[str, str, str]] = {

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.campaign.noise_assessment import NoiseReadings, visits_agree
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.campaign.planner import Plan
 from hexacell.cell.devices import EncoderSettings
 from hexacell.cell.measuring import NoiseSettings
-from hexacell.identification.diagnostics.standstill import display_step
 from hexacell.kinematics.pose import Pose
 from hexacell.motion.path_check import is_clear
+from hexacell.noise.noise_assessment import NoiseReadings, visits_agree
+from hexacell.noise.standstill import display_step
 from procedures.calibration.campaign_state import campaign_state
 from procedures.calibration.chosen_moves import move_to_chosen
 from procedures.calibration.set_steps import Known, SetSteps, reference_pose

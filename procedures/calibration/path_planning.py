@@ -10,15 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.campaign.pilots import with_pilots
+from hexacell.design.predicted_records import GaugeZero
 from hexacell.errors import HexacellError, LimitError
-from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.motion.path_check import ball_position
 from hexacell.motion.paths import PathPlanner, find_route, next_return_move
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 from procedures.run.state import RunState
 from procedures.run.steps import Move, SetKey, SixNumbers
 

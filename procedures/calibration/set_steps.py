@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from hexacell.design.predicted_records import GaugeZero
 from hexacell.errors import LimitError
-from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 from procedures.calibration.path_planning import NoSafePath, RunPathPlanner
 from procedures.run import events
 from procedures.run.state import RunState

@@ -2,7 +2,7 @@
 
 The reference of a set is recorded, the ball is moved a millimetre along each axis of the base, and the
 gauges are read. Back at the reference it is judged whether each of them follows the ball on its axis, with
-its sign and scale (:mod:`hexacell.identification.diagnostics.gauge_trial`). Only then is anything else
+its sign and scale (:mod:`hexacell.noise.gauge_trial`). Only then is anything else
 measured.
 """
 

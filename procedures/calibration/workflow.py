@@ -3,8 +3,8 @@
 The points are measured (:mod:`~procedures.calibration.identification_steps`) and the geometry is
 identified. The held-out points are measured (:mod:`~procedures.calibration.held_out_steps`), the geometry
 is written to the controller, and the held-out points are measured again. A check measures points, until
-they decide, and nothing else (:mod:`~hexacell.campaign.check`); the quick level carries a check on to a
-geometry (:mod:`~hexacell.campaign.quick_level`). A length check, of its own or before the
+they decide, and nothing else (:mod:`~hexacell.checks.check`); the quick level carries a check on to a
+geometry (:mod:`~hexacell.checks.quick_level`). A length check, of its own or before the
 verdict on a calibration, measures two seats (:mod:`~procedures.calibration.length_steps`). Nothing here
 uses hardware or files, so a run, its resumption and its replay decide alike.
 """
@@ -18,25 +18,25 @@ from functools import cached_property
 
 import numpy as np
 
-from hexacell.campaign.check import Check, identified_before
-from hexacell.campaign.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
-from hexacell.campaign.quick_level import QuickLevel
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
-from hexacell.campaign.teaching import WrittenGeometry, as_written
 from hexacell.cell.model import CellSettings
-from hexacell.decision import ErrorLimits, Verdict
+from hexacell.checks.check import Check, identified_before
+from hexacell.checks.quick_level import QuickLevel
 from hexacell.errors import HexacellError
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.refused_commands import RefusedCommands
-from hexacell.reporting.length_result import with_measured_scale
-from hexacell.reporting.result import AcceptedResult
-from hexacell.robot_model import Robot
-from hexacell.stated_effects import stated_effects
+from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
+from hexacell.results.length_result import with_measured_scale
+from hexacell.results.result import AcceptedResult
+from hexacell.results.written_geometry import WrittenGeometry, as_written
+from hexacell.robot.model import Robot
+from hexacell.robot.stated_effects import stated_effects
+from hexacell.verdict.decision import ErrorLimits, Verdict
 from procedures.calibration.held_out_poses import PosesByPoint, replacements
 from procedures.calibration.measuring import Measuring
 from procedures.run import events

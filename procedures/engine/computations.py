@@ -6,23 +6,23 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from statistics import fmean
 
-from hexacell.acceptance import gates
-from hexacell.campaign.noise_assessment import assess_noise
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
+from hexacell.checks.check_result import check_line, check_result
 from hexacell.errors import HexacellError, LimitError
 from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.reporting.assessment import Assessment, assess
-from hexacell.reporting.check_result import check_line, check_result
-from hexacell.reporting.documents import fit_document
-from hexacell.reporting.findings import findings
-from hexacell.reporting.length_result import LengthMeasurements
-from hexacell.reporting.length_statement import length_line, length_statement
-from hexacell.reporting.result import IdentificationResult
-from hexacell.reporting.verification import HeldOut, outcome_line, reason_of, verify
+from hexacell.noise.noise_assessment import assess_noise
+from hexacell.results.length_result import LengthMeasurements
+from hexacell.results.result import IdentificationResult
 from hexacell.runs.run_folder import RunFolder
+from hexacell.verdict.acceptance import gates
+from hexacell.verdict.assessment import Assessment, assess
+from hexacell.verdict.documents import fit_document
+from hexacell.verdict.findings import findings
+from hexacell.verdict.length_statement import length_line, length_statement
+from hexacell.verdict.verification import HeldOut, outcome_line, reason_of, verify
 from procedures.calibration.held_out_poses import PosesByPoint
 from procedures.calibration.noise_steps import noise_readings
 from procedures.calibration.workflow import Calibration, Mode

@@ -9,9 +9,9 @@ from __future__ import annotations
 from itertools import zip_longest
 from pathlib import Path
 
-from hexacell.controller_config.change import ConfigChange
-from hexacell.controller_config.contents import Contents, fingerprint_of, read_contents
-from hexacell.controller_config.receipt import RECEIPT, Receipt
+from hexacell.config.change import ConfigChange
+from hexacell.config.contents import Contents, fingerprint_of, read_contents
+from hexacell.config.receipt import RECEIPT, Receipt
 from hexacell.errors import FileError
 from hexacell.runs.run_folder import RunFolder
 from procedures.run.state import RunState

@@ -9,7 +9,7 @@ applies a change, another reverts it::
 
 A transaction is begun in the journal by its step, written with a receipt that can undo it, read by the
 controller, and confirmed in the journal by its event; each write of the file leaves a record beside the run
-folders (:mod:`~hexacell.controller_config.write_record`). If the controller does not read a new geometry,
+folders (:mod:`~hexacell.config.write_record`). If the controller does not read a new geometry,
 the file is restored before the error is raised. A crash or a cancellation in between leaves a whole file,
 old or new, and the receipt; applying and reverting may both be repeated from there.
 
@@ -27,14 +27,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.change import ConfigChange, propose
-from hexacell.controller_config.contents import fingerprint
-from hexacell.controller_config.receipt import RECEIPT, Receipt
-from hexacell.controller_config.write_back import commit, rollback
-from hexacell.controller_config.write_record import THE_RUN, WriteCause, WriteKind, recorded_write
+from hexacell.config.change import ConfigChange, propose
+from hexacell.config.contents import fingerprint
+from hexacell.config.receipt import RECEIPT, Receipt
+from hexacell.config.write_back import commit, rollback
+from hexacell.config.write_record import THE_RUN, WriteCause, WriteKind, recorded_write
 from hexacell.errors import AnswerNeeded, HexacellError, Interruption, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot_model import config_layout
+from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Calibration, geometry_of
 from procedures.devices.device_set import Devices

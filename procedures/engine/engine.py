@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from hexacell.decision import Verdict
 from hexacell.errors import ExitCode, HexacellError, Interruption, OutOfTime, SeveralErrors
+from hexacell.verdict.decision import Verdict
 from procedures.engine.command_loop import CommandLoop, Status, StepCancelled
 from procedures.engine.config_transactions import Reversal, revert_at_end, revert_unrecorded
 from procedures.engine.recovery import GIVE_UP, Recovery, RecoveryPolicy

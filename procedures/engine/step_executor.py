@@ -14,14 +14,14 @@ from drivers.errors import GaugeAtEnd
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
-from hexacell.controller_config.current import CurrentConfig
+from hexacell.config.current import CurrentConfig
 from hexacell.errors import HexacellError, consists_only_of
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of, joints_of
-from hexacell.robot_model import config_layout
+from hexacell.robot.model import config_layout
+from hexacell.robot.stated_limits import gauge_travel_of
 from hexacell.runs.run_folder import RunFolder
-from hexacell.stated_limits import gauge_travel_of
 from procedures.calibration.length_steps import seat_of
 from procedures.calibration.mounting import require_response, require_room
 from procedures.calibration.set_steps import check_reference, in_words

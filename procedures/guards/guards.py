@@ -22,10 +22,10 @@ from drivers.interfaces import EncoderSample
 from drivers.stop_input import SUBJECT as STOP_LINE
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
-from hexacell.controller_config.current import CurrentConfig
+from hexacell.config.current import CurrentConfig
 from hexacell.kinematics.position_agreement import PositionReports, PositionSource
 from hexacell.kinematics.rotations import Array
-from hexacell.stated_limits import gauge_travel_of
+from hexacell.robot.stated_limits import gauge_travel_of
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.guards import rules
 from procedures.guards.heartbeat import WatchedController

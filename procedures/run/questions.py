@@ -9,13 +9,13 @@ from enum import StrEnum
 from typing import Protocol
 
 from drivers.interfaces import StartupAction
-from hexacell.acceptance import AcceptanceGate
-from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded
 from hexacell.kinematics.pose import Pose
-from hexacell.reporting.result import ExpectedImprovement
-from hexacell.reporting.verification import Verification
+from hexacell.results.result import ExpectedImprovement
+from hexacell.results.written_geometry import TaskDisplacement
+from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.verification import Verification
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.steps import SetKey
 

@@ -16,7 +16,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import Robot, robot_of
+from hexacell.robot.model import Robot, robot_of
 
 Say = Callable[[str, str, str], None]
 

@@ -19,7 +19,7 @@ from hexacell.kinematics.mechanisms.hexaglide import RAILS
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record, deviation_of, joints_of
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 
 UM, PPM = 1e-3, 1e-6
 HALF_RANGE_MM = 800.0

@@ -22,29 +22,29 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.acceptance import gates
-from hexacell.application import unattended_runs
-from hexacell.application.calibration_run import new_calibration
-from hexacell.application.drift_history import drift_history
-from hexacell.application.history import past_runs
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.cell.loader import Cell, dump
 from hexacell.cell.simulation import SimulatedFault
+from hexacell.checks.check_result import check_line, check_result
 from hexacell.cli.app import main
-from hexacell.controller_config.change import propose
-from hexacell.controller_config.contents import fingerprint
-from hexacell.controller_config.write_back import commit, rollback
-from hexacell.decision import Verdict
+from hexacell.config.change import propose
+from hexacell.config.contents import fingerprint
+from hexacell.config.write_back import commit, rollback
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.reporting.check_result import check_line, check_result
-from hexacell.reporting.result import IdentificationResult
-from hexacell.reporting.verification import outcome_line, verify
-from hexacell.robot_model import config_layout, robot_of
+from hexacell.results.result import IdentificationResult
+from hexacell.robot.model import config_layout, robot_of
+from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.runs import run_folder
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.services.history.drift_history import drift_history
+from hexacell.services.history.history import past_runs
+from hexacell.services.run.calibration_run import new_calibration
+from hexacell.services.schedule import unattended_runs
+from hexacell.verdict.acceptance import gates
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.verification import outcome_line, verify
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal import line_format
 from procedures.journal.line_format import Entry, encode

@@ -18,15 +18,15 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from hexacell.campaign.check import Check
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.leg_expansion import leg_expansion
+from hexacell.checks.check import Check
+from hexacell.checks.check_result import ChangeAlarm, change_alarm
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
-from hexacell.reporting.check_result import ChangeAlarm, change_alarm
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.virtual_robot import VirtualRobot
 from tests.benchmarks.test_check import Calibrated, calibrated
 
 Say = Callable[[str, str, str], None]

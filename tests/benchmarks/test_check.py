@@ -18,18 +18,18 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from hexacell.campaign.check import Check, identified_before
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
-from hexacell.decision import ErrorLimits, Verdict
+from hexacell.checks.check import Check, identified_before
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import Robot, robot_of
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.model import Robot, robot_of
+from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.verdict.decision import ErrorLimits, Verdict
 
 Say = Callable[[str, str, str], None]
 

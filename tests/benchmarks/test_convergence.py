@@ -6,8 +6,8 @@ import numpy as np
 
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import identify
+from hexacell.robot.virtual_robot import random_robot
 from hexacell.study import data_sets
-from hexacell.virtual_robot import random_robot
 
 ROBOTS = 1000
 SIGMAS = 6.0

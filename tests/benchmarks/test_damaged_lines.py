@@ -24,13 +24,13 @@ from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import simulated_instrument
 from drivers.simulated.gauges.indicator import Indicator
 from drivers.wire_trace import WireTrace
-from hexacell.application.device_setup import gauge_with_agreement
 from hexacell.cell.described_devices import RequestSettings
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.measuring import NoiseSettings, TimingSettings
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, HexacellError, flatten_errors
 from hexacell.plugins import Group, load
+from hexacell.services.devices.device_setup import gauge_with_agreement
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.devices.settling import settle, trimmed_mean
 from tests.benchmarks.line_in_process import Damage, InstrumentLine, have_lines

@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState, Decision, Finished, MeasurePose
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.recursive_estimator import OnlineEstimator
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot_model import robot_of
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.model import robot_of
+from hexacell.robot.virtual_robot import VirtualRobot
 from tests.benchmarks.virtual_calibration import robot_that_reaches
 from tests.compiled_loops import compiled
 

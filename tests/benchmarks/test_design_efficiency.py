@@ -10,8 +10,8 @@ import os
 import numpy as np
 import pytest
 
-from hexacell.application.studies import processes, run_study
-from hexacell.experiment_design.design_efficiency import Efficiency
+from hexacell.design.design_efficiency import Efficiency
+from hexacell.services.study.studies import processes, run_study
 from hexacell.study.definition import Study
 from hexacell.study.design_trials import DesignOutcome, DesignTrial, run_design_trial
 from tests.benchmarks.test_study_speed import every

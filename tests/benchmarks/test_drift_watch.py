@@ -19,14 +19,14 @@ from typing import TypeVar
 import numpy as np
 import pytest
 
-from hexacell.campaign.change_alarm import machine_causes, machine_records
-from hexacell.campaign.dry_run import VirtualCampaign
-from hexacell.change_detection.carried_posterior import CarriedPosterior
-from hexacell.change_detection.causes import Causes
-from hexacell.change_detection.drift_watch import DriftWatch, StepAlarm, watch_runs
-from hexacell.change_detection.run_evidence import RunEvidence
+from hexacell.checks.change_alarm import machine_causes, machine_records
+from hexacell.drift.carried_posterior import CarriedPosterior
+from hexacell.drift.causes import Causes
+from hexacell.drift.drift_watch import DriftWatch, StepAlarm, watch_runs
+from hexacell.drift.run_evidence import RunEvidence
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.rotations import Array
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.virtual_robot import VirtualRobot
 from tests.benchmarks.test_check import calibrated
 
 Job = TypeVar("Job")

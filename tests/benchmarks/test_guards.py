@@ -21,14 +21,14 @@ from drivers.interfaces import StartupAction
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.cell import SimulatedCell
 from drivers.wire_trace import WireTrace
-from hexacell.application.device_setup import devices_of
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.measuring import GuardSettings
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
-from hexacell.controller_config.current import CurrentConfig
+from hexacell.config.current import CurrentConfig
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.services.devices.device_setup import devices_of
 from procedures.devices.device_set import Devices
 from procedures.guards.guards import Guards
 from procedures.run import events

@@ -21,9 +21,9 @@ import pytest
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
-from hexacell.decision import Verdict
 from hexacell.errors import HexacellError
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
+from hexacell.verdict.decision import Verdict
 from tests.benchmarks.virtual_calibration import calibrate, robot_that_reaches, stands_at
 from tests.benchmarks.worlds.effects import Effect
 from tests.benchmarks.worlds.table import least_by_chance, most_by_chance

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.application.history import past_runs
 from hexacell.runs.archive import INDEX
 from hexacell.runs.run_folder import runs_folder
-from tests.hexacell.application.proposed_runs import a_cell, propose_run
+from hexacell.services.history.history import past_runs
+from tests.hexacell.services.proposed_runs import a_cell, propose_run
 
 Say = Callable[[str, str, str], None]
 

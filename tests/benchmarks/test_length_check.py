@@ -13,24 +13,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot_model import Robot
-from hexacell.stated_effects import stated_effects
+from hexacell.robot.model import Robot
+from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_errors import JudgedGeometry
 from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
-from hexacell.virtual_robot import VirtualRobot
 from tests.benchmarks.imperfect_machine import ImperfectMachine
 
 MACHINES = int(os.environ.get("ROBOTS", "100"))

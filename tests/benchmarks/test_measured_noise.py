@@ -19,8 +19,8 @@ import pytest
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
-from hexacell.decision import Verdict
 from hexacell.errors import HexacellError
+from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import read_journal
 from procedures.run.state import RunState, fold
 from tests.procedures.rig import new_rig

@@ -13,21 +13,21 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.task_accuracy import Task
-from hexacell.campaign.teaching import as_written
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.controller_config.interface import ControllerGeometry
-from hexacell.decision import Verdict
+from hexacell.config.interface import ControllerGeometry
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import Robot, make_robot, robot_of
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.results.written_geometry import as_written
+from hexacell.robot.model import Robot, make_robot, robot_of
+from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.verdict.decision import Verdict
 from tests.benchmarks.tolerance_bound import largest_chances
 from tests.benchmarks.virtual_calibration import robot_that_stands, verification_of
 

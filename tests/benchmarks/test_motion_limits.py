@@ -20,10 +20,9 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.task_accuracy import Task
-from hexacell.campaign.teaching import as_written
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import HexacellError, LimitError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
@@ -31,7 +30,8 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
-from hexacell.robot_model import Robot, controller_geometry, make_robot, robot_of
+from hexacell.results.written_geometry import as_written
+from hexacell.robot.model import Robot, controller_geometry, make_robot, robot_of
 from hexacell.study import data_sets
 from hexacell.study.simulated_campaign import SimulatedCampaign
 from procedures.calibration.held_out_poses import HeldOutPoses

@@ -26,9 +26,9 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot_model import Robot, robot_of
+from hexacell.robot.model import Robot, robot_of
+from hexacell.robot.virtual_robot import VirtualRobot, random_robot
 from hexacell.study.simulated_campaign import SimulatedCampaign
-from hexacell.virtual_robot import VirtualRobot, random_robot
 
 Say = Callable[[str, str, str], None]
 

@@ -18,22 +18,22 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from hexacell.campaign.check import Check, identified_before
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
-from hexacell.campaign.quick_level import QuickLevel
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.decision import ErrorLimits
+from hexacell.checks.check import Check, identified_before
+from hexacell.checks.quick_level import QuickLevel
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import Robot, robot_of
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.model import Robot, robot_of
+from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.verdict.decision import ErrorLimits
 
 Say = Callable[[str, str, str], None]
 

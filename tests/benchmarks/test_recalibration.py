@@ -19,11 +19,11 @@ import numpy as np
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.decision import Verdict
 from hexacell.errors import HexacellError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot_model import Robot, robot_of
+from hexacell.robot.model import Robot, robot_of
+from hexacell.verdict.decision import Verdict
 from tests.benchmarks.virtual_calibration import calibrate, robot_that_stands
 from tests.benchmarks.worlds.closure import Bodies, CannotCloseError, follow, slider_places
 from tests.benchmarks.worlds.effects import Effect

@@ -20,10 +20,10 @@ from statistics import median
 
 import pytest
 
-from hexacell.attach.client import connect_to_run
-from hexacell.attach.run_socket import socket_path
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
+from hexacell.run_process.client import connect_to_run
+from hexacell.run_process.run_socket import socket_path
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from tests.benchmarks.conftest import Say

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.application.studies import processes, run_study
+from hexacell.services.study.studies import processes, run_study
 from hexacell.study.paper_summary import PAPER
 
 pytestmark = pytest.mark.benchmark

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from hexacell.application.studies import processes, run_study
+from hexacell.services.study.studies import processes, run_study
 from hexacell.study.definition import Study
 from hexacell.study.design_trials import DesignOutcome, DesignTrial, run_design_trial
 

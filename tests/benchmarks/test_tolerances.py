@@ -19,8 +19,8 @@ from hexacell.identification.problem.problem import Tolerances
 from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot_model import robot_of
-from hexacell.virtual_robot import random_robot
+from hexacell.robot.model import robot_of
+from hexacell.robot.virtual_robot import random_robot
 
 Say = Callable[[str, str, str], None]
 

@@ -13,27 +13,27 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot_model import Robot
-from hexacell.stated_effects import stated_effects
+from hexacell.robot.model import Robot
+from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, stop_repeatability
 from hexacell.uncertainty.environment_effects import load_at_work, temperature_at_work
 from hexacell.uncertainty.gauge_effects import ball_roundness, gauge_scales
 from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
-from hexacell.virtual_robot import VirtualRobot
 from tests.benchmarks.imperfect_machine import ImperfectMachine
 
 MACHINES = int(os.environ.get("ROBOTS", "100"))

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from hexacell.application.cell_status import CellStatus, cell_status
-from hexacell.application.drift_history import DriftHistory, drift_history
-from hexacell.decision import Verdict
 from hexacell.errors import ExitCode
+from hexacell.services.history.cell_status import CellStatus, cell_status
+from hexacell.services.history.drift_history import DriftHistory, drift_history
+from hexacell.verdict.decision import Verdict
 from procedures.calibration.workflow import Mode
 from tests.benchmarks.simulated_year import DEAD_GAUGE, FIRST_NIGHT, FULL_DISK, LIMIT_MM, Year
 from tests.benchmarks.worlds.table import most_by_chance

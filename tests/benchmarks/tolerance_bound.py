@@ -15,7 +15,7 @@ from scipy.special import ndtr, ndtri
 from hexacell.identification.diagnostics.tolerance_fit import PROBABILITY, ToleranceFitter
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 
 LEAST_INFORMATION = 1e-6
 """Of what the prior has: where the records have none."""

@@ -7,21 +7,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
-from hexacell.campaign.teaching import as_written
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.config.interface import ControllerGeometry
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.reporting.verification import HeldOut, Verification, verify
-from hexacell.robot_model import Robot, make_robot
-from hexacell.virtual_robot import VirtualRobot, random_robot
+from hexacell.results.written_geometry import as_written
+from hexacell.robot.model import Robot, make_robot
+from hexacell.robot.virtual_robot import VirtualRobot, random_robot
+from hexacell.verdict.verification import HeldOut, Verification, verify
 from procedures.calibration.held_out_poses import HeldOutPoses
 from procedures.run.steps import SixNumbers
 

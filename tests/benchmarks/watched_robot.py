@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.campaign.dry_run import VirtualCampaign
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.trajectory import interpolate_line
-from hexacell.robot_model import Robot
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.model import Robot
+from hexacell.robot.virtual_robot import VirtualRobot
 
 PIECES = 24
 """Of a way, at whose ends a stop is tried."""

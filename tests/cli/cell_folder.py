@@ -7,7 +7,7 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from hexacell.controller_config.write_record import RECORDS
+from hexacell.config.write_record import RECORDS
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.campaign.dry_run import dry_run
 from hexacell.cli.app import main
+from hexacell.dry_run.campaign import dry_run
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from tests.cli.cell_folder import QUICK, SHORT, CellFolder, copy_cell
@@ -72,7 +72,7 @@ def typed_here(
 @pytest.fixture
 def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     """Predict on a single robot and from few poses: the output is under test, not its quality."""
-    monkeypatch.setattr("hexacell.application.offline.dry_run", partial(dry_run, robots=1))
+    monkeypatch.setattr("hexacell.services.records.offline.dry_run", partial(dry_run, robots=1))
 
 
 @pytest.fixture

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import pytest
 
-from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.loader import load_cell
-from hexacell.robot_model import config_layout
+from hexacell.robot.model import config_layout
+from hexacell.verdict.acceptance import AcceptanceGate
 from tests.cli.terminal import ended
-from tests.hexacell.application.proposed_runs import MET, propose_run
-from tests.hexacell.controller_config.test_keyed_formats import write_hal, write_ini
+from tests.hexacell.config.test_keyed_formats import write_hal, write_ini
+from tests.hexacell.services.proposed_runs import MET, propose_run
 
 GRAVE = AcceptanceGate(
     name="within tolerance", passed=False, sentence="Beyond: S1x.", needs_person=True, needs_cell_name=True

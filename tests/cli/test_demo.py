@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.storage.cell_lock import cell_lock
+from hexacell.runs.cell_lock import cell_lock
 from procedures.run import events
 from procedures.run.steps import Phase
 

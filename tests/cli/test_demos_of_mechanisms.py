@@ -8,7 +8,7 @@ import re
 import pytest
 
 from hexacell.cell.loader import load_cell
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 from procedures.run import events
 from tests.cli.commands import run_command
 from tests.cli.conftest import Demo

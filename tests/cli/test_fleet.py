@@ -8,10 +8,10 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from hexacell.application.fleet import FleetCell
-from hexacell.presentation.fleet import fleet_text
 from hexacell.runs.archive import INDEX
-from hexacell.storage.cell_lock import cell_lock
+from hexacell.runs.cell_lock import cell_lock
+from hexacell.services.history.fleet import FleetCell
+from hexacell.text.fleet import fleet_text
 
 
 @pytest.fixture

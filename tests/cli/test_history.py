@@ -7,11 +7,11 @@ import json
 import pytest
 
 from hexacell.cell.loader import load_cell
-from hexacell.controller_config.write_back import commit
-from hexacell.controller_config.write_record import RECORDS
-from tests.hexacell.application.proposed_runs import propose_run
-from tests.hexacell.application.recorded_nights import Nights
-from tests.hexacell.application.test_history import identified
+from hexacell.config.write_back import commit
+from hexacell.config.write_record import RECORDS
+from tests.hexacell.services.proposed_runs import propose_run
+from tests.hexacell.services.recorded_nights import Nights
+from tests.hexacell.services.test_history import identified
 
 KEYS = {
     "run", "began", "ended", "mode", "records", "verdict", "position_mm", "expanded_mm", "limit_mm", "line",

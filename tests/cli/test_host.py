@@ -14,14 +14,14 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.attach.client import LOST, HostConnection, HostNotStarted, connect_to_run, start_host
-from hexacell.attach.host import STOPPED
-from hexacell.attach.messages import EventRecorded, HostMessage, StatusChanged
-from hexacell.attach.run_socket import socket_path
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.errors import CellBusy, ExitCode
+from hexacell.run_process.client import LOST, HostConnection, HostNotStarted, connect_to_run, start_host
+from hexacell.run_process.host import STOPPED
+from hexacell.run_process.messages import EventRecorded, HostMessage, StatusChanged
+from hexacell.run_process.run_socket import socket_path
+from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.storage.cell_lock import cell_lock
 from procedures.engine.command_loop import Status
 from procedures.journal.journal import read_journal
 from procedures.run import events
@@ -33,8 +33,8 @@ NOON = datetime(2026, 11, 20, 12, 0, tzinfo=UTC)
 TERMINAL = """
 import asyncio, sys
 from pathlib import Path
-from hexacell.attach.client import start_host
-from hexacell.attach.messages import EventRecorded
+from hexacell.run_process.client import start_host
+from hexacell.run_process.messages import EventRecorded
 
 async def watch():
     connection = await start_host(Path(sys.argv[1]), sys.argv[2:])

@@ -107,7 +107,7 @@ def stranger(cell_folder: Any, tmp_path: Path) -> Stranger:
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choose among few poses in this process; the quality of the choice is not under test."""
-    monkeypatch.setattr("hexacell.application.offline.Plan", partial(Plan, candidates=128))
+    monkeypatch.setattr("hexacell.services.records.offline.Plan", partial(Plan, candidates=128))
 
 
 def test_a_campaign_by_next_ends_with_all_points_measured(typed_here, short_cell, stranger):

@@ -8,8 +8,8 @@ import socket
 
 import pytest
 
-from hexacell.storage.cell_lock import cell_lock
-from tests.hexacell.notices.local_servers import broker, closed_port, webhook
+from hexacell.runs.cell_lock import cell_lock
+from tests.hexacell.services.notify.local_servers import broker, closed_port, webhook
 
 CHECK = ("--mode", "check", "--unattended")
 TOKEN = "hidden-token-7"
@@ -19,7 +19,7 @@ TOKEN = "hidden-token-7"
 def reached_at_once(monkeypatch):
     """Servers on loopback, and again at once where they refuse."""
     monkeypatch.setenv("no_proxy", "127.0.0.1")
-    monkeypatch.setattr("hexacell.notices.delivery.PAUSES_S", (0.0, 0.0))
+    monkeypatch.setattr("hexacell.services.notify.delivery.PAUSES_S", (0.0, 0.0))
 
 
 def tell(folder, name: str, url: str, *lines: str) -> None:

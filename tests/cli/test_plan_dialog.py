@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.presentation.plan_draft import REQUEST
+from hexacell.text.plan_draft import REQUEST
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from tests.cli.terminal import ended, start_at

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from hexacell.application.calibration_run import RunRequest
-from hexacell.decision import Verdict
+from hexacell.checks.check_result import ChangeAlarm, CheckResult
 from hexacell.errors import ExitCode
-from hexacell.presentation.run import NOT_REPEATED_ALARM, REPEATED, REPEATED_ALARM
-from hexacell.reporting.check_result import ChangeAlarm, CheckResult
+from hexacell.services.run.calibration_run import RunRequest
+from hexacell.text.run import NOT_REPEATED_ALARM, REPEATED, REPEATED_ALARM
+from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import Journal
 from procedures.run import events
 

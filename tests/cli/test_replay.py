@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from hexacell.decision import Verdict
+from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode
 from procedures.run import events

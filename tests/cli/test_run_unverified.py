@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.application.calibration_run import RunRequest
 from hexacell.cell.loader import load_cell
 from hexacell.cli.commands.run import execute_run
 from hexacell.cli.console import Console
 from hexacell.errors import CellBusy
+from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder
-from hexacell.storage.cell_lock import cell_lock
+from hexacell.services.run.calibration_run import RunRequest
 from procedures.calibration.workflow import Mode
 from procedures.journal.journal import Journal
 from procedures.run import events

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from tests.hexacell.notices.local_servers import closed_port
+from tests.hexacell.services.notify.local_servers import closed_port
 
 
 @pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])

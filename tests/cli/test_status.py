@@ -11,10 +11,10 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from hexacell.cell.loader import load_cell
-from hexacell.storage.cell_lock import cell_lock
+from hexacell.runs.cell_lock import cell_lock
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode
-from tests.hexacell.application.recorded_nights import Nights
+from tests.hexacell.services.recorded_nights import Nights
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 
 from hexacell.cli.arguments import studies
 from hexacell.errors import ExitCode
-from hexacell.presentation.studies import STUDIES
+from hexacell.text.studies import STUDIES
 
 PAPER = ("study", "paper", "--draws", "1", "--processes", "2", "--folder", "kept")
 

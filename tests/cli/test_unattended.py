@@ -10,7 +10,7 @@ import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.errors import ExitCode
-from hexacell.storage.cell_lock import cell_lock
+from hexacell.runs.cell_lock import cell_lock
 
 pytestmark = pytest.mark.usefixtures("few_candidates")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.controller_config.toml_format import NativeToml
+from hexacell.config.toml_format import NativeToml
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS
 from tests.cli.cell_folder import CONFIGS
 from tests.cli.commands import run_command

@@ -10,7 +10,7 @@ import pytest
 
 from hexacell.cell.fields import GeometrySettings
 from hexacell.cell.loader import Cell, describe, dump, load_cell
-from hexacell.controller_config.toml_format import NativeToml
+from hexacell.config.toml_format import NativeToml
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide

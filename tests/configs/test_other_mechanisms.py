@@ -13,7 +13,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import singularity_margin
-from hexacell.robot_model import Robot, robot_of
+from hexacell.robot.model import Robot, robot_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 NAMES = ["gough-stewart", "linapod", "rotary-cranks", "linuxcnc-hexapod/cell"]

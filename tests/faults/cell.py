@@ -15,8 +15,8 @@ from typing import Any
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.runs.cell_lock import lock_path
 from hexacell.runs.run_folder import RunFolder
-from hexacell.storage.cell_lock import lock_path
 from tests.small_cell import FREE, changed
 
 POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))

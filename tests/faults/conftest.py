@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.controller_config.receipt import AFTER
+from hexacell.config.receipt import AFTER
 from hexacell.runs.run_folder import RunFolder
 from procedures.engine.config_edits import PROVISIONAL_FOLDER
 from procedures.journal.journal import read_journal

@@ -1,7 +1,7 @@
 """SIGKILL before each call that writes the config or reverts it, without any cleaning up.
 
 The same for every call in this process, and failures instead of deaths, are in
-``tests/hexacell/controller_config``; a power cut, which also loses what was written, in
+``tests/hexacell/config``; a power cut, which also loses what was written, in
 ``test_power_cut``.
 """
 

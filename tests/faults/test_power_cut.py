@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from hexacell.controller_config.receipt import Receipt
-from hexacell.controller_config.write_back import rollback
+from hexacell.config.receipt import Receipt
+from hexacell.config.write_back import rollback
 from procedures.journal.journal import read_journal
 from tests.faults.cell import NEVER_GOOD_ENOUGH, Site, make_site
 from tests.faults.interception import Call

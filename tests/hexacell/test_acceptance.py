@@ -10,17 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.acceptance import (
-    DeviationStatistics,
-    gates,
-    is_worse,
-)
 from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
 from hexacell.identification.problem.problem import Noise, Tolerances
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.verdict.acceptance import (
+    DeviationStatistics,
+    gates,
+    is_worse,
+)
 
 TOLERANCES = Tolerances({"S": 7.0, "B": 7.0, "l": 7.0})
 

@@ -14,10 +14,10 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.presentation.identification import parameter_table
-from hexacell.robot_model import Robot, robot_of
+from hexacell.robot.model import Robot, robot_of
+from hexacell.robot.virtual_robot import random_robot
 from hexacell.study import data_sets
-from hexacell.virtual_robot import random_robot
+from hexacell.text.identification import parameter_table
 
 CONFIG = Path(__file__).parents[2] / "configs" / "linapod.toml"
 TURN = np.cos(np.radians(10.0))

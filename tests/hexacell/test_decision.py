@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.decision import ErrorLimits, Verdict, decide, worst_verdict
 from hexacell.uncertainty.statement import LargestError
+from hexacell.verdict.decision import ErrorLimits, Verdict, decide, worst_verdict
 
 
 @pytest.mark.parametrize(

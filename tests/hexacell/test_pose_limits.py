@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from hexacell.cell.loader import load_cell
-from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.config.interface import ControllerGeometry
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose
-from hexacell.pose_limits import broken_limits
-from hexacell.robot_model import make_robot, robot_of
+from hexacell.robot.model import make_robot, robot_of
+from hexacell.robot.pose_limits import broken_limits
 
 CELL = Path(__file__).parents[2] / "configs" / "simulated-hexaglide.toml"
 

@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hexacell.campaign.teaching import as_written
 from hexacell.cell.loader import load_cell
-from hexacell.controller_config.interface import ControllerGeometry
-from hexacell.controller_config.toml_format import NativeToml
+from hexacell.config.interface import ControllerGeometry
+from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.identification.estimator import estimate_online, identify
 from hexacell.identification.problem.problem import Tolerances
@@ -22,7 +21,8 @@ from hexacell.kinematics.mechanism import FrameTransform, inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.robot_model import make_robot, robot_of
+from hexacell.results.written_geometry import as_written
+from hexacell.robot.model import make_robot, robot_of
 
 CELL = Path(__file__).parents[2] / "configs" / "simulated-hexaglide.toml"
 TO_FLOOR = FrameTransform(

@@ -10,17 +10,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.config.interface import ControllerGeometry
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.measurements.records import MeasurementSet, deviation_of
-from hexacell.robot_model import Robot, make_robot
+from hexacell.robot.model import Robot, make_robot
+from hexacell.robot.virtual_robot import robots_within_tolerances
 from hexacell.study import data_sets
 from hexacell.study.simulated_campaign import SimulatedCampaign
-from hexacell.virtual_robot import robots_within_tolerances
 
 CONFIG = Path(__file__).parents[2] / "configs" / "gough-stewart.toml"
 TURNED = FrameTransform(

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from hexacell.cell.loader import load_cell
-from hexacell.controller_config.linuxcnc_limits import limits_of_ini
-from hexacell.robot_model import config_layout
+from hexacell.config.linuxcnc_limits import limits_of_ini
+from hexacell.robot.model import config_layout
 from tests.linuxcnc.conftest import LinuxCNC
 from tests.waiting import wait_until
 

@@ -14,13 +14,13 @@ import pytest
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import load_cell
-from hexacell.controller_config.change import propose
-from hexacell.controller_config.contents import fingerprint
-from hexacell.controller_config.write_back import commit
+from hexacell.config.change import propose
+from hexacell.config.contents import fingerprint
+from hexacell.config.write_back import commit
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot_model import config_layout
+from hexacell.robot.model import config_layout
 from tests.linuxcnc.conftest import TWO_FILES, LinuxCNC
 from tests.waiting import wait_until
 

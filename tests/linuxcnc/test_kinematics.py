@@ -11,7 +11,7 @@ import pytest
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot_model import config_layout
+from hexacell.robot.model import config_layout
 from tests.linuxcnc.server_client import ServerClient
 from tests.waiting import wait_until
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from hexacell.controller_config.write_record import RECORDS
+from hexacell.config.write_record import RECORDS
 from tests.mutations.attempts import Attempt, Place, attempt
 from tests.mutations.texts import ANY, TOML, mutated
 from tests.mutations.trials import CELL, RUN, Templates, mutated_file

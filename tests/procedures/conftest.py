@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
-from hexacell.controller_config.change import ConfigChange
-from hexacell.controller_config.write_back import commit
+from hexacell.config.change import ConfigChange
+from hexacell.config.write_back import commit
 from procedures.run import events
 from procedures.run.steps import Phase, SetKey
 from tests.made_once import made_once

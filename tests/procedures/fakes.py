@@ -21,13 +21,13 @@ from drivers.interfaces import (
 )
 from drivers.simulated.linuxcnc.state import SoftLimitExceeded
 from drivers.simulated.robot import SimulatedMachine
-from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.devices import GaugeAxis
 from hexacell.cell.recovery import Action
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
-from hexacell.reporting.verification import Verification
+from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.verification import Verification
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.run.questions import (
     GaugePlacement,

@@ -9,7 +9,7 @@ import numpy as np
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.identification.solver.levenberg_marquardt import Termination
-from hexacell.reporting.result import IdentificationResult
+from hexacell.results.result import IdentificationResult
 
 
 def an_identification(**changes: Any) -> IdentificationResult:

@@ -13,15 +13,15 @@ import pytest
 
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
-from hexacell.application.calibration_run import run_started
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.errors import DeviceError, FileError, HexacellError
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose
-from hexacell.reporting.result import AcceptedResult
-from hexacell.robot_model import robot_of
+from hexacell.results.result import AcceptedResult
+from hexacell.robot.model import robot_of
 from hexacell.runs.run_folder import RunFolder
+from hexacell.services.run.calibration_run import run_started
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.engine import Engine, Listener
 from procedures.engine.recovery import GIVE_UP, RecoveryPolicy

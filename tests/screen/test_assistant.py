@@ -13,9 +13,6 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 
 from drivers.discovery.gauges import FoundGauge, PortFindings
-from hexacell.application.device_search import SearchFindings
-from hexacell.application.first_cell import CellDraft
-from hexacell.application.found_cell import draft_of
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.errors import FileError, HexacellError
@@ -23,6 +20,9 @@ from hexacell.screen.app import FirstCell, TechnicianApp
 from hexacell.screen.assistant import FirstCellAssistant
 from hexacell.screen.assistant_screen import AssistantScreen
 from hexacell.screen.session import ScreenSession
+from hexacell.services.devices.device_search import SearchFindings
+from hexacell.services.devices.first_cell import CellDraft
+from hexacell.services.devices.found_cell import draft_of
 from tests.screen.test_history_screen import WithoutDevices
 from tests.screen.test_job import press, shown, until_shown
 from tests.waiting import until

@@ -11,20 +11,20 @@ from pathlib import Path
 import pytest
 from textual.pilot import Pilot
 
-from hexacell.acceptance import AcceptanceGate
-from hexacell.application.config_history import config_history
-from hexacell.attach.snapshots import LiveSnapshot
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.write_back import commit
+from hexacell.config.write_back import commit
 from hexacell.errors import FileError
-from hexacell.presentation.config_changes import RELOAD
-from hexacell.presentation.screens.questions import PERSON
+from hexacell.run_process.snapshots import LiveSnapshot
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.cell_workplace import CellWorkplace
 from hexacell.screen.overlays.confirm_overlay import ConfirmOverlay
 from hexacell.screen.overlays.fault_overlay import FaultOverlay
 from hexacell.screen.session import ScreenSession
-from tests.hexacell.application.proposed_runs import ProposedRun, a_cell, propose_run
+from hexacell.services.write_back.config_history import config_history
+from hexacell.text.config_changes import RELOAD
+from hexacell.text.screens.questions import PERSON
+from hexacell.verdict.acceptance import AcceptanceGate
+from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
 from tests.mutations.journals import with_checksum
 from tests.screen.conftest import settled
 from tests.screen.test_job import press, shown, until_shown

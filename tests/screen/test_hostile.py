@@ -10,13 +10,13 @@ from textual.events import Paste
 from textual.pilot import Pilot
 from textual.widgets import Input
 
-from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.loader import Cell
 from hexacell.screen.app import FirstCell, TechnicianApp
 from hexacell.screen.assistant import FirstCellAssistant
 from hexacell.screen.assistant_screen import AssistantScreen
 from hexacell.screen.overlays.question_overlay import QuestionOverlay
 from hexacell.screen.overlays.quit_overlay import QuitOverlay
+from hexacell.verdict.acceptance import AcceptanceGate
 from procedures.run import events
 from procedures.run.questions import ask_approval
 from tests.screen.conftest import Opened, settled

@@ -8,17 +8,17 @@ import pytest
 from textual.pilot import Pilot
 
 from drivers.interfaces import StartupAction
-from hexacell.acceptance import AcceptanceGate
-from hexacell.attach.messages import ControlChanged, HostFailed, StatusChanged
 from hexacell.cell.loader import Cell
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.pose import Pose
-from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.run_process.messages import ControlChanged, HostFailed, StatusChanged
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.overlays.fault_overlay import FaultOverlay
 from hexacell.screen.overlays.question_overlay import QuestionOverlay
 from hexacell.screen.widgets.text_panel import TextList, TextPanel
 from hexacell.screen.workplace import Preflight
+from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.verdict.acceptance import AcceptanceGate
 from procedures.engine.command_loop import Status
 from procedures.run import events
 from procedures.run.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo

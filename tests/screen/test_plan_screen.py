@@ -6,13 +6,13 @@ import asyncio
 
 from textual.events import Key
 
-from hexacell.application.plan_draft import PlannedPose, PlanPreview
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.cell.loader import Cell
 from hexacell.screen.overlays.fault_overlay import FaultOverlay
 from hexacell.screen.plan_screen import PlanScreen
 from hexacell.screen.widgets.row_list import RowList
 from hexacell.screen.workplace import TriedPlan
+from hexacell.services.preflight.plan_draft import PlannedPose, PlanPreview
 from tests.screen.conftest import Opened, settled
 from tests.screen.test_job import press, shown, until_shown
 from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.presentation.screens.plot_lines import plot_lines
-from hexacell.presentation.screens.views import PlotView, Series
+from hexacell.text.screens.plot_lines import plot_lines
+from hexacell.text.screens.views import PlotView, Series
 
 
 def view(**changes: object) -> PlotView:

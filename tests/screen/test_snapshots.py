@@ -10,16 +10,16 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input
 
-from hexacell.acceptance import AcceptanceGate
-from hexacell.attach.messages import StatusChanged
 from hexacell.cell.loader import Cell
 from hexacell.kinematics.pose import Pose
-from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.run_process.messages import StatusChanged
 from hexacell.screen.app import FirstCell, TechnicianApp
 from hexacell.screen.assistant import FirstCellAssistant
 from hexacell.screen.assistant_screen import AssistantScreen
 from hexacell.screen.key_map import THEMES
 from hexacell.screen.workplace import Preflight, TriedPlan
+from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.verdict.acceptance import AcceptanceGate
 from procedures.engine.command_loop import Status
 from procedures.run import events
 from procedures.run.questions import ask_approval, ask_placement

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.attach.client import connect_to_run
-from hexacell.attach.run_socket import socket_path
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
+from hexacell.run_process.client import connect_to_run
+from hexacell.run_process.run_socket import socket_path
 from tests.waiting import wait_until
 
 NAME = "simulated-hexaglide"

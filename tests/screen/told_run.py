@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from hexacell.attach.connection import RunConnection
-from hexacell.attach.messages import (
+from hexacell.campaign.removed_poses import RemovedPoses
+from hexacell.cell.loader import Cell
+from hexacell.run_process.connection import RunConnection
+from hexacell.run_process.messages import (
     ControlChanged,
     EventRecorded,
     HostMessage,
@@ -18,16 +20,14 @@ from hexacell.attach.messages import (
     RunDescribed,
     StatusChanged,
 )
-from hexacell.attach.snapshots import (
+from hexacell.run_process.snapshots import (
     ControllerSnapshot,
     EncoderSnapshot,
     GaugeSnapshot,
     LiveSnapshot,
 )
-from hexacell.campaign.removed_poses import RemovedPoses
-from hexacell.cell.loader import Cell
-from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
 from hexacell.screen.workplace import Preflight, TriedPlan
+from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
 from procedures.engine.command_loop import Status
 from procedures.run.commands import Command
 from procedures.run.events import Event

@@ -21,8 +21,8 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from hexacell.controller_config.hal_pins import SETP
-from hexacell.controller_config.ini_text import IniText
+from hexacell.config.hal_pins import SETP
+from hexacell.config.ini_text import IniText
 from hexacell.errors import HexacellError, UsageError
 from hexacell.storage.atomic_files import read_text
 

@@ -35,7 +35,7 @@ STUDIES = (
         "robots, each measured in every way",
     ),
 )
-"""Each a row of ``hexacell.presentation.studies``, which would take long to import here."""
+"""Each a row of ``hexacell.text.studies``, which would take long to import here."""
 
 
 def add_study_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private

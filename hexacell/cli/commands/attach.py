@@ -5,15 +5,15 @@ from __future__ import annotations
 import argparse
 import asyncio
 
-from hexacell.application.calibration_run import RunRequest
-from hexacell.attach.client import HostConnection, connect_to_run, start_host
-from hexacell.attach.run_socket import socket_path
 from hexacell.cell.loader import Cell
 from hexacell.cli.attached_terminal import AttachedTerminal
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import is_interactive
 from hexacell.errors import ExitCode, UsageError
+from hexacell.run_process.client import HostConnection, connect_to_run, start_host
+from hexacell.run_process.run_socket import socket_path
+from hexacell.services.run.calibration_run import RunRequest
 
 
 def main(options: argparse.Namespace) -> ExitCode:

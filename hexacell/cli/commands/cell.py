@@ -5,15 +5,15 @@ from __future__ import annotations
 import argparse
 import json
 
-from hexacell.application.device_setup import require_drivers
-from hexacell.application.offline import plan_of
-from hexacell.application.stated_poses import require_stated_poses
 from hexacell.cell.loader import describe, schema, settings_document
 from hexacell.cell.passwords import with_passwords
 from hexacell.cli.cell_argument import cell_at, cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
-from hexacell.presentation.config_changes import files_named
+from hexacell.services.devices.device_setup import require_drivers
+from hexacell.services.records.offline import plan_of
+from hexacell.services.records.stated_poses import require_stated_poses
+from hexacell.text.config_changes import files_named
 
 
 def main(options: argparse.Namespace) -> ExitCode:

@@ -7,17 +7,17 @@ import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from hexacell.application.config_rollback import roll_back_config
-from hexacell.application.held_config import settle_config
-from hexacell.application.proposals import apply_proposal, read_proposal
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import TerminalOperator, is_interactive
-from hexacell.controller_config.three_way import ConfigEditedSince
+from hexacell.config.three_way import ConfigEditedSince
 from hexacell.errors import ExitCode
-from hexacell.presentation.config_changes import applied_text, rollback_text, versions_text
-from hexacell.presentation.documents import applied_document, rollback_document
 from hexacell.runs.run_folder import RunFolder
+from hexacell.services.write_back.config_rollback import roll_back_config
+from hexacell.services.write_back.held_config import settle_config
+from hexacell.services.write_back.proposals import apply_proposal, read_proposal
+from hexacell.text.config_changes import applied_text, rollback_text, versions_text
+from hexacell.text.documents import applied_document, rollback_document
 from procedures.run.questions import UnattendedOperator
 
 

@@ -9,18 +9,18 @@ from pathlib import Path
 from typing import Any
 
 from drivers.discovery.node_ids import set_node_id
-from hexacell.application.device_diagnosis import diagnose
-from hexacell.application.device_search import SearchFindings, SearchRequest, search_devices
-from hexacell.application.found_cell import draft_of
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import is_interactive
 from hexacell.errors import AnswerNeeded, ExitCode, FileError, UsageError
-from hexacell.presentation.device_diagnosis import diagnosis_document, diagnosis_lines
-from hexacell.presentation.found_devices import cell_lines, search_document, search_lines
-from hexacell.presentation.layout import wrapped
 from hexacell.screen.assistant import FirstCellAssistant
+from hexacell.services.devices.device_diagnosis import diagnose
+from hexacell.services.devices.device_search import SearchFindings, SearchRequest, search_devices
+from hexacell.services.devices.found_cell import draft_of
 from hexacell.storage.atomic_files import require_creatable
+from hexacell.text.device_diagnosis import diagnosis_document, diagnosis_lines
+from hexacell.text.found_devices import cell_lines, search_document, search_lines
+from hexacell.text.layout import wrapped
 
 TCP_PORTS = 1 << 16
 

@@ -5,22 +5,23 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from hexacell.application.config_history import config_history
-from hexacell.application.drift_history import drift_history
-from hexacell.application.evidence_comparison import compare_evidence
-from hexacell.application.fleet import fleet_runs
-from hexacell.application.history import compare_runs, have_results, parameter_trends, past_runs
-from hexacell.application.refit import refit_run
-from hexacell.application.retention import delete_runs, retention
-from hexacell.application.run_index import RunIndex
 from hexacell.cell.loader import Cell
 from hexacell.cli.archive_argument import archive_url
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
-from hexacell.presentation.changes import evidence_comparison_text, watch_text
-from hexacell.presentation.config_changes import config_history_text
-from hexacell.presentation.documents import (
+from hexacell.runs.run_folder import RunFolder, find_run
+from hexacell.services.history.drift_history import drift_history
+from hexacell.services.history.evidence_comparison import compare_evidence
+from hexacell.services.history.fleet import fleet_runs
+from hexacell.services.history.history import compare_runs, have_results, parameter_trends, past_runs
+from hexacell.services.history.refit import refit_run
+from hexacell.services.history.retention import delete_runs, retention
+from hexacell.services.history.run_index import RunIndex
+from hexacell.services.write_back.config_history import config_history
+from hexacell.text.changes import evidence_comparison_text, watch_text
+from hexacell.text.config_changes import config_history_text
+from hexacell.text.documents import (
     comparison_document,
     config_history_document,
     drift_document,
@@ -30,11 +31,10 @@ from hexacell.presentation.documents import (
     retention_document,
     story_document,
 )
-from hexacell.presentation.fleet import fleet_history_document, fleet_history_text
-from hexacell.presentation.history import comparison_text, drift_text, history_text
-from hexacell.presentation.old_runs import refit_text, retention_text
-from hexacell.presentation.run_story import story_text
-from hexacell.runs.run_folder import RunFolder, find_run
+from hexacell.text.fleet import fleet_history_document, fleet_history_text
+from hexacell.text.history import comparison_text, drift_text, history_text
+from hexacell.text.old_runs import refit_text, retention_text
+from hexacell.text.run_story import story_text
 from procedures.journal.journal import read_entries
 
 MOST_DAYS = 36525.0

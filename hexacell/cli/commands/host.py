@@ -13,17 +13,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from socket import socket
 
-from hexacell.application.calibration_run import RunRequest
-from hexacell.attach.client import READY
-from hexacell.attach.host import RemoteOperator, RunHost, failure_message
-from hexacell.attach.messages import message_line
-from hexacell.attach.run_socket import listening_socket, socket_path
 from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
 from hexacell.cli.signal_commands import SignalCommands
 from hexacell.errors import ExitCode, HexacellError
+from hexacell.run_process.client import READY
+from hexacell.run_process.host import RemoteOperator, RunHost, failure_message
+from hexacell.run_process.messages import message_line
+from hexacell.run_process.run_socket import listening_socket, socket_path
 from hexacell.runs.run_folder import RunFolder
+from hexacell.services.run.calibration_run import RunRequest
 from procedures.calibration.workflow import Mode
 
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import argparse
 
-from hexacell.application.run_notices import notice_of_test
-from hexacell.application.telling_people import (
+from hexacell.cell.loader import Cell
+from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.console import Console
+from hexacell.errors import ExitCode, UsageError
+from hexacell.services.notify.run_notices import notice_of_test
+from hexacell.services.notify.telling_people import (
     TellingOutcome,
     send_waiting,
     tell_test,
     waiting_notices,
 )
-from hexacell.cell.loader import Cell
-from hexacell.cli.cell_argument import cell_at
-from hexacell.cli.console import Console
-from hexacell.errors import ExitCode, UsageError
-from hexacell.presentation.notices import (
+from hexacell.text.notices import (
     notifications_document,
     notifications_text,
     telling_document,

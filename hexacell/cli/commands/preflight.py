@@ -7,16 +7,16 @@ import asyncio
 
 from drivers.controllers.errors import ConnectionLost
 from drivers.errors import BusError, GaugeSilent, PortLost, SilentNodeError, WrongAnswer
-from hexacell.application.calibration_run import new_calibration, preflight
-from hexacell.application.offline import try_plan
-from hexacell.campaign.quick_trial import try_quick_level
 from hexacell.cli.cell_argument import cell_with_devices_at
 from hexacell.cli.console import Console
+from hexacell.dry_run.quick_level import try_quick_level
 from hexacell.errors import ExitCode, HexacellError, flatten_errors
-from hexacell.presentation.documents import preflight_document, quick_preflight_document
-from hexacell.presentation.layout import wrapped
-from hexacell.presentation.planning import plan_trial_lines, preflight_lines
-from hexacell.presentation.quick_level import quick_trial_text
+from hexacell.services.records.offline import try_plan
+from hexacell.services.run.calibration_run import new_calibration, preflight
+from hexacell.text.documents import preflight_document, quick_preflight_document
+from hexacell.text.layout import wrapped
+from hexacell.text.planning import plan_trial_lines, preflight_lines
+from hexacell.text.quick_level import quick_trial_text
 from procedures.calibration.workflow import Mode
 
 MISSING = (PortLost, GaugeSilent, WrongAnswer, BusError, SilentNodeError, ConnectionLost)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import argparse
 
-from hexacell.application.offline import MOST_RECORDS_BEFORE_NEXT, fit_measurements, next_pose
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.measurements.records import MeasurementSet
-from hexacell.presentation.documents import next_document
-from hexacell.presentation.identification import identification_report
-from hexacell.presentation.layout import wrapped
-from hexacell.presentation.planning import decision_text, forecast_text, left_out_text
-from hexacell.reporting.documents import fit_document
 from hexacell.runs.run_folder import RunFolder
+from hexacell.services.records.offline import MOST_RECORDS_BEFORE_NEXT, fit_measurements, next_pose
+from hexacell.text.documents import next_document
+from hexacell.text.identification import identification_report
+from hexacell.text.layout import wrapped
+from hexacell.text.planning import decision_text, forecast_text, left_out_text
+from hexacell.verdict.documents import fit_document
 
 MANY_RECORDS = 200
 

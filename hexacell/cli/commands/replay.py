@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import asyncio
 
-from hexacell.application.replay_run import replay
-from hexacell.application.run_export import export_run
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
-from hexacell.presentation.documents import replay_document
-from hexacell.presentation.run import replay_report
+from hexacell.services.history.run_export import export_run
+from hexacell.services.run.replay_run import replay
+from hexacell.text.documents import replay_document
+from hexacell.text.run import replay_report
 from procedures.replay.comparison import TOLERANCE
 from procedures.replay.replayer import Scope
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hexacell.application.reported_run import ReportedRun, reported_run
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
-from hexacell.presentation.calibration_certificate import certificate
-from hexacell.presentation.calibration_report.blocks import Report
-from hexacell.presentation.calibration_report.html import html_of
-from hexacell.presentation.calibration_report.pdf import pdf_of
-from hexacell.presentation.calibration_report.report import report_of
+from hexacell.services.history.reported_run import ReportedRun, reported_run
 from hexacell.storage.atomic_files import write_atomically
+from hexacell.text.certificate import certificate
+from hexacell.text.report.blocks import Report
+from hexacell.text.report.html import html_of
+from hexacell.text.report.pdf import pdf_of
+from hexacell.text.report.report import report_of
 
 CERTIFICATE = ".xml"
 """How the name of a file ends that is to be one."""

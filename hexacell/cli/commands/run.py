@@ -8,14 +8,6 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 
-from hexacell.application.calibration_run import RunRequest, calibrate, is_unverified
-from hexacell.application.check_repetition import raised_alarm, repetition
-from hexacell.application.demo import prepare_demo
-from hexacell.application.event_stream import EventStream
-from hexacell.application.interrupted_runs import run_to_resume
-from hexacell.application.run_notices import RunEnd
-from hexacell.application.unattended_runs import ended_in_time, note_unreadable_cell
-from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell
@@ -31,9 +23,18 @@ from hexacell.cli.terminal import KeyboardCommands, TerminalOperator, is_interac
 from hexacell.cli.told_afterwards import told_afterwards
 from hexacell.cli.unattended_start import begun_in_window
 from hexacell.errors import ExitCode, HexacellError, UsageError
-from hexacell.presentation.documents import run_document
-from hexacell.presentation.line_face import LETTERS
-from hexacell.presentation.run import (
+from hexacell.run_process.run_device_watch import RunDeviceWatch
+from hexacell.runs.run_folder import new_run
+from hexacell.services.notify.run_notices import RunEnd
+from hexacell.services.run.calibration_run import RunRequest, calibrate, is_unverified
+from hexacell.services.run.demo import prepare_demo
+from hexacell.services.run.event_stream import EventStream
+from hexacell.services.run.interrupted_runs import run_to_resume
+from hexacell.services.schedule.check_repetition import raised_alarm, repetition
+from hexacell.services.schedule.unattended_runs import ended_in_time, note_unreadable_cell
+from hexacell.text.documents import run_document
+from hexacell.text.line_face import LETTERS
+from hexacell.text.run import (
     NOT_REPEATED_ALARM,
     REPEATED,
     REPEATED_ALARM,
@@ -43,7 +44,6 @@ from hexacell.presentation.run import (
     demo_opening,
     resume_hint,
 )
-from hexacell.runs.run_folder import new_run
 from procedures.calibration.expected_records import expected_records
 from procedures.calibration.workflow import Mode
 from procedures.engine.engine import Listener

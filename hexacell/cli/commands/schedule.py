@@ -5,7 +5,12 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
-from hexacell.application.schedules import (
+from hexacell.cell.loader import Cell
+from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.console import Console
+from hexacell.errors import ExitCode, UsageError
+from hexacell.services.schedule.crontab import crontab_line
+from hexacell.services.schedule.schedules import (
     Schedule,
     ScheduleRequest,
     present_schedule,
@@ -13,18 +18,13 @@ from hexacell.application.schedules import (
     scheduled_run,
     write_schedule,
 )
-from hexacell.cell.loader import Cell
-from hexacell.cli.cell_argument import cell_at
-from hexacell.cli.console import Console
-from hexacell.errors import ExitCode, UsageError
-from hexacell.presentation.documents import schedule_document
-from hexacell.presentation.schedules import (
+from hexacell.text.documents import schedule_document
+from hexacell.text.schedules import (
     crontab_text,
     present_schedule_text,
     removed_schedule_text,
     written_schedule_text,
 )
-from hexacell.scheduling.crontab import crontab_line
 
 
 def main(options: argparse.Namespace) -> ExitCode:

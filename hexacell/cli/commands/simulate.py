@@ -9,10 +9,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from hexacell.application.demo import served_cell, with_faults
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
+from hexacell.services.run.demo import served_cell, with_faults
 from hexacell.storage.atomic_files import write_atomically
 
 

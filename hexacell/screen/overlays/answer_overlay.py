@@ -12,9 +12,9 @@ from textual.events import Key
 from textual.screen import ModalScreen, ScreenResultType
 from textual.widgets import Input
 
-from hexacell.presentation.screens.views import Choice, QuestionView
 from hexacell.screen.widgets.device_panel import DevicePanel
 from hexacell.screen.widgets.text_panel import TextPanel
+from hexacell.text.screens.views import Choice, QuestionView
 
 LONGEST_TYPED = 200
 """What is pasted by mistake may be a whole file."""

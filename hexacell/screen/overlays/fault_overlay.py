@@ -9,8 +9,8 @@ from textual.binding import BindingType
 from textual.containers import Vertical, VerticalScroll
 from textual.screen import ModalScreen
 
-from hexacell.presentation.screens.views import FaultView
 from hexacell.screen.widgets.text_panel import TextPanel
+from hexacell.text.screens.views import FaultView
 
 
 class FaultOverlay(ModalScreen[None]):

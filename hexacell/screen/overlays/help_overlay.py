@@ -10,15 +10,15 @@ from textual.binding import BindingType
 from textual.containers import Vertical
 from textual.screen import ModalScreen
 
-from hexacell.presentation.screens.help_texts import (
+from hexacell.screen.key_map import KEYS, preferences_path, shown_path
+from hexacell.screen.widgets.text_panel import TextList, TextPanel
+from hexacell.text.screens.help_texts import (
     KEYS_NOTE,
     KEYS_TITLE,
     REPLAY_HELP,
     SCREEN_HELP,
     reflowed,
 )
-from hexacell.screen.key_map import KEYS, preferences_path, shown_path
-from hexacell.screen.widgets.text_panel import TextList, TextPanel
 
 
 class HelpOverlay(ModalScreen[None]):

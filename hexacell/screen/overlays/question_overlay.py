@@ -7,10 +7,10 @@ from typing import ClassVar
 
 from textual.binding import BindingType
 
-from hexacell.presentation.screens.views import QuestionView
 from hexacell.screen.backend import Backend
 from hexacell.screen.overlays.answer_overlay import AnswerOverlay
 from hexacell.screen.widgets.device_panel import DevicePanel
+from hexacell.text.screens.views import QuestionView
 
 Answering = Callable[[str | None], Awaitable[None]]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from textual.containers import Vertical
 
-from hexacell.presentation.screens.lines import device_lines
-from hexacell.presentation.screens.views import LiveView
 from hexacell.screen.widgets.text_panel import TextPanel
+from hexacell.text.screens.lines import device_lines
+from hexacell.text.screens.views import LiveView
 
 MOST_LINES = 6
 """Three gauges, encoders, controller and stop line."""

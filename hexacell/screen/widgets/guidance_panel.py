@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from textual.containers import Vertical
 
-from hexacell.presentation.screens.views import Guidance
 from hexacell.screen.widgets.text_panel import TextPanel
+from hexacell.text.screens.views import Guidance
 
 WORDS = ("Now", "Next", "Time", "Stop")
 

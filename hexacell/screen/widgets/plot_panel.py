@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from textual.containers import Vertical
 
-from hexacell.presentation.screens.plot_lines import plot_lines
-from hexacell.presentation.screens.views import PlotView
 from hexacell.screen.widgets.text_panel import TextPanel
+from hexacell.text.screens.plot_lines import plot_lines
+from hexacell.text.screens.views import PlotView
 
 
 class PlotPanel(Vertical):

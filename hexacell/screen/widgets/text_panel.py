@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from textual.containers import VerticalScroll
 from textual.widgets import Static
 
-from hexacell.presentation.screens.views import Urgency
+from hexacell.text.screens.views import Urgency
 
 
 class TextPanel(Static):

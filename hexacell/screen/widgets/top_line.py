@@ -9,8 +9,8 @@ from textual.containers import Horizontal
 from textual.content import Content
 from textual.widgets import Static
 
-from hexacell.presentation.screens.views import HeaderView
 from hexacell.screen.widgets.text_panel import TextPanel
+from hexacell.text.screens.views import HeaderView
 
 TABS = {
     "cell": "Cell",

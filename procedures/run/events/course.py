@@ -6,12 +6,12 @@ from typing import Literal, Self
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.removed_poses import RemovedPoses
-from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
-from hexacell.controller_config.interface import ControllerLimits
+from hexacell.config.interface import ControllerLimits
 from hexacell.kinematics.mechanism import Branch
-from hexacell.reporting.result import AcceptedResult
+from hexacell.results.result import AcceptedResult
+from hexacell.results.written_geometry import TaskDisplacement
 from procedures.run.steps import Step
 from procedures.run.trips import Guard, Trip
 

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 
 from pydantic import AliasChoices, Field
 
-from hexacell.campaign.measured_noise import MeasuredNoise
 from hexacell.cell.fields import Frozen
+from hexacell.noise.measured_noise import MeasuredNoise
 from procedures.run.steps import SetKey, SixNumbers, ThreeNumbers
 
 Joints = Annotated[SixNumbers, Field(validation_alias=AliasChoices("joints", "joints_mm"))]

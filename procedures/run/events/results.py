@@ -6,16 +6,16 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator
 
-from hexacell.acceptance import AcceptanceGate
-from hexacell.campaign.quick_level import QuickAccuracy
-from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.fields import Frozen, GeometryDocument
-from hexacell.decision import Verdict
-from hexacell.experiment_design.design_efficiency import DesignEfficiency
-from hexacell.reporting.check_result import CheckResult
-from hexacell.reporting.length_statement import LengthStatement
-from hexacell.reporting.result import ExpectedImprovement, IdentificationResult
-from hexacell.reporting.verification import Verification
+from hexacell.checks.check_result import CheckResult
+from hexacell.checks.quick_level import QuickAccuracy
+from hexacell.design.design_efficiency import DesignEfficiency
+from hexacell.results.result import ExpectedImprovement, IdentificationResult
+from hexacell.results.written_geometry import TaskDisplacement
+from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.length_statement import LengthStatement
+from hexacell.verdict.verification import Verification
 from procedures.run.steps import SixNumbers
 
 

@@ -8,7 +8,7 @@ from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record, deviation_of, joints_of
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 from tests.benchmarks.peers.interface import Array, Records
 
 ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))

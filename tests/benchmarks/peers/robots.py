@@ -24,7 +24,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.sensitivity import has_singularity_margin
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.robot_model import Robot, robot_of
+from hexacell.robot.model import Robot, robot_of
 from hexacell.study.data_sets import DataSet, unlimited_travel, within_travel
 from hexacell.study.simulated_campaign import SimulatedCampaign
 from tests.benchmarks.peers.interface import Array, Records

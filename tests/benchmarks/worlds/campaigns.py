@@ -11,13 +11,13 @@ from hexacell.campaign.forecast import select_sets
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.experiment_design.candidates import orientations, reachable
+from hexacell.design.candidates import orientations, reachable
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import Robot, robot_of
-from hexacell.virtual_robot import random_robot
+from hexacell.robot.model import Robot, robot_of
+from hexacell.robot.virtual_robot import random_robot
 from tests.benchmarks.worlds.world import Commands
 
 TILT_DEG = 45.0

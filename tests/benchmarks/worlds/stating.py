@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
-from hexacell.decision import Verdict, decide
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.statement import LargestError
+from hexacell.verdict.decision import Verdict, decide
 
 LIMIT_MM = 0.33
 """On the largest error at a task pose: one that most machines without mistakes pass."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binom
 
-from hexacell.decision import Verdict
+from hexacell.verdict.decision import Verdict
 from tests.benchmarks.worlds.kinds import KINDS
 from tests.benchmarks.worlds.trials import Outcome
 

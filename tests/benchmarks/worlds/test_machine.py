@@ -14,7 +14,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import pose_sensitivity
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.virtual_robot import VirtualRobot
 from tests.benchmarks.worlds import frames, legs, rails
 from tests.benchmarks.worlds.campaigns import Setting, setting
 from tests.benchmarks.worlds.closure import Bodies, close, leg_forces, slider_places

@@ -11,13 +11,13 @@ import numpy as np
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import Grade
-from hexacell.decision import Verdict
 from hexacell.errors import HexacellError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import GaugeFaultError, Identification
 from hexacell.measurements.records import MeasurementSet
-from hexacell.reporting.verification import HeldOut, Verification, verify
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.verification import HeldOut, Verification, verify
 from tests.benchmarks.worlds import budgets
 from tests.benchmarks.worlds.campaigns import Setting, UnreachableError, setting
 from tests.benchmarks.worlds.closure import CannotCloseError

@@ -17,7 +17,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record, deviation_of, joints_of
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
 from tests.benchmarks.worlds import frames
 from tests.benchmarks.worlds.closure import STAGES, Bodies, CannotCloseError, close, follow, slider_places
 from tests.benchmarks.worlds.effects import Effect, Posture, Stops

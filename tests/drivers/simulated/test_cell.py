@@ -22,7 +22,7 @@ from drivers.interfaces import StartupAction
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.cell import SimulatedCell
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.toml_format import NativeToml
+from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, ReachError
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose

@@ -17,7 +17,7 @@ from hexacell.errors import UsageError
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot_model import config_layout
+from hexacell.robot.model import config_layout
 from tests.small_cell import changed
 from tests.waiting import wait_until
 

@@ -10,7 +10,7 @@ import pytest
 
 from drivers.simulated.linuxcnc.state import KinematicsFailure
 from drivers.simulated.robot import LINE_STEPS
-from hexacell.controller_config.toml_format import NativeToml
+from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState, Decision, Finished, FinishPoint
-from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot_model import config_layout, make_robot
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.model import config_layout, make_robot
+from hexacell.robot.virtual_robot import VirtualRobot
 
 FEW = 64
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))

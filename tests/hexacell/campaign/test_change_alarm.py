@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.campaign.change_alarm import FIRST_RECORDS
-from hexacell.campaign.check import Check, identified_before
 from hexacell.campaign.decisions import Finished
-from hexacell.campaign.dry_run import VirtualCampaign
-from hexacell.decision import ErrorLimits
+from hexacell.checks.change_alarm import FIRST_RECORDS
+from hexacell.checks.check import Check, identified_before
+from hexacell.checks.check_result import change_alarm, check_result
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
-from hexacell.presentation.verification import alarm_sentence, check_text
-from hexacell.reporting.check_result import change_alarm, check_result
+from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.text.verification import alarm_sentence, check_text
 from hexacell.uncertainty.encoder_effects import encoder_scales
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.verdict.decision import ErrorLimits
 
 SIGMA_MM = 0.005
 SCALE_UM_M = 100.0

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.campaign.check import FEWEST_POINTS, Check, check_settings, identified_before
-from hexacell.campaign.check_statement import CheckStatement
 from hexacell.campaign.decisions import CampaignState
-from hexacell.campaign.drift_estimator import DriftEstimator
-from hexacell.campaign.dry_run import VirtualCampaign
-from hexacell.decision import ErrorLimits, Verdict
+from hexacell.checks.check import FEWEST_POINTS, Check, check_settings, identified_before
+from hexacell.checks.drift_estimator import DriftEstimator
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot_model import Robot
+from hexacell.robot.model import Robot
+from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.verdict.check_statement import CheckStatement
+from hexacell.verdict.decision import ErrorLimits, Verdict
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 LIMITS = ErrorLimits(position_mm=0.15, orientation_deg=0.05)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from hexacell.campaign.check_statement import (
+from hexacell.verdict.check_statement import (
     MOST_FURTHER_RECORDS,
     ErrorEstimate,
     guarded_verdict,
     records_to_decide,
 )
-from hexacell.decision import ErrorLimits, Verdict
+from hexacell.verdict.decision import ErrorLimits, Verdict
 
 QUANTILE = float(np.sqrt(chi2.ppf(0.95, 3)))
 NONE = np.zeros((1, 6, 0))

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.budget import usual_move_seconds
-from hexacell.campaign.dry_run import dry_run
 from hexacell.cell.uncertainty import UncertaintySettings
-from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.config.interface import ControllerGeometry
+from hexacell.dry_run.campaign import dry_run
 from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
-from hexacell.robot_model import make_robot
-from hexacell.stated_effects import stated_effects
-from hexacell.virtual_robot import robots_within_tolerances
+from hexacell.robot.model import make_robot
+from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.virtual_robot import robots_within_tolerances
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 SMALL = {

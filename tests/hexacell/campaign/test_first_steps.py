@@ -10,7 +10,7 @@ from hexacell.campaign.recursive_estimator import OnlineEstimator
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
-from hexacell.virtual_robot import VirtualRobot, random_robot
+from hexacell.robot.virtual_robot import VirtualRobot, random_robot
 
 TRAVEL_MM = 5.0
 

@@ -9,12 +9,12 @@ import pytest
 
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.forecast import PlannedInformation
-from hexacell.experiment_design.criteria import add_information, covariance_update
+from hexacell.design.criteria import add_information, covariance_update
 from hexacell.identification.diagnostics.pose_accuracy import predicted_accuracy
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.virtual_robot import VirtualRobot
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 

@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.campaign.averaging import AveragingForecaster, worthwhile_windows
 from hexacell.campaign.budget import COMMANDED_PROVISIONALLY, usual_move_seconds
-from hexacell.campaign.measured_noise import AveragingForecast, with_measured_noise
-from hexacell.campaign.noise_assessment import NoiseReadings, assess_noise
 from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
-from hexacell.identification.diagnostics.approach_scatter import ScatterSource
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.sensitivity import position_sensitivity
-from hexacell.robot_model import noise_of, robot_of
-from hexacell.stated_effects import stated_effects
+from hexacell.noise.approach_scatter import ScatterSource
+from hexacell.noise.averaging import AveragingForecaster, worthwhile_windows
+from hexacell.noise.measured_noise import AveragingForecast, with_measured_noise
+from hexacell.noise.noise_assessment import NoiseReadings, assess_noise
+from hexacell.robot.model import noise_of, robot_of
+from hexacell.robot.stated_effects import stated_effects
 from hexacell.uncertainty.effects import Occurrence
 from tests.small_cell import changed
 

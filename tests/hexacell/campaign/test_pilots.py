@@ -11,8 +11,8 @@ from hexacell.campaign.decisions import CampaignState, StartPoint
 from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, are_counted, pilot_number, with_pilots
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.stopping_rules import StoppingRules
-from hexacell.experiment_design.continuous_design.optimality import DOptimality
-from hexacell.experiment_design.design_efficiency import CampaignMeasure
+from hexacell.design.continuous_design.optimality import DOptimality
+from hexacell.design.design_efficiency import CampaignMeasure
 from hexacell.identification.estimator import estimate_online
 from hexacell.measurements.records import MeasurementSet
 from tests.hexacell.campaign.conftest import Campaign

@@ -12,11 +12,11 @@ from hexacell.campaign.decisions import CampaignState, Finished, FinishPoint, Me
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.cell.limits import PassiveJointSettings
-from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot_model import make_robot
+from hexacell.robot.model import make_robot
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 

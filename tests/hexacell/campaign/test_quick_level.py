@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.campaign.check import Check, identified_before
 from hexacell.campaign.decisions import CampaignState
-from hexacell.campaign.dry_run import VirtualCampaign
-from hexacell.campaign.quick_level import AS_ACCURATE, QuickLevel
-from hexacell.campaign.quick_trial import try_quick_level
-from hexacell.decision import ErrorLimits
+from hexacell.checks.check import Check, identified_before
+from hexacell.checks.quick_level import AS_ACCURATE, QuickLevel
+from hexacell.dry_run.campaign import VirtualCampaign
+from hexacell.dry_run.quick_level import try_quick_level
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.measurements.records import MeasurementSet
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.verdict.decision import ErrorLimits
 
 LIMITS = ErrorLimits(position_mm=0.15, orientation_deg=0.05)
 CALIBRATED_MM = 0.02

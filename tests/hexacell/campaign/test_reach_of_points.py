@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.feasibility import ROBOTS, unreachable_share
-from hexacell.virtual_robot import VirtualRobot, robots_within_tolerances
+from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 from tests.hexacell.campaign.conftest import make
 
 

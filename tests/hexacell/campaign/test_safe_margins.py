@@ -10,10 +10,10 @@ import pytest
 from hexacell.campaign.decisions import MeasurePose
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_chooser import FIRST_TURN
-from hexacell.experiment_design import travel_monte_carlo
-from hexacell.experiment_design.candidates import ReachableTargets, outcomes_of
-from hexacell.experiment_design.predicted_records import predict_records
-from hexacell.experiment_design.travel_monte_carlo import MARGIN_SIGMAS, TravelConstraint
+from hexacell.design import travel_monte_carlo
+from hexacell.design.candidates import ReachableTargets, outcomes_of
+from hexacell.design.predicted_records import predict_records
+from hexacell.design.travel_monte_carlo import MARGIN_SIGMAS, TravelConstraint
 from hexacell.identification.belief import SPARE_ANGLE, SPARE_SIGMAS
 from hexacell.kinematics.free_sensitivity import free_sensitivity
 from hexacell.kinematics.rotations import Array

@@ -14,18 +14,18 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from hexacell.campaign.teaching import TaskDisplacement, as_written
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.measuring import AcceptanceSettings, TaskSettings
-from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.config.interface import ControllerGeometry
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.robot_model import Robot, make_robot
+from hexacell.results.written_geometry import TaskDisplacement, as_written
+from hexacell.robot.model import Robot, make_robot
 
 RECALIBRATIONS = 12
 WORKSHOP = FrameTransform(

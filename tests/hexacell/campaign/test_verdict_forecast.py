@@ -7,21 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.campaign.dry_run import VirtualCampaign
-from hexacell.campaign.held_out_forecast import predicted_verdicts, with_held_out_records
-from hexacell.campaign.verdict_forecast import (
+from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.dry_run.campaign import VirtualCampaign
+from hexacell.dry_run.held_out_forecast import predicted_verdicts, with_held_out_records
+from hexacell.dry_run.verdict_forecast import (
     NOISE,
     SEED,
     VerdictForecast,
     forecast_verdicts,
     stated_errors,
 )
-from hexacell.cell.uncertainty import UncertaintySettings
-from hexacell.decision import ErrorLimits, Verdict, decide, worst_verdict
 from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.forward import continue_solution
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.verdict.decision import ErrorLimits, Verdict, decide, worst_verdict
 
 MACHINES = 60
 SCALE_UM_M = 60.0

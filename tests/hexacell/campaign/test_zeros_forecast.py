@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import Forecast
-from hexacell.campaign.dry_run import VirtualCampaign
-from hexacell.campaign.held_out_forecast import predicted_verdicts, with_held_out_records
 from hexacell.campaign.planner import Plan
-from hexacell.campaign.verdict_forecast import stated_errors
 from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
-from hexacell.decision import Verdict
+from hexacell.dry_run.campaign import VirtualCampaign
+from hexacell.dry_run.held_out_forecast import predicted_verdicts, with_held_out_records
+from hexacell.dry_run.verdict_forecast import stated_errors
 from hexacell.identification.estimator import identify
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
+from hexacell.robot.virtual_robot import VirtualRobot, random_robot
 from hexacell.uncertainty.budget import UncertaintyBudget
-from hexacell.virtual_robot import VirtualRobot, random_robot
+from hexacell.verdict.decision import Verdict
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 

@@ -9,7 +9,7 @@ import pytest
 from hexacell.cell.loader import describe, load_cell
 from hexacell.errors import FileError
 from hexacell.identification.identified_zeros import ParameterChoice
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hexacell.errors import FileError
-from hexacell.robot_model import noise_of
+from hexacell.robot.model import noise_of
 
 STATED = "encoder_mm = 0.01\ngauge_mm = 0.01\n"
 

@@ -12,7 +12,7 @@ from hexacell.errors import FileError
 from hexacell.kinematics.encoder_scales import WithEncoderScales
 from hexacell.kinematics.mechanisms.screw_legs import ScrewLegs
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SCREWS = f"""

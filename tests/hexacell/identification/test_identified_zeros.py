@@ -22,7 +22,7 @@ from hexacell.identification.identified_zeros import (
 from hexacell.identification.problem.problem import Tolerances
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot_model import Robot, robot_of
+from hexacell.robot.model import Robot, robot_of
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 ZEROS = {"simulated-hexaglide": 5, "gough-stewart": 6, "linapod": 5, "rotary-cranks": 6}

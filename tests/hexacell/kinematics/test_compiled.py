@@ -26,8 +26,8 @@ from hexacell.kinematics.sensitivity import (
     singularity_margin,
 )
 from hexacell.limits.leg_limits import LegLimits
-from hexacell.robot_model import robot_of
-from hexacell.virtual_robot import random_robot
+from hexacell.robot.model import robot_of
+from hexacell.robot.virtual_robot import random_robot
 from tests.compiled_loops import compiled
 
 pytest.importorskip("numba")
@@ -267,13 +267,13 @@ def test_a_decision_is_the_same_in_a_program_of_its_own():
 
 DECISION = """
 import numpy as np
-from hexacell.campaign.dry_run import VirtualCampaign
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.compiled.availability import is_compiled
-from hexacell.robot_model import robot_of
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.robot.model import robot_of
+from hexacell.robot.virtual_robot import VirtualRobot
 
 cell = load_cell(bundled_config("simulated-hexaglide"))
 robot = robot_of(cell)

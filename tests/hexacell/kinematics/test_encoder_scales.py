@@ -17,7 +17,7 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.encoder_scales import WithEncoderScales
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot_model import Robot, config_layout, robot_of
+from hexacell.robot.model import Robot, config_layout, robot_of
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 SCALES = 1e-6 * np.array([300.0, -200.0, 100.0, -300.0, 200.0, -100.0])

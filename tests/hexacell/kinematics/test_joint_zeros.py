@@ -11,7 +11,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 

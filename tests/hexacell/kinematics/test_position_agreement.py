@@ -22,7 +22,7 @@ from hexacell.kinematics.position_agreement import (
     position_mismatch,
 )
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 
 ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))
 TOLERANCES = AgreementTolerances(position_mm=0.01, encoders=1.0)

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from tests.hexacell.experiment_design.conftest import know, limits, little, much
+from tests.hexacell.design.conftest import know, limits, little, much
 
 __all__ = ["know", "limits", "little", "much"]

@@ -15,7 +15,7 @@ from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.duration import SHORTEST_S, LineDurations, SpeedLimits, shortest_duration
 from hexacell.motion.trajectory import interpolate_line
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 
 ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))
 LINES = LineDurations(Hexaglide(), ROBOT.controller, ROBOT.branch)

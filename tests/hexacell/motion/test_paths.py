@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hexacell.experiment_design.candidates import commands_for, orientations, reachable_targets
+from hexacell.design.candidates import commands_for, orientations, reachable_targets
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import PoseBatch

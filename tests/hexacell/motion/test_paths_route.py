@@ -14,7 +14,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion import paths as module
 from hexacell.motion.path_check import ball_position, is_clear
 from hexacell.motion.paths import find_route
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 
 
 def at(place: float) -> PoseBatch:

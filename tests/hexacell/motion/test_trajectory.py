@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.experiment_design.candidates import orientations
+from hexacell.design.candidates import orientations
 from hexacell.kinematics.forward import assembly_mode, continue_solution, forward_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import pose_jacobian

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.application.history import past_runs
-from hexacell.decision import Verdict
 from hexacell.result_server import new_results
 from hexacell.result_server.new_results import NewResults
 from hexacell.result_server.published_result import ResultEvaluation, ResultState
 from hexacell.runs.run_folder import runs_folder
-from tests.hexacell.application.proposed_runs import a_cell, propose_run
+from hexacell.services.history.history import past_runs
+from hexacell.verdict.decision import Verdict
+from tests.hexacell.services.proposed_runs import a_cell, propose_run
 
 
 @pytest.fixture

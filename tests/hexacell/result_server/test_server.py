@@ -24,14 +24,14 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from hexacell.cell.loader import Cell
 from hexacell.cell.opcua import OpcUaSettings
-from hexacell.decision import Verdict
 from hexacell.errors import DeviceError, FileError, UsageError
 from hexacell.result_server.address_space import MOST_RESULTS, NAMESPACE
 from hexacell.result_server.credentials import ensure_certificate
 from hexacell.result_server.server import serve_results
 from hexacell.runs.run_folder import runs_folder
-from tests.hexacell.application.proposed_runs import a_cell, propose_run
-from tests.hexacell.notices.local_servers import closed_port
+from hexacell.verdict.decision import Verdict
+from tests.hexacell.services.notify.local_servers import closed_port
+from tests.hexacell.services.proposed_runs import a_cell, propose_run
 
 USER, PASSWORD = "line-7", "hidden-password"
 QUIET = logging.getLogger("asyncua")

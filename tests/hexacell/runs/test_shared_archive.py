@@ -6,12 +6,12 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 
-from hexacell.application.history import past_runs
-from hexacell.application.run_index import RunIndex
 from hexacell.runs.archive import INDEX, Archive
 from hexacell.runs.archived_documents import DocumentKind, StampedDocument
 from hexacell.runs.run_folder import runs_folder
-from tests.hexacell.application.proposed_runs import a_cell, propose_run
+from hexacell.services.history.history import past_runs
+from hexacell.services.history.run_index import RunIndex
+from tests.hexacell.services.proposed_runs import a_cell, propose_run
 
 SUMMARY = DocumentKind.SUMMARY
 

@@ -14,13 +14,13 @@ from pathlib import Path
 import pytest
 
 from hexacell.errors import CellBusy, ExitCode, FileError
-from hexacell.storage.cell_lock import cell_lock, lock_path
+from hexacell.runs.cell_lock import cell_lock, lock_path
 from tests.signals import terminal_signals
 
 HOLD = """
 import sys
 from pathlib import Path
-from hexacell.storage.cell_lock import cell_lock
+from hexacell.runs.cell_lock import cell_lock
 with cell_lock(Path(sys.argv[1])):
     print("held", flush=True)
     sys.stdin.read()

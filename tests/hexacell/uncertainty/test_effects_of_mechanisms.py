@@ -13,7 +13,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart, gough_stewart_geometry
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 from hexacell.uncertainty.effects import Effect, Placement
 from hexacell.uncertainty.encoder_effects import (
     encoder_eccentricities,

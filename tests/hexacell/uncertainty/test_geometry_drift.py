@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from hexacell.experiment_design.candidates import ReachableTargets
-from hexacell.experiment_design.predicted_records import position_derivatives
+from hexacell.design.candidates import ReachableTargets
+from hexacell.design.predicted_records import position_derivatives
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.build import build_problem

@@ -15,11 +15,11 @@ from drivers.interfaces import DeviceIdentity, TemperatureReading
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.loader import load_cell
-from hexacell.decision import Verdict
 from hexacell.errors import AnswerNeeded, HexacellError
 from hexacell.kinematics.pose import Pose
-from hexacell.reporting.length_statement import LengthStatement
-from hexacell.reporting.result import AcceptedResult
+from hexacell.results.result import AcceptedResult
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.length_statement import LengthStatement
 from procedures.calibration.expected_records import expected_records
 from procedures.calibration.length_steps import BESIDE_MM
 from procedures.calibration.preflight import plan_failures

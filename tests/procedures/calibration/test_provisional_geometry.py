@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.controller_config.toml_format import NativeToml
+from hexacell.config.toml_format import NativeToml
 from hexacell.errors import DeviceError, ExitCode, HexacellError, Interruption
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS

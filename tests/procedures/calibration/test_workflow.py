@@ -11,10 +11,10 @@ import pytest
 from hexacell.campaign import planner as module
 from hexacell.campaign.decisions import MeasurePose
 from hexacell.campaign.stopping_rules import REFUSALS
-from hexacell.decision import Verdict
 from hexacell.errors import LimitError
 from hexacell.kinematics.pose import Pose
-from hexacell.reporting.verification import Verification
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.verification import Verification
 from procedures.calibration import path_planning
 from procedures.calibration.identification_steps import IdentificationSteps
 from procedures.calibration.workflow import Mode

@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from hexacell.decision import Verdict
 from hexacell.errors import (
     AnswerNeeded,
     DeviceError,
@@ -23,6 +22,7 @@ from hexacell.errors import (
     SeveralErrors,
     WriteBackUndone,
 )
+from hexacell.verdict.decision import Verdict
 from procedures.engine.engine import Engine
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from hexacell.controller_config.change import ConfigChange
-from hexacell.controller_config.write_back import commit
+from hexacell.config.change import ConfigChange
+from hexacell.config.write_back import commit
 from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
 from procedures.engine import config_transactions

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from hexacell.campaign.measured_noise import InstrumentNoise, RepeatedApproaches
-from hexacell.identification.diagnostics.approach_scatter import ScatterSource
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.noise.approach_scatter import ScatterSource
+from hexacell.noise.measured_noise import InstrumentNoise, RepeatedApproaches
 from procedures.run import events
 
 SIX = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.fields import Frozen
+from hexacell.verdict.acceptance import AcceptanceGate
 from procedures.journal.line_format import decode
 from procedures.replay.comparison import Aspect, Change, Difference, changes, is_wording
 from procedures.run import events

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from drivers.errors import GaugeAtEnd
-from hexacell.application.calibration_run import calibration_of_run
-from hexacell.decision import Verdict
 from hexacell.errors import HexacellError, LimitError
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
+from hexacell.services.run.calibration_run import calibration_of_run
+from hexacell.verdict.decision import Verdict
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_journal
 from procedures.journal.line_format import Entry

@@ -6,10 +6,10 @@ import asyncio
 
 import pytest
 
-from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded, ExitCode
 from hexacell.kinematics.pose import Pose
+from hexacell.verdict.acceptance import AcceptanceGate
 from procedures.run.questions import (
     GaugePlacement,
     Question,

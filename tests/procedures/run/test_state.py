@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.decision import Verdict
+from hexacell.verdict.decision import Verdict
 from procedures.run import events
 from procedures.run.state import RunState, apply, fold
 from procedures.run.steps import CloseSet, Phase, SetKey

@@ -11,23 +11,23 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.acceptance import AcceptanceGate
-from hexacell.campaign.measured_noise import (
+from hexacell.campaign.pilots import FIRST_PILOT
+from hexacell.cell.fields import Frozen
+from hexacell.cell.recovery import Action, FailureKind
+from hexacell.identification.solver.result import DataFaultKind
+from hexacell.kinematics.parameters import JointUnit
+from hexacell.noise.approach_scatter import ScatterSource
+from hexacell.noise.measured_noise import (
     AveragingForecast,
     InstrumentNoise,
     MeasuredNoise,
     RepeatedApproaches,
 )
-from hexacell.campaign.pilots import FIRST_PILOT
-from hexacell.cell.fields import Frozen
-from hexacell.cell.recovery import Action, FailureKind
-from hexacell.decision import Verdict
-from hexacell.identification.diagnostics.approach_scatter import ScatterSource
-from hexacell.identification.solver.result import DataFaultKind
-from hexacell.kinematics.parameters import JointUnit
-from hexacell.reporting.model_evidence import ModelTest
-from hexacell.reporting.result import OutlierRecord
-from hexacell.reporting.verification import JudgedError, Verification, VerifiedAccuracy
+from hexacell.results.result import OutlierRecord
+from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.model_evidence import ModelTest
+from hexacell.verdict.verification import JudgedError, Verification, VerifiedAccuracy
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.events import course, measuring, results

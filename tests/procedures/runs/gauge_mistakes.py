@@ -13,8 +13,8 @@ from hexacell.cell.fields import GeometrySettings
 from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.kinematics.pose import Pose
-from hexacell.robot_model import robot_of
-from hexacell.virtual_robot import VirtualRobot, random_robot
+from hexacell.robot.model import robot_of
+from hexacell.robot.virtual_robot import VirtualRobot, random_robot
 
 MM_PER_INCH = 25.4
 

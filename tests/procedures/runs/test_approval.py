@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.controller_config.change import ConfigChange
+from hexacell.config.change import ConfigChange
 from hexacell.errors import AnswerNeeded, ExitCode, LimitError
 from procedures.run import events
 from procedures.run.questions import UnattendedOperator

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from hexacell.decision import Verdict
 from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
-from hexacell.presentation.events import event_text
-from hexacell.reporting import model_evidence
+from hexacell.text.events import event_text
+from hexacell.verdict import model_evidence
+from hexacell.verdict.decision import Verdict
 from procedures.calibration.held_out_poses import HeldOutPoses
 from procedures.journal.journal import read_journal
 from procedures.run import events

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from drivers.errors import GaugeSilent
-from hexacell.application.calibration_run import calibration_of_run
 from hexacell.campaign import planner
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.recovery import UnattendedRecovery
-from hexacell.controller_config.receipt import Receipt
+from hexacell.config.receipt import Receipt
 from hexacell.errors import ExitCode, Interruption
 from hexacell.kinematics.pose import Pose
-from hexacell.presentation.events import event_text
+from hexacell.services.run.calibration_run import calibration_of_run
+from hexacell.text.events import event_text
 from procedures.calibration.workflow import Mode
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal

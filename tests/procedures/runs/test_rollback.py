@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from drivers.errors import GaugeAtEnd
-from hexacell.decision import Verdict
 from hexacell.errors import DeviceError, ExitCode, FileError, WriteBackUndone
+from hexacell.verdict.decision import Verdict
 from procedures.run import events
 from procedures.run.questions import UnattendedOperator
 from procedures.run.state import fold

@@ -8,9 +8,9 @@ import tomllib
 
 import numpy as np
 
-from hexacell.controller_config.change import ConfigChange
-from hexacell.controller_config.receipt import Receipt
-from hexacell.controller_config.toml_format import NativeToml
+from hexacell.config.change import ConfigChange
+from hexacell.config.receipt import Receipt
+from hexacell.config.toml_format import NativeToml
 from hexacell.errors import ExitCode
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.measurements.csv_file import read_measurements

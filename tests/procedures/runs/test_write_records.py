@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.controller_config.write_record import RECORDS, THE_RUN, WriteKind, WriteRecord, read_records
+from hexacell.config.write_record import RECORDS, THE_RUN, WriteKind, WriteRecord, read_records
 from hexacell.errors import DeviceError, ExitCode, WriteBackUndone
 from procedures.run import events
 from tests.procedures.runs.listening import with_tiny_deviations_before

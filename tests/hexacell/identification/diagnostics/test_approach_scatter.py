@@ -7,9 +7,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from hexacell.identification.diagnostics.approach_scatter import ALONE, ScatterSource, approach_scatter
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import position_sensitivity
+from hexacell.noise.approach_scatter import ALONE, ScatterSource, approach_scatter
 
 NOISE = 0.01
 VISITS = 7

@@ -9,16 +9,16 @@ import pytest
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
-from hexacell.identification.diagnostics.gauge_trial import (
+from hexacell.kinematics import rotations
+from hexacell.kinematics.pose import Pose
+from hexacell.noise.gauge_trial import (
     GaugeMistake,
     TrialFinding,
     judge_response,
     response_of,
 )
-from hexacell.kinematics import rotations
-from hexacell.kinematics.pose import Pose
-from hexacell.robot_model import robot_of
-from hexacell.virtual_robot import VirtualRobot, robots_within_tolerances
+from hexacell.robot.model import robot_of
+from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 
 DEAD, INCHES, REVERSED, EXCHANGED = GaugeMistake
 NOISE_MM = 0.014

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.identification.diagnostics.repeatability import Repeatability, repeatability
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.noise.repeatability import Repeatability, repeatability
 
 STILL = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

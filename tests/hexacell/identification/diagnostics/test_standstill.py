@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2, kstest
 
 from hexacell.cell.measuring import FEWEST_STANDSTILL_READINGS
-from hexacell.identification.diagnostics.standstill import (
+from hexacell.noise.standstill import (
     LARGEST_CORRELATION,
     SMALLEST_SERIES,
     USUAL_STEP_MM,

@@ -17,7 +17,7 @@ from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
-from hexacell.virtual_robot import random_robot
+from hexacell.robot.virtual_robot import random_robot
 
 MECHANISM = Hexaglide()
 THREE_MM = Tolerances({"S": 3.0, "B": 3.0, "l": 3.0})

@@ -8,7 +8,7 @@ import pytest
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
-from hexacell.reporting.findings import residual_sentence
+from hexacell.verdict.findings import residual_sentence
 
 
 def test_probability_is_the_table_s():

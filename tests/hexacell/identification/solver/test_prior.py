@@ -11,7 +11,7 @@ from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
-from hexacell.virtual_robot import random_robot
+from hexacell.robot.virtual_robot import random_robot
 
 
 def covariance_of_drawn(mechanism, drawing, tolerances, count=4000):

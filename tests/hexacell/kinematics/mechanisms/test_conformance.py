@@ -11,7 +11,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.conformance import MechanismConformance, MechanismExample
 from hexacell.kinematics.mechanisms.six_rails import SixRails, six_rails_geometry
 from hexacell.kinematics.turned_axes import turns_of
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 
 CONFIGS = Path(__file__).parents[4] / "configs"
 

@@ -20,7 +20,7 @@ from hexacell.kinematics.mechanisms.rotary_cranks import (
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.turned_axes import turns_of
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 
 MECHANISM = RotaryCranks()
 CELL = Path(__file__).parents[4] / "configs" / "rotary-cranks.toml"

@@ -17,7 +17,7 @@ from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart
 from hexacell.kinematics.mechanisms.screw_legs import ScrewLegs, Screws
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import robot_of
+from hexacell.robot.model import robot_of
 
 LEAD_MM = 10.0
 LARGEST_CHANGE = LEAD_MM / (2.0 * np.pi * 500.0)

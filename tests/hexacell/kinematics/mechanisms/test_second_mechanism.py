@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hexacell.cell.model import geometry_settings, tolerance_settings
-from hexacell.controller_config.toml_format import NativeToml
+from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.identification.diagnostics.frame_choice import choose_frames
 from hexacell.identification.estimator import identify
@@ -33,7 +33,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.reporting.result import IdentificationResult
+from hexacell.results.result import IdentificationResult
 
 MECHANISM: Mechanism = GoughStewart()
 BRANCH: Branch = ()

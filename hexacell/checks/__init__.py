@@ -1,0 +1,1 @@
+"""Checks of a calibrated robot: a short identification that decides, and the quick level."""

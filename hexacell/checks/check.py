@@ -1,0 +1,249 @@
+"""A check: a short identification that decides whether the robot, as it is now, is within a limit.
+
+It starts from what the last accepted result left known of the geometry, and from what may have drifted
+since; without such a result from the drawing. Poses are chosen for the error at the task poses. The check
+ends as soon as that error and its uncertainty decide against the limit, or its budget is used.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.campaign.forecast import PlannedInformation
+from hexacell.campaign.planner import CANDIDATES, Plan
+from hexacell.campaign.pose_list import PoseList
+from hexacell.campaign.recursive_estimator import OnlineEstimator, RecordEstimator
+from hexacell.cell.model import CellSettings
+from hexacell.checks.change_alarm import ChangeTest, change_test
+from hexacell.checks.drift_estimator import GUARDED_SCALE, DriftEstimator, ScaledEstimate
+from hexacell.identification.solver.chi_square import ChiSquareVerdict
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet, Record, RecordId
+from hexacell.robot.model import Robot
+from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.geometry_drift import IdentifiedBefore, drift_covariance, drift_sigma
+from hexacell.verdict.check_statement import (
+    CheckStatement,
+    ErrorEstimate,
+    guarded_verdict,
+    records_to_decide,
+)
+from hexacell.verdict.decision import ErrorLimits, Verdict
+
+FEWEST_POINTS = 2
+"""Points with more than the reference, at which a check measures whatever was known before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """The check of one robot against limits of the errors at its task poses.
+
+    Attributes:
+        before: the last accepted result, and its drift since; none without such a result.
+        limits: at the worst task pose.
+        budget: most records, references included.
+        listed: poses to measure; none if they are chosen.
+        effects: the systematic ones. A check shares the constant ones with the result before it, so that
+            its records do not reduce them.
+        earlier: what these did to that result, as errors (p, k) of its free parameters by effect.
+        candidates: number of candidate orientations for each record.
+        left_points: points that are not measured, counted from 1.
+    """
+
+    settings: CellSettings
+    robot: Robot
+    before: IdentifiedBefore | None
+    limits: ErrorLimits
+    budget: int
+    listed: PoseList | None = None
+    effects: tuple[Effect, ...] = ()
+    earlier: Mapping[str, Array] = field(default_factory=dict)
+    candidates: int = CANDIDATES
+    left_points: frozenset[int] = frozenset()
+
+    @cached_property
+    def plan(self) -> Plan:
+        """What to measure, until the check is decided or its budget is used."""
+        drifting = self._drifting
+        return Plan(
+            check_settings(self.settings, self.budget, len(self.left_points)),
+            self.robot if drifting is None else drifting.robot,
+            self.listed,
+            self.candidates,
+            estimator=self._by_drawing if drifting is None else drifting,
+            goal=self,
+            earlier=self.earlier,
+            left_points=self.left_points,
+        )
+
+    def reached(self, measurements: MeasurementSet) -> str | None:
+        """That the records are enough: see :class:`~hexacell.campaign.stopping_rules.Goal`."""
+        _, records = np.unique(measurements.points, return_counts=True)
+        is_enough = np.count_nonzero(records > 1) >= FEWEST_POINTS
+        return self._decided(measurements) if is_enough else None
+
+    def reached_at(self, point: int, measurements: MeasurementSet) -> str | None:
+        """That the records are enough, but perhaps at too few points."""
+        is_measured = np.count_nonzero(measurements.points == point) > 1
+        return self._decided(measurements) if is_measured else None
+
+    def statement(self, measurements: MeasurementSet) -> CheckStatement | None:
+        """What is said by some records; none if the estimated robot can take no task pose.
+
+        Raises:
+            IdentifiabilityError: the records do not belong to this robot.
+        """
+        records = measurements.records
+        if records not in self._stated:
+            self._stated.clear()  # only the last one is asked for again
+            self._stated[records] = self._statement(measurements, self.effects)
+        return self._stated[records]
+
+    def final_statement(
+        self, measurements: MeasurementSet, effects: tuple[Effect, ...] | None = None
+    ) -> CheckStatement | None:
+        """The same at the end of the check, where what is not decided is not evaluated.
+
+        ``effects`` are the systematic ones as they are known by then, if not as before.
+
+        Raises:
+            IdentifiabilityError: the records do not belong to this robot.
+        """
+        effects = self.effects if effects is None else effects
+        stated = self._statement(measurements, effects)
+        if stated is None or stated.is_decided:
+            return stated
+        further = self._further_records(measurements, effects) if stated.is_consistent else None
+        return replace(stated, verdict=Verdict.NOT_EVALUATED, further_records=further)
+
+    def change_test(
+        self, measurements: MeasurementSet, expansion: Array | None = None
+    ) -> ChangeTest | None:
+        """Whether some records contradict an unchanged robot; none where it was not identified before.
+
+        ``expansion`` (n, P) is by how much the parameters differ at each record from those of then.
+        """
+        if self.before is None:
+            return None
+        return change_test(self.robot, self.before, measurements, self.earlier, expansion)
+
+    def predicted_error(self, measurements: MeasurementSet) -> float | None:
+        """The error predicted at the worst task pose, 1 sigma, mm; none if no task pose can be taken.
+
+        Raises:
+            IdentifiabilityError: the records do not belong to this robot.
+        """
+        belief = self._estimates(measurements)[0].estimate.belief
+        error = self.plan.task.error(belief)
+        return None if error is None else error.worst(belief.covariance)
+
+    def false_records(self, measurements: MeasurementSet) -> frozenset[RecordId]:
+        """Records that the others prove false; no statement counts them."""
+        return self._estimates(measurements)[0].estimate.false_records
+
+    def _decided(self, measurements: MeasurementSet) -> str | None:
+        stated = self.statement(measurements)
+        if stated is None or not stated.is_decided:
+            return None
+        return f"the error at the task poses is {stated.position} mm: {stated.verdict}"
+
+    def _statement(
+        self, measurements: MeasurementSet, effects: tuple[Effect, ...]
+    ) -> CheckStatement | None:
+        likeliest, guarded = self._estimates(measurements)
+        estimates = self._errors(likeliest, effects), self._errors(guarded, effects)
+        if estimates[0] is None or estimates[1] is None:
+            return None
+        errors = estimates[0].errors
+        is_consistent = _is_consistent(likeliest)
+        verdict = guarded_verdict(errors, estimates[1].errors, self.limits)
+        return CheckStatement(
+            estimate=likeliest.estimate,
+            errors=errors,
+            verdict=verdict if is_consistent else Verdict.NOT_EVALUATED,
+            drift_scale=None if self.before is None else likeliest.scale,
+            is_consistent=is_consistent,
+            records=len(measurements),
+        )
+
+    def _estimates(self, measurements: MeasurementSet) -> tuple[ScaledEstimate, ScaledEstimate]:
+        """Under the likeliest scale of the drift, and under the guarded one; by the drawing the same."""
+        if self._drifting is not None:
+            guarded = self._drifting.at_least(GUARDED_SCALE, measurements)
+            return self._drifting.likeliest(measurements), guarded
+        estimate = ScaledEstimate(1.0, self._by_drawing.estimate(measurements), 0.0)
+        return estimate, estimate
+
+    def _errors(self, estimate: ScaledEstimate, effects: tuple[Effect, ...]) -> ErrorEstimate | None:
+        return ErrorEstimate.of(self.plan.task, estimate.estimate, effects, self.earlier)
+
+    def _further_records(self, measurements: MeasurementSet, effects: tuple[Effect, ...]) -> int | None:
+        """How many more would decide, each as informative as those of well spread sets on average."""
+        likeliest, guarded = self._estimates(measurements)
+        first, second = self._errors(likeliest, effects), self._errors(guarded, effects)
+        if first is None or second is None:
+            return None
+        sets = replace(self.plan, settings=self.settings).planned_sets
+        planned = PlannedInformation.of(sets, likeliest.estimate.belief)
+        total = np.sum(
+            [planned.information(point, len(sets[point - 1])) for point in self.plan.points], axis=0
+        )
+        size = sum(len(sets[point - 1]) for point in self.plan.points)
+        return records_to_decide(first, second, self.limits, total / size)
+
+    @cached_property
+    def _drifting(self) -> DriftEstimator | None:
+        return None if self.before is None else DriftEstimator(self.robot, self.before)
+
+    @cached_property
+    def _by_drawing(self) -> RecordEstimator:
+        return OnlineEstimator(self.robot)
+
+    @cached_property
+    def _stated(self) -> dict[tuple[Record, ...], CheckStatement | None]:
+        return {}
+
+
+def check_settings(settings: CellSettings, budget: int, left_points: int = 0) -> CellSettings:
+    """A cell's settings with those of a check, of ``budget`` records, in the place of the calibration's.
+
+    So many of the points are not measured.
+    """
+    plan = settings.identification
+    points = len(plan.points) - left_points
+    identification = plan.model_copy(
+        update={
+            "criterion": "task",
+            "orientations": max(2, math.ceil(budget / points)),
+            "budget_records": budget,
+            "budget_minutes": None,
+            "target_mm": None,
+            "least_gain_mm": 0.0,
+            "choose_points": False,
+            "provisional": False,
+        }
+    )
+    return settings.model_copy(update={"identification": identification})
+
+
+def identified_before(robot: Robot, covariance: Array, drift_mm: float) -> IdentifiedBefore:
+    """The controller's geometry, as identified with a covariance (P, P), mm^2, of all parameters.
+
+    ``drift_mm`` is the standard deviation of what each length may have changed since.
+    """
+    mechanism, geometry = robot.mechanism, robot.commanding
+    rows = mechanism.convention.free_rows()
+    sigma = drift_sigma(mechanism, drift_mm, robot.tolerances)
+    drift = drift_covariance(mechanism, geometry, sigma)
+    return IdentifiedBefore(mechanism, geometry, covariance[np.ix_(rows, rows)], drift)
+
+
+def _is_consistent(estimate: ScaledEstimate) -> bool:
+    """Whether the residuals are not too large for the stated noise."""
+    found = estimate.estimate.identification
+    return found is None or found.goodness.agreement is not ChiSquareVerdict.TOO_LARGE

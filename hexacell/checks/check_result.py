@@ -1,0 +1,227 @@
+"""The result of a check: the error of the controller's geometry now, what has changed, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime
+
+import numpy as np
+
+from hexacell.campaign.leg_expansion import leg_expansion
+from hexacell.campaign.recursive_estimator import OnlineEstimate
+from hexacell.cell.fields import Frozen
+from hexacell.checks.change_alarm import FIRST_RECORDS, ChangeTest
+from hexacell.checks.check import Check
+from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet, RecordId
+from hexacell.results.length_result import LengthResult
+from hexacell.results.result import AcceptedResult
+from hexacell.uncertainty.effects import Effect
+from hexacell.verdict.check_statement import CheckStatement
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.verification import JudgedError, VerifiedAccuracy, outcome_of
+
+
+class ParameterChange(Frozen):
+    """How far a free parameter is from the controller's, and one standard deviation of that."""
+
+    name: str
+    unit: str
+    change: float
+    sigma: float
+
+    @property
+    def significance(self) -> float:
+        """The change in standard deviations."""
+        return abs(self.change) / self.sigma
+
+
+class ChangeAlarm(Frozen):
+    """Whether the first records of a check contradict a robot that has not changed since, by one parameter.
+
+    Attributes:
+        records: that were tested.
+        score: the largest of all parameters; each is standard normal for an unchanged robot.
+        limit: what the largest exceeds in one of a hundred checks of unchanged robots.
+        leg: that changed, if one did, by all records of the check; its likeliest ``parameter``, the
+            ``change`` of that and its standard deviation, if it alone changed.
+    """
+
+    records: int
+    score: float
+    limit: float
+    leg: int
+    parameter: str
+    unit: str
+    change: float
+    sigma: float
+
+    @property
+    def is_raised(self) -> bool:
+        """Whether an unchanged robot is contradicted."""
+        return self.score > self.limit
+
+
+class CheckResult(Frozen):
+    """What a check says of the robot as it is now.
+
+    Attributes:
+        accuracy: errors of the controller's geometry; none where the robot can take none of the task poses.
+        is_consistent: whether the residuals agree with the stated noise, however far the robot drifted.
+        further_records: about how many more would decide; none where none would, or nothing is open.
+        earlier_run, earlier_at: the accepted result that it started from; none where that is the drawing.
+        drift_scale: how many times as large as stated the drift since then is.
+        changes: of the free parameters, in the mechanism's frame convention.
+        left_out: records that the others prove false.
+        alarm: the test of a change by the first records; none where the robot was not identified before, or
+            where there were fewer.
+    """
+
+    verdict: Verdict
+    records: int
+    points: int
+    accuracy: VerifiedAccuracy | None = None
+    is_consistent: bool = True
+    further_records: int | None = None
+    earlier_run: str | None = None
+    earlier_at: datetime | None = None
+    drift_scale: float | None = None
+    changes: tuple[ParameterChange, ...] = ()
+    left_out: tuple[RecordId, ...] = ()
+    alarm: ChangeAlarm | None = None
+
+    @property
+    def significant_change(self) -> ParameterChange | None:
+        """The most significant change; none where all may be chance."""
+        most = max(self.changes, key=lambda one: one.significance, default=None)
+        return most if most is not None and most.significance >= SIGNIFICANT_SIGMAS else None
+
+
+def check_result(
+    check: Check,
+    measurements: MeasurementSet,
+    earlier: AcceptedResult | None,
+    effects: tuple[Effect, ...],
+    warmer: Array | None = None,
+) -> CheckResult:
+    """The result of a check that has ended.
+
+    ``earlier`` is what it started from; ``effects`` are the systematic ones. ``warmer`` (n, 6), K, is each
+    leg at each record than at ``earlier``; NaN where that is not known: then no change is looked for.
+
+    Raises:
+        IdentifiabilityError: the records do not belong to this robot.
+    """
+    stated = check.final_statement(measurements, effects) if len(measurements) else None
+    records, points = len(measurements), len(set(measurements.points.tolist()))
+    if stated is None:
+        return CheckResult(verdict=Verdict.NOT_EVALUATED, records=records, points=points)
+    return CheckResult(
+        verdict=stated.verdict,
+        records=records,
+        points=points,
+        accuracy=_accuracy(check, stated, None if earlier is None else earlier.length),
+        is_consistent=stated.is_consistent,
+        further_records=stated.further_records,
+        earlier_run=earlier and earlier.run,
+        earlier_at=earlier and earlier.at,
+        drift_scale=stated.drift_scale,
+        changes=tuple(_changes(stated.estimate)),
+        left_out=tuple(sorted(check.false_records(measurements))),
+        alarm=_alarm(check, measurements, warmer),
+    )
+
+
+def _alarm(check: Check, measurements: MeasurementSet, warmer: Array | None) -> ChangeAlarm | None:
+    """The alarm, where it is known how much longer the legs are than at the accepted result."""
+    if warmer is None or not warmer.any():
+        return change_alarm(check, measurements)
+    if np.isnan(warmer).any():
+        return None
+    by_kelvin = check.settings.uncertainty.expansion_legs_um_m_k
+    return change_alarm(check, measurements, leg_expansion(check.robot.commanding, by_kelvin, warmer))
+
+
+def change_alarm(
+    check: Check, measurements: MeasurementSet, expansion: Array | None = None
+) -> ChangeAlarm | None:
+    """Whether the first records raise an alarm, and which leg all of them name.
+
+    Records that the others prove false are not tested. ``expansion`` (n, P) is by how much the parameters
+    differ at each record from those of the result before.
+
+    Raises:
+        IdentifiabilityError: the records do not belong to this robot.
+    """
+    false = check.false_records(measurements)
+    sound = [row for row, one in enumerate(measurements.records) if one.id not in false]
+    first, every = (
+        _tested(check, measurements, rows, expansion) for rows in (sound[:FIRST_RECORDS], sound)
+    )
+    if first is None or len(sound) < FIRST_RECORDS:
+        return None
+    assert every is not None  # noqa: S101 - the first records had a test
+    parameter = check.robot.mechanism.parameters.parameters[every.cause]
+    return ChangeAlarm(
+        records=FIRST_RECORDS,
+        score=float(np.abs(first.test.scores).max()),
+        limit=first.test.limit,
+        leg=every.leg,
+        parameter=parameter.name,
+        unit=parameter.kind.unit.value,
+        change=float(every.test.changes[every.cause]),
+        sigma=float(every.test.sigmas[every.cause]),
+    )
+
+
+def _tested(
+    check: Check, measurements: MeasurementSet, rows: list[int], expansion: Array | None
+) -> ChangeTest | None:
+    records = MeasurementSet(tuple(measurements.records[row] for row in rows))
+    return check.change_test(records, None if expansion is None else expansion[rows]) if rows else None
+
+
+def check_line(result: CheckResult) -> str:
+    """The outcome of a check in one line: what was measured, the error, the verdict and its reason."""
+    measured = f"{result.records} records at {result.points} points"
+    return outcome_of([f"check: {measured}"], result.accuracy, result.verdict, _reason(result))
+
+
+def _reason(result: CheckResult) -> str:
+    if result.verdict is not Verdict.NOT_EVALUATED:
+        return ""
+    if result.accuracy is None:
+        return "the robot can take none of the task poses"
+    if not result.is_consistent:
+        return "the residuals are larger than the stated noise explains"
+    if result.further_records is None:
+        return "further records would not decide"
+    return f"about {result.further_records} more records would decide"
+
+
+def _accuracy(check: Check, stated: CheckStatement, length: LengthResult | None) -> VerifiedAccuracy:
+    task = check.plan.task.reachable(stated.estimate.belief)
+    limits, factor = check.limits, check.limits.guard_band_factor
+    return VerifiedAccuracy(
+        position=JudgedError.of(stated.position, limits.position_mm, factor),
+        orientation=JudgedError.of(stated.orientation, limits.orientation_deg, factor),
+        poses=len(task.poses),
+        task_named=bool(check.settings.task.poses),
+        worst=check.robot.to_command(task.poses.pose(stated.errors.worst)).as_tuple(),
+        length=length,
+        scale_of=VerifiedAccuracy.scale_with(check.robot.mechanism),
+    )
+
+
+def _changes(estimate: OnlineEstimate) -> Iterator[ParameterChange]:
+    belief = estimate.belief
+    convention = belief.mechanism.convention
+    change = belief.free - convention.free_parameters(belief.controller)
+    sigma = np.sqrt(np.diag(belief.covariance))
+    rows = convention.free_rows()
+    for row, moved, deviation in zip(rows, change.tolist(), sigma.tolist(), strict=True):
+        parameter = belief.mechanism.parameters.parameters[row]
+        yield ParameterChange(
+            name=parameter.name, unit=parameter.kind.unit.value, change=moved, sigma=deviation
+        )

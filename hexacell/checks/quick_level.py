@@ -1,0 +1,205 @@
+"""The quick level: a check carried on until the robot is known as well as the last calibration left it.
+
+It starts from the last accepted result and from what may have drifted since, as a check does
+(:mod:`~hexacell.checks.check`), and chooses poses in the same way. It ends once the error predicted at
+the worst task pose is that of the last calibration, or its budget is used. Its result is a whole geometry.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.campaign.forecast import PlannedInformation
+from hexacell.campaign.planner import Plan
+from hexacell.cell.fields import Frozen
+from hexacell.checks.check import Check, check_settings
+from hexacell.checks.drift_estimator import DriftEstimator, ScaledEstimate
+from hexacell.design.criteria import add_information
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.problem.data_requirements import is_overdetermined
+from hexacell.identification.problem.problem import Prior
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet
+from hexacell.robot.model import Robot
+from hexacell.uncertainty.geometry_drift import IdentifiedBefore
+from hexacell.verdict.check_statement import MOST_FURTHER_RECORDS
+
+TOLD_RECORDS = (12, 24, 48)
+"""So many more records have their gain told."""
+
+AS_ACCURATE = 1.02
+"""Times the error that the last calibration left: nobody measures for two hundredths of it."""
+
+
+class FurtherRecords(Frozen):
+    """What more records would leave: the predicted error at the worst task pose, 1 sigma, mm."""
+
+    records: int
+    error_mm: float
+
+
+class QuickAccuracy(Frozen):
+    """How well the quick level knows the robot: predicted errors at the worst task pose, 1 sigma, mm.
+
+    Attributes:
+        records: that it measured.
+        error_mm: by these records and what was known before.
+        calibrated_mm: that the result left which it started from.
+        drift_scale: how many times as large as stated the drift since then is.
+        further: what more records would leave.
+        records_to_calibrated: about how many more would leave as little as that result; 0 where these do,
+            none where no sensible number would.
+    """
+
+    records: int
+    error_mm: float
+    calibrated_mm: float
+    drift_scale: float
+    further: tuple[FurtherRecords, ...] = ()
+    records_to_calibrated: int | None = None
+
+    @property
+    def ratio(self) -> float:
+        """The error, as a multiple of that of the result before."""
+        return self.error_mm / self.calibrated_mm
+
+
+@dataclass(frozen=True, eq=False)
+class QuickLevel:
+    """The quick level of one robot.
+
+    Attributes:
+        check: of the same robot, from the same result on; it has one.
+        budget: most records, references included.
+    """
+
+    check: Check
+    budget: int
+
+    @cached_property
+    def plan(self) -> Plan:
+        """What to measure, until the robot is known as well as before or the budget is used."""
+        check, drifting = self.check, self._drifting
+        return Plan(
+            check_settings(check.settings, self.budget, len(check.left_points)),
+            drifting.robot,
+            check.listed,
+            check.candidates,
+            estimator=drifting,
+            goal=self,
+            earlier=check.earlier,
+            left_points=check.left_points,
+        )
+
+    @cached_property
+    def calibrated_mm(self) -> float | None:
+        """The error predicted at the worst task pose that the result before left; none without poses."""
+        return self._worst(replace(self.check.robot.belief(), covariance=self._before.covariance))
+
+    @property
+    def expected(self) -> Prior:
+        """What is known of the robot before the first record, if it drifted as stated."""
+        return self._before.prior(1.0)
+
+    def reached(self, measurements: MeasurementSet) -> str | None:
+        """That the records are enough: see :class:`~hexacell.campaign.stopping_rules.Goal`."""
+        error, wanted = self._known_error(measurements), self.calibrated_mm
+        if error is None or wanted is None or error > AS_ACCURATE * wanted:
+            return None
+        return f"the predicted error at the task poses is {error:.3f} mm, that of the last calibration"
+
+    def reached_at(
+        self,
+        point: int,  # noqa: ARG002 - of the protocol
+        measurements: MeasurementSet,
+    ) -> str | None:
+        """The same: no point needs more records where all together are enough."""
+        return self.reached(measurements)
+
+    def robot_after(self, measurements: MeasurementSet) -> Robot:
+        """The robot with what was known before the records, under the drift's scale that they tell.
+
+        Raises:
+            IdentifiabilityError: they do not belong to this robot.
+        """
+        scale = self._drifting.likeliest(measurements).scale if len(measurements) else 1.0
+        robot, known = self.check.robot, self._before.prior(scale)
+        # What the records leave as uncertain as the drawing is not determined, whatever was known before.
+        known = replace(known, tolerance_sigma=robot.prior.sigma)
+        return replace(robot, known=known)
+
+    def accuracy(self, measurements: MeasurementSet) -> QuickAccuracy | None:
+        """How well the robot is known; none if it can take no task pose.
+
+        Raises:
+            IdentifiabilityError: the records do not belong to this robot.
+        """
+        likeliest, wanted = self._drifting.likeliest(measurements), self.calibrated_mm
+        error = self._worst(likeliest.estimate.belief)
+        if error is None or wanted is None:
+            return None
+        errors = self._errors_after(likeliest)
+        return QuickAccuracy(
+            records=len(measurements),
+            error_mm=error,
+            calibrated_mm=wanted,
+            drift_scale=likeliest.scale,
+            further=tuple(FurtherRecords(records=n, error_mm=errors[n]) for n in TOLD_RECORDS),
+            records_to_calibrated=_first_within(errors, AS_ACCURATE * wanted),
+        )
+
+    def _known_error(self, measurements: MeasurementSet) -> float | None:
+        """The predicted error, where the records alone would determine a geometry and be tested."""
+        if not len(measurements):
+            return None
+        estimate = self._drifting.likeliest(measurements).estimate
+        found = estimate.identification
+        if found is None or not is_overdetermined(found.problem):
+            return None
+        return self._worst(estimate.belief)
+
+    def _errors_after(self, estimate: ScaledEstimate) -> list[float]:
+        """The predicted error after 0, 1, 2, ... more records, as informative as well spread ones."""
+        belief = estimate.estimate.belief
+        error = self.plan.task.error(belief)
+        assert error is not None  # noqa: S101 - there is an error now
+        each = self._information_per_record(belief)
+        return [
+            error.worst(
+                add_information(belief.covariance, records * each) if records else belief.covariance
+            )
+            for records in range(MOST_FURTHER_RECORDS + 1)
+        ]
+
+    def _information_per_record(self, belief: RobotBelief) -> Array:
+        """Of the sets of a whole calibration, (p, p), 1/mm^2."""
+        sets = replace(self.plan, settings=self.check.settings).planned_sets
+        planned, points = PlannedInformation.of(sets, belief), self.plan.points
+        total: Array = np.sum(
+            [planned.information(point, len(sets[point - 1])) for point in points], axis=0
+        )
+        return total / sum(len(sets[point - 1]) for point in points)
+
+    def _worst(self, belief: RobotBelief) -> float | None:
+        error = self.plan.task.error(belief)
+        return None if error is None else error.worst(belief.covariance)
+
+    @cached_property
+    def _drifting(self) -> DriftEstimator:
+        return DriftEstimator(self.check.robot, self._before)
+
+    @property
+    def _before(self) -> IdentifiedBefore:
+        assert self.check.before is not None  # noqa: S101 - without a result no quick level is begun
+        return self.check.before
+
+
+def _first_within(errors: list[float], wanted: float) -> int | None:
+    """The first number of records after which a falling error is within what is wanted."""
+    if errors[-1] > wanted:
+        return None
+    return bisect_left(errors, True, key=lambda error: error <= wanted)

@@ -1,0 +1,293 @@
+"""A config with one number a key: what LinuxCNC's files and the templates of other controllers share.
+
+Which key holds which number follows from patterns in the cell file, one for each kind of parameter:
+
+    [controller.config_options]
+    names = { S = "S{leg}{COMPONENT}", l = "L{leg}" }
+    corrections = { S = "DS{leg}{COMPONENT}" }
+    branch = "BRANCH{leg}"
+    unit_mm = 25.4
+
+``{leg}`` counts from 1, ``{index}`` from 0. Where ``corrections`` are named, the parameter is the sum of
+both numbers, and only the correction is written: the nominal number stays as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from math import ceil, log10
+from pathlib import Path
+from typing import Any, Protocol, Self, TypeVar, cast
+
+from pydantic import Field, ValidationError
+
+from hexacell.cell.fields import Positive, Section, Text, first_mistake
+from hexacell.config.interface import (
+    LARGEST_CONFIG_BYTES,
+    ConfigPart,
+    ControllerGeometry,
+    ControllerLimits,
+)
+from hexacell.config.number_tokens import (
+    NumberToken,
+    number_of,
+    replace_tokens,
+    require_physical,
+    token_error,
+    write_number,
+)
+from hexacell.errors import FileError, UsageError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Branch
+from hexacell.kinematics.parameters import LEGS, GeometricParameter, ParameterSet, ParameterUnit
+from hexacell.storage import atomic_files
+
+Options = TypeVar("Options", bound=Section)
+
+
+class NumberLookup(Protocol):
+    """The numbers of one text by their keys."""
+
+    def number(self, key: str) -> NumberToken:
+        """The number of a key; raises ``FileError`` if there is none, or more than one."""
+        ...
+
+    def has(self, key: str) -> bool:
+        """Whether there is a number of that key."""
+        ...
+
+
+OpenText = Callable[[str, Path | None], NumberLookup]
+DefaultKey = Callable[[GeometricParameter], str]
+ReadLimits = Callable[[NumberLookup, Path | None], ControllerLimits]
+
+
+class KeyedOptions(Section):
+    """Where a config holds its numbers.
+
+    Attributes:
+        names: pattern of the key of each kind of parameter, by its symbol.
+        corrections: the same, of numbers that are added.
+        branch: pattern of the keys of the six signs, or the signs themselves.
+        unit_mm: one unit of length in the config.
+    """
+
+    names: Mapping[str, Text] = Field(default_factory=dict)
+    corrections: Mapping[str, Text] = Field(default_factory=dict)
+    branch: Text | tuple[int, int, int, int, int, int] | None = None
+    unit_mm: Positive = 1.0
+
+
+def options_of(model: type[Options], format_name: str, given: Mapping[str, Any]) -> Options:
+    """The options of a format, checked; raises ``UsageError``."""
+    try:
+        return model.model_validate(given)
+    except ValidationError as error:
+        raise UsageError(
+            f"config_options of the config format '{format_name}': {first_mistake(error, 'they')}",
+            action="Correct [controller.config_options] in the cell file",
+        ) from error
+
+
+def _key_of(pattern: str, parameter: GeometricParameter) -> str:
+    return _filled(
+        pattern,
+        {
+            "symbol": parameter.kind.symbol,
+            "leg": parameter.leg,
+            "index": parameter.leg - 1,
+            "component": parameter.component,
+            "COMPONENT": parameter.component.upper(),
+        },
+    )
+
+
+def _filled(pattern: str, values: Mapping[str, str | int]) -> str:
+    try:
+        return pattern.format_map(values)
+    except (KeyError, IndexError, ValueError, AttributeError) as error:
+        raise UsageError(
+            f"config_options: {pattern!r} is not a pattern of names",
+            action="It may contain {leg}, {index}, {symbol}, {component} and {COMPONENT}",
+        ) from error
+
+
+@dataclass(frozen=True)
+class NumberKeys:
+    """The key of each parameter, of its correction if it has one, and of the signs or the signs.
+
+    ``branch`` is none of a file that is one of several and has no signs.
+    """
+
+    values: Mapping[str, str]
+    corrections: Mapping[str, str]
+    branch: tuple[str, ...] | Branch | None
+
+    @classmethod
+    def of(
+        cls, parameters: ParameterSet, options: KeyedOptions, default: DefaultKey, *, is_part: bool
+    ) -> Self:
+        """By the options; a parameter without a pattern of its own has the ``default`` key.
+
+        Raises:
+            UsageError: an option names no parameter, or a branch is missing or too many.
+        """
+        symbols = {kind.symbol for kind in parameters.kinds}
+        if unknown := sorted({*options.names, *options.corrections} - symbols):
+            raise UsageError(
+                f"config_options name '{unknown[0]}', which the mechanism has not",
+                action=f"Its parameters are {', '.join(sorted(symbols))}",
+            )
+        every = parameters.parameters
+        keys = {one.name: default(one) for one in every} | _keys_by(options.names, every)
+        branch = None if is_part and options.branch is None else _branch_of(parameters, options)
+        found = cls(keys, _keys_by(options.corrections, every), branch)
+        found._require_different()
+        return found
+
+    def _require_different(self) -> None:
+        named = [one for one in self.branch or () if isinstance(one, str)]
+        every = [*self.values.values(), *self.corrections.values(), *named]
+        if twice := next((one for one in every if every.count(one) > 1), None):
+            raise UsageError(
+                f"config_options: two parameters are in '{twice}'",
+                action="Distinguish them by {leg} or {index}, and by {component}",
+            )
+
+
+def _keys_by(patterns: Mapping[str, str], every: Iterable[GeometricParameter]) -> dict[str, str]:
+    """The keys of those parameters whose kind has a pattern."""
+    named = (one for one in every if one.kind.symbol in patterns)
+    return {one.name: _key_of(patterns[one.kind.symbol], one) for one in named}
+
+
+def _branch_of(parameters: ParameterSet, options: KeyedOptions) -> tuple[str, ...] | Branch:
+    given = options.branch
+    if not parameters.has_branch:
+        return ()
+    if given is None:
+        raise UsageError(
+            "config_options have no branch, and a leg of this mechanism has two inverse solutions",
+            action="Name the config's signs there, or give them: branch = [1, 1, 1, -1, -1, -1]",
+        )
+    if isinstance(given, str):
+        return tuple(_filled(given, {"leg": leg, "index": leg - 1}) for leg in range(1, LEGS + 1))
+    if not set(given) <= {1, -1}:
+        raise UsageError("config_options: branch is not six times 1 or -1", action="Correct it")
+    return cast("Branch", given)
+
+
+class KeyedConfig:
+    """A :class:`~hexacell.config.interface.ConfigFormat` of such texts, and a ``PartFormat``."""
+
+    def __init__(
+        self,
+        parameters: ParameterSet,
+        keys: NumberKeys,
+        open_text: OpenText,
+        unit_mm: float,
+        read_limits: ReadLimits = lambda _, __: ControllerLimits(),
+    ) -> None:
+        self._read_limits = read_limits
+        self._parameters = parameters
+        self._keys = keys
+        self._open = open_text
+        self._unit_mm = unit_mm
+
+    def read(self, path: Path) -> ControllerGeometry:
+        """The geometry in the file; raises ``FileError`` with file and line."""
+        text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
+        part = self._part(self._open(text, path), path, self._parameters.parameters)
+        geometry = Geometry(self._parameters, list(part.values.values()))
+        return ControllerGeometry(geometry, part.branch or (), part.limits)
+
+    def rewrite(self, text: str, geometry: Geometry) -> str:
+        """``text`` with ``geometry`` in it, to 1 nm; a number that agrees to half of that is kept.
+
+        Raises:
+            FileError: a value is not finite, a length not above zero, or the text is no such config.
+        """
+        require_physical(geometry)
+        values = geometry.vector.tolist()
+        return self.rewrite_part(text, dict(zip(self._parameters.names, values, strict=True)))
+
+    def read_part(self, text: str, source: Path | None) -> ConfigPart:
+        """The parameters whose keys are in the text; raises ``FileError`` with the line."""
+        lookup = self._open(text, source)
+        there = [one for one in self._parameters.parameters if any(map(lookup.has, self._keys_of(one)))]
+        return self._part(lookup, source, there)
+
+    def rewrite_part(self, text: str, values: Mapping[str, float]) -> str:
+        """``text`` with these values of parameters, as :meth:`rewrite` writes them."""
+        new = [(one, values[one.name]) for one in self._parameters.parameters if one.name in values]
+        changed = replace_tokens(text, dict(self._changed(self._open(text, None), new)))
+        self._require_kept(self._open(changed, None), new)
+        return changed
+
+    def _part(
+        self, lookup: NumberLookup, source: Path | None, there: Iterable[GeometricParameter]
+    ) -> ConfigPart:
+        values = {one.name: self._value(lookup, one, source) for one in there}
+        return ConfigPart(values, self._branch(lookup, source), self._read_limits(lookup, source))
+
+    def _changed(
+        self, lookup: NumberLookup, new: Iterable[tuple[GeometricParameter, float]]
+    ) -> Iterator[tuple[NumberToken, str]]:
+        for parameter, wanted in new:
+            difference = wanted - self._value(lookup, parameter, None)
+            if abs(difference) > 0.5 * _resolution(parameter):
+                token = lookup.number(self._written_key(parameter))
+                unit = self._unit(parameter)
+                value = number_of(token, None) + difference / unit
+                yield token, write_number(value, parameter.kind.unit.decimals + _more_decimals(unit))
+
+    def _require_kept(self, lookup: NumberLookup, new: Iterable[tuple[GeometricParameter, float]]) -> None:
+        for parameter, wanted in new:
+            if abs(self._value(lookup, parameter, None) - wanted) > _resolution(parameter):
+                raise FileError(
+                    f"the new geometry reads back with another {parameter.name}",
+                    action="Nothing was written; please report this with the config",
+                )
+
+    def _value(self, lookup: NumberLookup, parameter: GeometricParameter, source: Path | None) -> float:
+        tokens = [lookup.number(key) for key in self._keys_of(parameter)]
+        value = self._unit(parameter) * sum(number_of(token, source) for token in tokens)
+        if parameter.kind.is_positive and value <= 0.0:
+            problem = f"{parameter.name} is {value:g}, but must be above zero"
+            raise token_error(tokens[-1], problem, source, "Correct it")
+        return value
+
+    def _keys_of(self, parameter: GeometricParameter) -> tuple[str, ...]:
+        """Of the numbers whose sum it is."""
+        keys = (self._keys.values[parameter.name], self._keys.corrections.get(parameter.name))
+        return tuple(key for key in keys if key is not None)
+
+    def _written_key(self, parameter: GeometricParameter) -> str:
+        return self._keys.corrections.get(parameter.name, self._keys.values[parameter.name])
+
+    def _unit(self, parameter: GeometricParameter) -> float:
+        return self._unit_mm if parameter.kind.unit is ParameterUnit.MM else 1.0
+
+    def _branch(self, lookup: NumberLookup, source: Path | None) -> Branch | None:
+        if self._keys.branch is None:
+            return None
+        return cast("Branch", tuple(self._sign(lookup, one, source) for one in self._keys.branch))
+
+    def _sign(self, lookup: NumberLookup, key: str | int, source: Path | None) -> int:
+        if isinstance(key, int):
+            return key
+        token = lookup.number(key)
+        if (value := number_of(token, source)) not in {1.0, -1.0}:
+            raise token_error(token, f"{key} is {token.text}", source, "It must be 1 or -1")
+        return int(value)
+
+
+def _resolution(parameter: GeometricParameter) -> float:
+    """The last decimal of a parameter in its own unit."""
+    return float(10.0**-parameter.kind.unit.decimals)
+
+
+def _more_decimals(unit: float) -> int:
+    """Decimals that a number needs beyond those of a millimetre, counted in a larger unit."""
+    return max(0, ceil(log10(unit)))

@@ -1,0 +1,127 @@
+"""Which files a controller's geometry is in, and in which format each of them is.
+
+Most controllers have it in one file. Of LinuxCNC's ``genhexkins`` base and platform may be in a HAL file
+and the zeros of the legs in the INI file. Each parameter is looked for in every file and must be in one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import reduce
+from pathlib import Path
+
+from hexacell.config.interface import (
+    LARGEST_CONFIG_BYTES,
+    ConfigFormat,
+    ConfigPart,
+    ControllerGeometry,
+    ControllerLimits,
+    PartFormat,
+)
+from hexacell.config.number_tokens import require_physical
+from hexacell.errors import FileError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Branch
+from hexacell.kinematics.parameters import ParameterSet
+from hexacell.storage import atomic_files
+
+
+@dataclass(frozen=True, slots=True)
+class FormatOfFile:
+    """The format of one file, and what the cell file calls it."""
+
+    name: str
+    reader: ConfigFormat
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigLayout:
+    """The formats of a config's files, in the order in which the cell file names the files.
+
+    Every method takes one path or text for each of them, in that order. If there are several, each format
+    is a :class:`~hexacell.config.interface.PartFormat`.
+    """
+
+    parameters: ParameterSet
+    formats: tuple[FormatOfFile, ...]
+
+    def read(self, *paths: Path) -> ControllerGeometry:
+        """The geometry in the files.
+
+        Raises:
+            FileError: with file and line: a file is absent, unreadable or no such config, or a parameter is
+                in none of the files, or in two.
+        """
+        if len(self.formats) == 1:
+            [path] = paths
+            return self.formats[0].reader.read(path)
+        parts = self._parts([atomic_files.read_text(path, LARGEST_CONFIG_BYTES) for path in paths], paths)
+        values = self._values(parts, paths)
+        limits = reduce(ControllerLimits.narrowed, (part.limits for part in parts))
+        return ControllerGeometry(
+            Geometry(self.parameters, [values[name] for name in self.parameters.names]),
+            self._branch(parts, paths),
+            limits,
+        )
+
+    def rewrite(self, texts: Sequence[str], geometry: Geometry) -> tuple[str, ...]:
+        """The texts with the values of ``geometry``; every other character of them is kept.
+
+        Raises:
+            FileError: a text is no such config, or cannot hold its part of ``geometry``.
+        """
+        if len(self.formats) == 1:
+            [text] = texts
+            return (self.formats[0].reader.rewrite(text, geometry),)
+        require_physical(geometry)
+        values = dict(zip(self.parameters.names, geometry.vector.tolist(), strict=True))
+        parts = self._parts(texts, [None] * len(texts))
+        self._values(parts, [Path(f"file {number}") for number, _ in enumerate(texts, start=1)])
+        return tuple(
+            one.rewrite_part(text, {name: values[name] for name in part.values})
+            for one, text, part in zip(self._part_formats, texts, parts, strict=True)
+        )
+
+    @property
+    def _part_formats(self) -> Iterator[PartFormat]:
+        for one in self.formats:
+            assert isinstance(one.reader, PartFormat)  # noqa: S101 - whoever makes a layout sees to it
+            yield one.reader
+
+    def _parts(self, texts: Sequence[str], sources: Sequence[Path | None]) -> list[ConfigPart]:
+        files = zip(self._part_formats, texts, sources, strict=True)
+        return [one.read_part(text, source) for one, text, source in files]
+
+    def _values(self, parts: Sequence[ConfigPart], paths: Sequence[Path]) -> Mapping[str, float]:
+        """The value of every parameter, each of which must be in one of the files."""
+        found: dict[str, float] = {}
+        for name in self.parameters.names:
+            having = [path for part, path in zip(parts, paths, strict=True) if name in part.values]
+            if len(having) != 1:
+                raise _not_in_one(name, having, paths)
+            found[name] = next(part.values[name] for part in parts if name in part.values)
+        return found
+
+    def _branch(self, parts: Sequence[ConfigPart], paths: Sequence[Path]) -> Branch:
+        if not self.parameters.has_branch:
+            return ()
+        found = [(part.branch, path) for part, path in zip(parts, paths, strict=True) if part.branch]
+        if len(found) != 1:
+            raise _not_in_one("branch", [path for _, path in found], paths)
+        return found[0][0]
+
+
+def _not_in_one(name: str, having: Sequence[Path], paths: Sequence[Path]) -> FileError:
+    if having:
+        return FileError(
+            f"{name} is in {having[0].name} and in {having[1].name}; which of them counts is not known",
+            subject=having[1],
+            action="Remove it from one of them, or give it another name in the config_options of one",
+        )
+    searched = " and ".join(path.name for path in paths)
+    return FileError(
+        f"{name} is in none of the files {searched}",
+        subject=paths[0],
+        action="Name the file that has it in [[controller.further_files]], or correct config_options",
+    )

@@ -1,0 +1,173 @@
+"""A write of several files at once, noted beside them until it is complete.
+
+One file is replaced in one step; several are not. Before the first of them is replaced, a note of what all
+of them hold is written beside them and synced to the disk; it is removed once the last one is replaced and
+read back. If the process is killed in between, the next one that holds the cell finds the note and puts the
+old content back, or, where all files are new already, only removes the note.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from hexacell.cell.fields import Frozen
+from hexacell.config.change import JsonRecord
+from hexacell.config.contents import Contents, names_of, read_contents
+from hexacell.errors import FileError
+from hexacell.storage import atomic_files
+
+_AS_TEXT = "latin-1"
+"""Every byte is one character of it: so a file that is no text can be in a note."""
+
+
+class _NotedFile(Frozen):
+    path: Path
+    before: str
+    sha256_after: str
+
+    @property
+    def old(self) -> bytes:
+        """What it held before."""
+        return self.before.encode(_AS_TEXT)
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether it gets another content."""
+        return atomic_files.sha256(self.old) != self.sha256_after
+
+
+class _Note(JsonRecord):
+    noun: ClassVar[str] = "note of a write"
+
+    files: tuple[_NotedFile, ...]
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """Of the files."""
+        return tuple(one.path for one in self.files)
+
+
+@dataclass(frozen=True, slots=True)
+class InterruptedWrite:
+    """What became of an earlier write that did not reach its end.
+
+    Attributes:
+        files: all files of the write, by name.
+        restored: those that got their old content back.
+        is_complete: all had their new content already, which stays.
+    """
+
+    files: tuple[str, ...]
+    restored: tuple[str, ...]
+    is_complete: bool
+
+
+def note_path(paths: Sequence[Path]) -> Path:
+    """Where the note of a write of these files is, whatever their order: beside one of them.
+
+    Raises:
+        FileError: one of them is a link that cannot be read.
+    """
+    try:
+        target = Path(min(os.path.realpath(path) for path in paths))
+    except OSError as error:
+        raise atomic_files.os_error_to_file_error("cannot be read", paths[0], error) from error
+    return target.with_name(f".{target.name}.hexacell-write")
+
+
+def note_write(paths: Sequence[Path], before: Contents, after: Contents) -> None:
+    """Note that the files, which hold ``before``, are about to get ``after``.
+
+    Raises:
+        FileError: the note cannot be written, or somebody has put a link in its place.
+    """
+    place = note_path(paths)
+    if os.path.islink(place):  # noqa: PTH114 - Path.is_symlink raises where it cannot be told
+        raise FileError("is a link, which would lead a note elsewhere", subject=place, action="Remove it")
+    files = tuple(
+        _NotedFile(path=path.absolute(), before=old.decode(_AS_TEXT), sha256_after=atomic_files.sha256(new))
+        for path, old, new in zip(paths, before, after, strict=True)
+    )
+    most_private = min(paths, key=_readers)
+    atomic_files.write_atomically(place, _Note(files=files).to_json(), like=most_private)
+
+
+def forget_write(paths: Sequence[Path]) -> None:
+    """Remove the note, if there is one: all files are new, or all are old. Raises ``FileError``."""
+    path = note_path(paths)
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise atomic_files.os_error_to_file_error("the note cannot be removed", path, error) from error
+    # A power cut may bring the note back; then it says of complete files that they are complete.
+    with suppress(OSError):
+        atomic_files.sync_folder(path.parent)
+
+
+def is_interrupted(paths: Sequence[Path]) -> bool:
+    """Whether a write of these files was begun and is not complete; it may be going on."""
+    return os.path.lexists(note_path(paths))
+
+
+def settle_interrupted_write(paths: Sequence[Path]) -> InterruptedWrite | None:
+    """Undo what a process that died left of a write; none if there is nothing.
+
+    The caller must hold the cell: a write that is going on looks the same.
+
+    Raises:
+        FileError: a file was edited since, or cannot be written; nothing else is changed then.
+    """
+    if not is_interrupted(paths):
+        return None
+    path = note_path(paths)
+    note = _Note.load(path)
+    _require_same_files(note, paths, path)
+    found = list(zip(note.files, read_contents(note.paths), strict=True))
+    replaced = [(one, data) for one, data in found if _is_replaced(one, data, note, path)]
+    is_complete = len(replaced) == sum(
+        atomic_files.sha256(one.old) != one.sha256_after for one in note.files
+    )
+    for one, data in () if is_complete else replaced:
+        atomic_files.write_atomically(one.path, one.old, expected=data)
+    forget_write(paths)
+    restored = () if is_complete else names_of([one.path for one, _ in replaced])
+    return InterruptedWrite(names_of(note.paths), restored, is_complete=is_complete)
+
+
+def _is_replaced(one: _NotedFile, data: bytes, note: _Note, path: Path) -> bool:
+    """Whether a file has its new content; raises ``FileError`` where it has neither."""
+    if data == one.old:
+        return False
+    if atomic_files.sha256(data) == one.sha256_after:
+        return True
+    raise FileError(
+        f"a write of {' and '.join(names_of(note.paths))} was interrupted, and this file was edited since: "
+        "whether they belong together is not known",
+        subject=one.path,
+        action=f"Make all of them old or all new, from the copies in the run's folder; then delete {path}",
+    )
+
+
+def _require_same_files(note: _Note, paths: Sequence[Path], path: Path) -> None:
+    """What a note names is written: it must be the files of this cell, no others."""
+    noted, own = ({os.path.realpath(one) for one in files} for files in (note.paths, paths))
+    if noted != own:
+        raise FileError(
+            f"a write of {' and '.join(names_of(note.paths))} was interrupted, which are not the files "
+            "that this cell file names",
+            subject=path,
+            action="Use the cell file with which the write was made; its next command undoes it",
+        )
+
+
+def _readers(path: Path) -> int:
+    """How many may read a file: the bits of its mode that let the group and all others."""
+    try:
+        return path.stat().st_mode & 0o044
+    except OSError as error:
+        raise atomic_files.os_error_to_file_error("cannot be read", path, error) from error

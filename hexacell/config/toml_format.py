@@ -1,0 +1,219 @@
+"""The native controller config: TOML with the geometry in ``[geometry]``, and whatever else.
+
+    [geometry]
+    S = [[x, y, z], ...]    # six joints on the sliders, base frame, mm
+    B = [[x, y, z], ...]    # six joints on the platform, platform frame, mm
+    l = [...]               # six leg lengths, mm
+    branch = [1, ...]       # six signs; of a mechanism whose legs have two inverse solutions
+
+    [[axes]]                # six sliders or none; the joint variable's range, which may be absent
+    min = -800.0
+    max = 200.0
+
+The file belongs to the robot's owner. A write-back changes the numbers of the geometry and no other
+character.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, cast
+
+import numpy as np
+
+from hexacell.cell.fields import LARGEST_NUMBER
+from hexacell.config.interface import (
+    LARGEST_CONFIG_BYTES,
+    ConfigPart,
+    ControllerGeometry,
+    ControllerLimits,
+    JointRanges,
+)
+from hexacell.config.number_tokens import require_physical, write_number
+from hexacell.errors import FileError, UsageError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Branch
+from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet
+from hexacell.storage import atomic_files
+from hexacell.storage.toml_document import TomlDocument
+from hexacell.storage.toml_edit import replace_numbers
+from hexacell.storage.toml_locations import KeyPath
+
+
+class NativeToml:
+    """The format ``toml``, a :class:`~hexacell.config.interface.ConfigFormat`.
+
+    Raises:
+        UsageError: options are given; it has none.
+    """
+
+    def __init__(
+        self,
+        parameters: ParameterSet,
+        given: Mapping[str, Any] = MappingProxyType({}),
+        *,
+        is_part: bool = False,  # noqa: ARG002 - it has no options that could be incomplete
+    ) -> None:
+        if given:
+            raise UsageError(
+                f"the config format 'toml' has no options, but '{next(iter(given))}' is given",
+                action="Remove [controller.config_options], or name another config_format",
+            )
+        self._parameters = parameters
+
+    def read(self, path: Path) -> ControllerGeometry:
+        """The geometry and the branch in the file; raises ``FileError`` with file and line."""
+        text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
+        content = _Content(TomlDocument.parse(text, path), self._parameters)
+        limits = ControllerLimits(joints=content.joint_ranges())
+        return ControllerGeometry(content.geometry(), content.branch(), limits)
+
+    def rewrite(self, text: str, geometry: Geometry) -> str:
+        """``text`` with ``geometry`` in it, with as many decimals as the unit has (1 nm), no exponent.
+
+        A value that differs by no more than half of the last decimal keeps its token. A geometry with a
+        value that is not finite, or a length that is not above zero, is refused; the new text is read
+        again before it is returned.
+        """
+        require_physical(geometry)
+        document = TomlDocument.parse(text)
+        before = _Content(document, self._parameters).geometry()
+        changed = replace_numbers(document, dict(_changed_tokens(before, geometry)))
+        after = _Content(TomlDocument.parse(changed), self._parameters).geometry()
+        last_decimal = {kind.symbol: 10.0**-kind.unit.decimals for kind in self._parameters.kinds}
+        if (abs(after.vector - geometry.vector) > self._parameters.by_kind(last_decimal)).any():
+            raise FileError(
+                "the new geometry reads back with different numbers",
+                action="Nothing was written; please report this with the config",
+            )
+        return changed
+
+    def read_part(self, text: str, source: Path | None) -> ConfigPart:
+        """The kinds of parameters that ``[geometry]`` has; raises ``FileError`` with the line."""
+        document = TomlDocument.parse(text, source)
+        there = self._kinds_in(document)
+        content = _Content(document, there)
+        values = (
+            dict(zip(there.names, content.geometry().vector.tolist(), strict=True)) if there.kinds else {}
+        )
+        branch = content.branch() if there.has_branch else None
+        return ConfigPart(values, branch, ControllerLimits(joints=content.joint_ranges()))
+
+    def rewrite_part(self, text: str, values: Mapping[str, float]) -> str:
+        """``text`` with these values, of all parameters of some kinds, as :meth:`rewrite` writes them."""
+        there = self._kinds_in(TomlDocument.parse(text))
+        return NativeToml(there).rewrite(text, Geometry(there, [values[name] for name in there.names]))
+
+    def _kinds_in(self, document: TomlDocument) -> ParameterSet:
+        """Those of the mechanism that the document has, and whether it has the branch."""
+        section = document.data.get("geometry")
+        names = {*section} if isinstance(section, dict) else set()
+        has_branch = self._parameters.has_branch and "branch" in names | {*document.data}
+        kinds = tuple(kind for kind in self._parameters.kinds if kind.symbol in names)
+        return ParameterSet(kinds, has_branch)
+
+
+def _changed_tokens(before: Geometry, after: Geometry) -> Iterator[tuple[KeyPath, str]]:
+    for kind in after.parameters.kinds:
+        old, half_of_last = before[kind.symbol], 0.5 * 10.0**-kind.unit.decimals
+        for index, new in np.ndenumerate(after[kind.symbol]):
+            if abs(new - old[index]) > half_of_last:
+                yield ("geometry", kind.symbol, *index), write_number(float(new), kind.unit.decimals)
+
+
+@dataclass(frozen=True, slots=True)
+class _Content:
+    """The content of a config; every method raises ``FileError`` with the line of what is wrong."""
+
+    document: TomlDocument
+    parameters: ParameterSet
+
+    def geometry(self) -> Geometry:
+        """The geometry, in the units of its parameters."""
+        kinds = self.parameters.kinds
+        values = {kind.symbol: self._numbers(self._path_to(kind.symbol), kind.shape) for kind in kinds}
+        for kind in kinds:
+            if kind.is_positive:
+                self._require_positive(kind, values[kind.symbol])
+        return Geometry.of(self.parameters, values)
+
+    def branch(self) -> Branch:
+        """The signs, in ``[geometry]`` or at the top of the file; none of a mechanism without."""
+        if not self.parameters.has_branch:
+            return ()
+        path = ("branch",) if "branch" in self.document.data else self._path_to("branch")
+        signs = self._numbers(path, (LEGS,))
+        for leg, sign in enumerate(signs):
+            if sign not in {1, -1}:
+                raise self._mismatch((*path, leg), "1 or -1")
+        return cast("Branch", tuple(int(sign) for sign in signs))
+
+    def joint_ranges(self) -> JointRanges | None:
+        """Smallest and largest joint variable of each leg; none where the six are not all stated."""
+        axes = self.document.data.get("axes")
+        if not isinstance(axes, list) or len(axes) != LEGS:
+            return None
+        if not all(isinstance(axis, dict) and {"min", "max"} <= axis.keys() for axis in axes):
+            return None
+        return tuple(self._joint_range(leg) for leg in range(LEGS))
+
+    def _joint_range(self, leg: int) -> tuple[float, float]:
+        low, high = (self._number(("axes", leg, limit)) for limit in ("min", "max"))
+        if low >= high:
+            raise self._error(("axes", leg, "max"), f"max of axis {leg + 1} is not above its min, {low:g}")
+        return low, high
+
+    def _require_positive(self, kind: ParameterKind, values: Any) -> None:  # noqa: ANN401
+        for index, value in np.ndenumerate(np.array(values)):
+            if value <= 0.0:
+                component = kind.components[index[1]] if kind.components else ""
+                name = kind.display_name(index[0] + 1, component)
+                problem = f"{name} is {value} {kind.unit}, but must be above zero"
+                raise self._error(("geometry", kind.symbol, *index), problem)
+
+    def _path_to(self, name: str) -> KeyPath:
+        data = self.document.data
+        if "geometry" not in data:
+            raise self._error((), "there is no [geometry]")
+        if not isinstance(data["geometry"], dict):
+            raise self._mismatch(("geometry",), "a section")
+        if name not in data["geometry"]:
+            raise self._error(("geometry",), f"[geometry] has no {name}")
+        return ("geometry", name)
+
+    def _numbers(self, path: KeyPath, shape: tuple[int, ...]) -> Any:  # noqa: ANN401
+        """The number, or the nested lists of numbers, of that shape at ``path``."""
+        if not shape:
+            return self._number(path)
+        value = self.document.value(path)
+        if not isinstance(value, list) or len(value) != shape[0]:
+            item = "rows" if shape[1:] else "numbers"
+            raise self._mismatch(path, f"a list of {shape[0]} {item}")
+        return [self._numbers((*path, index), shape[1:]) for index in range(shape[0])]
+
+    def _number(self, path: KeyPath) -> float:
+        value = self.document.value(path)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self._mismatch(path, "a number")
+        if not abs(value) <= LARGEST_NUMBER:  # NaN too, and integers of hundreds of digits
+            raise self._mismatch(path, f"a finite number within +-{LARGEST_NUMBER:g}")
+        return float(value)
+
+    def _mismatch(self, path: KeyPath, expected: str) -> FileError:
+        return self._error(path, self.document.mismatch(path, expected))
+
+    def _error(self, path: KeyPath, problem: str) -> FileError:
+        needed = [_needed(kind) for kind in self.parameters.kinds]
+        if self.parameters.has_branch:
+            needed.append("branch (six signs)")
+        *most, last = needed
+        return self.document.error(path, problem, f"[geometry] needs {', '.join(most)} and {last}")
+
+
+def _needed(kind: ParameterKind) -> str:
+    """``S (six rows of 3 numbers, mm)``."""
+    values = f"six rows of {len(kind.components)} numbers" if kind.components else "six numbers"
+    return f"{kind.symbol} ({', '.join(filter(None, (values, kind.unit)))})"

@@ -1,0 +1,178 @@
+"""A config change written into the controller's config, and its rollback.
+
+The order makes it safe. First the backup, the new text and the receipt are written to the disk; then the
+config is replaced in one step; then it is read back. If the process or the power fails at any moment, the
+config is the old one or the new one, and if it is the new one, the receipt that undoes it exists.
+
+Of several files, each is replaced in a step of its own. What a process that dies between two steps leaves
+behind, the next one settles (:mod:`~hexacell.config.pending_write`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import NoReturn
+
+from hexacell.config.change import ConfigChange, require_fingerprint
+from hexacell.config.contents import Contents, fingerprint_of, read_contents
+from hexacell.config.receipt import AFTER, BEFORE, RECEIPT, Receipt
+from hexacell.config.replacement import Replacement
+from hexacell.errors import FileError, HexacellError, WriteBackUndone
+from hexacell.storage import atomic_files
+
+
+def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
+    """Write ``change`` into the controller's config.
+
+    ``backup_folder`` gets the texts before and after and the receipt. A commit that is complete already,
+    and was interrupted before it returned, returns its receipt again.
+
+    Raises:
+        FileError: nothing was replaced: the config changed since the run began, or something cannot be
+            written. Only if the message says so, the new config is in place and could not be undone.
+        WriteBackUndone: it failed after the replacement; the config is unchanged.
+    """
+    receipt = Receipt.for_change(change, backup_folder)
+    before, after = change.before_contents, change.after_contents
+    found = read_contents(change.paths)
+    if found == after and _is_complete(receipt):
+        return receipt
+    _require_unchanged(change.paths, found, before)
+    _back_up(receipt, before, after)
+    _replace(receipt, Replacement(change.paths, before, after))
+    return receipt
+
+
+def rollback(receipt: Receipt) -> None:
+    """Restore the config of before the commit, byte for byte; may be repeated.
+
+    Raises:
+        FileError: the config is not the one that was written, the backup is missing, or the config cannot
+            be written; the message says so if it was replaced nevertheless.
+    """
+    before = receipt.backup()
+    found = read_contents(receipt.paths)
+    if found == before:
+        return
+    if fingerprint_of(found) != receipt.sha256_after:
+        path, copy = _edited(receipt, found, before)
+        raise FileError(
+            "the config was changed since it was written; rolling back would lose that change",
+            subject=path,
+            action=f"Review it; if it may be lost, copy {copy} over it",
+        )
+    restore(receipt.paths, before, expected=found)
+
+
+def restore(paths: tuple[Path, ...], contents: Contents, *, expected: Contents) -> None:
+    """Replace the config by an earlier version, while it is as ``expected``, and read it back.
+
+    Raises:
+        FileError: it has changed, or cannot be written; of several files none is replaced then. If even
+            that fails, the next command that uses the cell does it.
+    """
+    replacement = Replacement(paths, expected, contents)
+    try:
+        replacement.write()
+        replacement.finish()
+    except BaseException:
+        if len(replacement.changed) > 1:
+            with suppress(FileError):
+                replacement.put_back(all_of_them=False)
+        raise
+
+
+def _require_unchanged(paths: Sequence[Path], found: Contents, before: Contents) -> None:
+    """Raise ``FileError``, with the file, if the config changed since the run began."""
+    for path, data, expected in zip(paths, found, before, strict=True):
+        require_fingerprint(path, (data,), fingerprint_of((expected,)))
+
+
+def _edited(receipt: Receipt, found: Contents, before: Contents) -> tuple[Path, Path]:
+    """A file that is neither as before nor as written, and its copy of before."""
+    files = list(zip(receipt.paths, receipt.kept(BEFORE), strict=True))
+    with suppress(FileError):
+        for file, data, *known in zip(files, found, before, receipt.written(), strict=True):
+            if data not in known:
+                return file
+    return files[0]
+
+
+def _is_complete(receipt: Receipt) -> bool:
+    try:
+        return Receipt.of(receipt.backup_folder) == receipt and bool(receipt.backup())
+    except FileError:
+        return False
+
+
+def _back_up(receipt: Receipt, before: Contents, after: Contents) -> None:
+    folder = receipt.backup_folder
+    atomic_files.create_folder_durably(folder)
+    for path, data in zip(receipt.kept(BEFORE), before, strict=True):
+        if atomic_files.read_if_present(path) not in {None, data}:
+            raise FileError(
+                "this folder already holds the backup of another version",
+                subject=path,
+                action="Use another folder for each write-back",
+            )
+    for name, contents in ((BEFORE, before), (AFTER, after)):
+        for path, data, like in zip(receipt.kept(name), contents, receipt.paths, strict=True):
+            atomic_files.write_atomically(path, data, like=like)
+    receipt.save(folder / RECEIPT, like=receipt.path)
+    receipt.backup()
+
+
+def _replace(receipt: Receipt, replacement: Replacement) -> None:
+    try:
+        replacement.write()
+    except BaseException as error:
+        # Undo only if a new text is in place; otherwise nothing was replaced.
+        if replacement.has_begun:
+            _undo(receipt, replacement, error, all_of_them=False)
+        with suppress(FileError):
+            replacement.forget()
+        raise
+    try:
+        replacement.finish()
+    except BaseException as error:
+        _undo(receipt, replacement, error, all_of_them=True)
+
+
+def _undo(
+    receipt: Receipt, replacement: Replacement, cause: BaseException, *, all_of_them: bool
+) -> NoReturn:
+    try:
+        replacement.put_back(all_of_them=all_of_them, keep=lambda found: _keep(receipt, found))
+    except FileError as error:
+        if any(one.present != one.old for one in replacement.changed):
+            raise _not_undone(receipt, cause, error) from cause
+    if not isinstance(cause, Exception):
+        raise cause
+    raise WriteBackUndone(
+        f"the write-back failed and was undone, the config is unchanged ({_reason(cause)})",
+        subject=receipt.path,
+        action="Correct that and apply the change again",
+    ) from cause
+
+
+def _not_undone(receipt: Receipt, cause: BaseException, error: FileError) -> FileError:
+    copies = " and ".join(map(str, receipt.kept(BEFORE)))
+    return FileError(
+        f"the write-back failed ({_reason(cause)}) and could not be undone ({_reason(error)}); "
+        "the config may hold the new geometry",
+        subject=receipt.path,
+        action=f"Do not move the robot; copy {copies} over the config",
+    )
+
+
+def _reason(error: BaseException) -> str:
+    return error.problem if isinstance(error, HexacellError) else repr(error)
+
+
+def _keep(receipt: Receipt, found: bytes) -> None:
+    """Keep a version that no commit wrote beside the backup, if possible, so that it is not lost."""
+    with suppress(FileError):
+        name = f"config-found-{atomic_files.sha256(found)[:12]}"
+        atomic_files.write_atomically(receipt.backup_folder / name, found, like=receipt.path)

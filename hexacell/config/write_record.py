@@ -1,0 +1,202 @@
+"""A write into a controller's config, recorded: when, who, what and why.
+
+The records of a cell are lines of JSON in a file beside its run folders, and stay when runs are deleted.
+Whoever writes a config holds the cell, so no two processes add a record at once. The config comes first: a
+record that cannot be written undoes nothing.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import Literal
+
+from pydantic import TypeAdapter, ValidationError
+
+from hexacell.cell.fields import LONGEST_TEXT, Finite, Frozen, Text
+from hexacell.config.contents import fingerprint
+from hexacell.config.layout import ConfigLayout
+from hexacell.errors import FileError, HexacellError, UsageError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.runs.cell_lock import user_name
+from hexacell.storage import atomic_files
+from hexacell.storage.appended_lines import append_line
+
+RECORDS = "config-writes.jsonl"
+"""The file of them, beside the run folders of a cell."""
+
+THE_RUN = "the run"
+"""Who decided what no person did."""
+
+
+class WriteKind(StrEnum):
+    """What a config was written for."""
+
+    RESULT = "result"
+    APPLIED = "applied"
+    ROLLED_BACK = "rolled back"
+    TAKEN_BACK = "taken back"
+    PROVISIONAL = "provisional"
+    PROVISIONAL_TAKEN_BACK = "provisional taken back"
+
+
+class NumberChange(Frozen):
+    """One number of a geometry, and by how much it changed, in its unit."""
+
+    name: str
+    change: Finite
+    unit: str
+
+
+class WriteRecord(Frozen):
+    """One write into a controller's config.
+
+    Attributes:
+        at: when it was complete, UTC.
+        by: who decided on it, as the journal and ``applied.json`` have it.
+        user, host: whose process wrote it, and on which computer; empty where no record was kept then.
+        run: the name of the run whose geometry was written or undone; empty where there is none.
+        files: of the config, the first one first.
+        numbers_changed, largest: how many numbers of the geometry changed, and the one that changed most (a
+            milliradian counts as a millimetre); none where that is not known.
+        why: what the program knows of the cause.
+        reason: what the person gave as one.
+    """
+
+    version: Literal[1] = 1
+    at: datetime
+    kind: WriteKind
+    by: str
+    user: str = ""
+    host: str = ""
+    run: str = ""
+    files: tuple[Path, ...]
+    sha256_before: str = ""
+    sha256_after: str = ""
+    numbers_changed: int | None = None
+    largest: NumberChange | None = None
+    why: str = ""
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class WriteCause:
+    """Why a config is written, by whose decision, and which run's geometry it is."""
+
+    kind: WriteKind
+    by: str
+    run: str
+    why: str
+    reason: str = ""
+
+
+@dataclass(slots=True)
+class Recording:
+    """What became of a record; ``problem`` is why it could not be kept, in a sentence, empty if it was."""
+
+    problem: str = ""
+
+
+def stated_reason(text: str) -> str:
+    """What a person gives as the reason of a write; raises ``UsageError`` where it is no line of text."""
+    try:
+        return TypeAdapter(Text).validate_python(text.strip())
+    except ValidationError as error:
+        raise UsageError(
+            f"a reason is one line of at most {LONGEST_TEXT} letters", action="Shorten --reason"
+        ) from error
+
+
+@contextmanager
+def recorded_write(
+    folder: Path, paths: tuple[Path, ...], layout: ConfigLayout, cause: WriteCause
+) -> Iterator[Recording]:
+    """Record what the context writes into a config; nothing where it raises or writes nothing.
+
+    Args:
+        folder: that of the cell's runs.
+        paths: the files of the config.
+        layout: how the geometry is read from them.
+        cause: what the record says of the cause.
+    """
+    before = _Version.now(paths, layout)
+    recording = Recording()
+    yield recording
+    try:
+        after = _Version.now(paths, layout)
+        if after.sha256 != before.sha256:
+            atomic_files.create_folder_durably(folder)
+            line = _record(paths, before, after, cause).model_dump_json().encode()
+            append_line(folder / RECORDS, line)
+    except (HexacellError, OSError, ValueError) as error:
+        recording.problem = f"The config is written, but the history has no record of it: {error}"
+
+
+def read_records(folder: Path) -> tuple[tuple[WriteRecord, ...], tuple[int, ...]]:
+    """The records of a cell, in their order, and the lines that are torn, damaged or of a newer program.
+
+    Raises:
+        FileError: the file cannot be read; where it does not exist there are no records.
+    """
+    data = atomic_files.read_if_present(folder / RECORDS) or b""
+    records, damaged = [], []
+    for number, line in enumerate(data.split(b"\n"), start=1):
+        try:
+            if line:
+                records.append(WriteRecord.model_validate_json(line))
+        except ValidationError:
+            damaged.append(number)
+    return tuple(records), tuple(damaged)
+
+
+@dataclass(frozen=True, slots=True)
+class _Version:
+    """A config at one moment; no geometry where none can be read."""
+
+    sha256: str
+    geometry: Geometry | None
+
+    @classmethod
+    def now(cls, paths: tuple[Path, ...], layout: ConfigLayout) -> _Version:
+        try:
+            geometry = layout.read(*paths).geometry
+        except HexacellError:
+            geometry = None
+        try:
+            return cls(fingerprint(*paths), geometry)
+        except FileError:
+            return cls("", geometry)
+
+
+def _record(paths: tuple[Path, ...], before: _Version, after: _Version, cause: WriteCause) -> WriteRecord:
+    changes = _changes(before.geometry, after.geometry)
+    return WriteRecord(
+        at=datetime.now(UTC),
+        kind=cause.kind,
+        by=cause.by,
+        user=user_name(),
+        host=socket.gethostname(),
+        run=cause.run,
+        files=tuple(path.absolute() for path in paths),
+        sha256_before=before.sha256,
+        sha256_after=after.sha256,
+        numbers_changed=None if changes is None else len(changes),
+        largest=changes[0] if changes else None,
+        why=cause.why,
+        reason=cause.reason,
+    )
+
+
+def _changes(before: Geometry | None, after: Geometry | None) -> list[NumberChange] | None:
+    """The numbers that differ, the largest change first; none where a geometry is not known."""
+    if before is None or after is None:
+        return None
+    units = [one.kind.unit for one in after.parameters.parameters]
+    found = zip(after.parameters.names, (after.vector - before.vector).tolist(), units, strict=True)
+    ranked = sorted((one for one in found if one[1]), key=lambda one: -abs(one[1]) / one[2].like_a_mm)
+    return [NumberChange(name=name, change=change, unit=unit.value) for name, change, unit in ranked]

@@ -1,0 +1,189 @@
+"""Selection of the pose to measure next: greedy optimal design under limits of travel and motion.
+
+Candidates that linear propagation puts inside the gauges' travel are scored first, by the gain of a
+criterion (:mod:`hexacell.design.criteria`), and the best of them are refined
+(:mod:`hexacell.design.candidate_refinement`). Their ranking is then walked from the best
+downward, a few candidates at a time, and the first is taken that
+
+1. the controller can be commanded to,
+2. satisfies the chance constraint on the travel
+   (:mod:`hexacell.design.travel_monte_carlo`),
+3. can be reached by a path along which the constraint holds as well.
+
+Of the few examined together a straight path is preferred to one over waypoints, which takes more moves,
+unless the gain makes up for them; a path over the reference is the last choice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.design.candidate_refinement import THOROUGH, CandidateSpace, Rounds
+from hexacell.design.candidates import commands_for, outcomes_of
+from hexacell.design.criteria import D_OPTIMAL, Criterion
+from hexacell.design.predicted_records import GaugeZero, PredictedRecords, predict_records
+from hexacell.design.travel_monte_carlo import TravelConstraint
+from hexacell.errors import LimitError
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array, Mask
+from hexacell.motion.paths import Path, PathPlanner, Rows
+
+MOST_CANDIDATES = 280
+COMMAND_BATCHES = (12, 24, 48)
+PATH_BATCH = 4
+"""The best candidates are examined, their commands in batches, of the last size in the end, and their paths
+in smaller ones: one of the first few is usually taken."""
+
+WAYPOINT_GAIN_RATIO = 1.2
+"""How much more a candidate must gain to be reached over waypoints, which take more moves."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SelectedPose:
+    """The selected pose.
+
+    Attributes:
+        command: what to send to the controller as it is configured now.
+        record: the record (1) that it will give.
+        gain: information gained on the parameters, nat.
+        waypoints: commands to pass on the path; none on a straight line.
+    """
+
+    command: Pose
+    record: PredictedRecords
+    gain: float
+    waypoints: tuple[Pose, ...]
+
+
+def select_pose(
+    planner: PathPlanner,
+    zero: GaugeZero,
+    orientations: Array,
+    criterion: Criterion = D_OPTIMAL,
+    known_then: Array | None = None,
+    rounds: Rounds = THOROUGH,
+) -> SelectedPose:
+    """The best by a criterion of some orientations (n, 3, 3), relative to the platform's at the reference.
+
+    They are not relative to the level platform: with millimetres of error in the joints the platform may
+    be 20 degrees from where the controller believes it to be.
+
+    Args:
+        planner: of paths from where the robot is.
+        zero: of the point's gauges.
+        orientations: candidates.
+        criterion: what is best.
+        known_then: covariance of the free parameters (p, p), mm^2, beside which a record has to gain; none
+            for that of now.
+        rounds: of refinement.
+
+    Raises:
+        LimitError: none is reachable within the limits and almost surely inside the travel.
+    """
+    belief = planner.belief
+    covariance = belief.covariance if known_then is None else known_then
+    space = CandidateSpace(
+        belief, zero, lambda some: criterion.gain(covariance, some.jacobian, some.covariance)
+    )
+    candidates = space.rated(orientations @ zero.orientation)
+    if candidates is None:
+        raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
+    if len(candidates):
+        candidates = space.refined(candidates, rounds)[:MOST_CANDIDATES]
+    search = _PathSearch(TravelConstraint(belief, zero), planner)
+    for ranked in _batches(np.arange(len(candidates)), *COMMAND_BATCHES):
+        commands, found = commands_for(belief, candidates.records.targets[ranked])
+        rows = ranked[found]
+        if selected := search.first_safe(candidates.records[rows], commands[found], candidates.gains[rows]):
+            return selected
+    raise LimitError("no orientation surely keeps the ball inside the gauges' travel")
+
+
+def select_from_list(
+    planner: PathPlanner, zero: GaugeZero, commands: PoseBatch, skipped: int
+) -> SelectedPose:
+    """The first of some commands (n) that almost surely stays inside the travel.
+
+    As :func:`select_pose`; the list's order takes the place of the gain. The first ``skipped`` of those
+    inside the travel are left out.
+
+    Raises:
+        LimitError: none of them does.
+    """
+    belief = planner.belief
+    targets, rows = outcomes_of(belief, commands)
+    records = predict_records(belief, zero, targets)
+    inside = np.flatnonzero(records.stay_inside(belief.limits))[skipped:]
+    search = _PathSearch(TravelConstraint(belief, zero), planner)
+    no_preference = np.full(len(inside), np.inf)
+    selected = search.first_of_few(records[inside], commands[rows[inside]], no_preference)
+    if selected is None:
+        raise LimitError(
+            "none of the poses left in the list surely keeps the ball inside the gauges' travel"
+        )
+    return selected
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _PathSearch:
+    """Search for candidates that can be reached safely, all from one command."""
+
+    travel: TravelConstraint
+    planner: PathPlanner
+
+    def first_safe(
+        self, records: PredictedRecords, commands: PoseBatch, gains: Array
+    ) -> SelectedPose | None:
+        """The first of some ranked candidates with a safe path to it; a few are examined together."""
+        rows = np.arange(len(records))
+        for some in _batches(rows, len(rows) if self.travel.is_uncertain else PATH_BATCH):
+            holds = self.travel.holds(records[some])
+            for few in _batches(some, PATH_BATCH):
+                arguments = records[few], commands[few], gains[few]
+                if selected := self.first_of_few(*arguments, holds[few - some[0]]):
+                    return selected
+        return None
+
+    def first_of_few(
+        self, records: PredictedRecords, commands: PoseBatch, gains: Array, holds: Mask | None = None
+    ) -> SelectedPose | None:
+        """The best of a few, straight paths first; ``holds``: at which the constraint does, if known."""
+        rows = np.flatnonzero(self.travel.holds(records) if holds is None else holds)
+        if not len(rows):
+            return None
+        paths = self.planner.options(commands)
+        found = self._first(paths.straight, rows)
+        worth_waypoints = rows
+        if found is not None:
+            better = rows[rows < found[0]]
+            worth_waypoints = better[gains[better] >= WAYPOINT_GAIN_RATIO * gains[found[0]]]
+        found = (
+            self._first(paths.via_waypoints, worth_waypoints)
+            or found
+            or self._first(paths.via_reference, rows)
+        )
+        if found is None:
+            return None
+        row, path = found
+        record = records[np.array([row])]
+        gain = D_OPTIMAL.gain(self.planner.belief.covariance, record.jacobian, record.covariance)
+        return SelectedPose(commands.pose(row), record, float(gain[0]), path.waypoints)
+
+    def _first(self, paths_to: Callable[[Rows], list[Path | None]], rows: Rows) -> tuple[int, Path] | None:
+        """The first row with a path along which the ball stays inside, and the path."""
+        for row, path in zip(rows.tolist(), paths_to(rows), strict=True):
+            if path is not None and self.travel.holds_along(path):
+                return row, path
+        return None
+
+
+def _batches(rows: Rows, *sizes: int) -> Iterator[Rows]:
+    """Batches of some sizes, and then of the last of them."""
+    first, waiting = 0, list(sizes)
+    while first < len(rows):
+        size = waiting.pop(0) if len(waiting) > 1 else waiting[0]
+        yield rows[first : first + size]
+        first += size

@@ -1,0 +1,184 @@
+"""Predicted records: the zero of a point's gauges, and what candidate poses would show against it.
+
+Both are propagated linearly with their covariances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexacell.design.candidates import ReachableTargets, commands_for
+from hexacell.design.criteria import innovation_covariance
+from hexacell.errors import LimitError
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.solver.measurement_model import record_covariance, record_weights
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.forward import assembly_mode
+from hexacell.kinematics.free_sensitivity import POSITION, free_sensitivity, sensitivity_and_margin
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.sensitivity import pose_jacobian
+from hexacell.limits.limits import Limits
+
+SAFETY_SIGMAS = 4.0
+TRAVEL_SHARE = 0.9
+"""Share of the travel that the predicted deviation and four sigma may use. The most informative poses are
+at this limit, thousands of 50,000 records; with three sigma one in some thousands left the travel."""
+
+
+@dataclass(frozen=True, eq=False)
+class GaugeZero:
+    """What is known of the zero of a point's gauges.
+
+    Attributes:
+        reference: estimated position (3,), mm, of the ball when they were zeroed.
+        orientation: the platform's then (3, 3), under the estimate.
+        joints: joint variables then (6,), mm.
+        jacobian: derivative (3, p) of ``reference`` by the free parameters.
+        covariance: of ``reference`` (3, 3), mm^2, the parameters being known.
+    """
+
+    reference: Array
+    orientation: Array
+    joints: Array
+    jacobian: Array
+    covariance: Array
+
+    @cached_property
+    def target(self) -> ReachableTargets:
+        """The reference as a target (1)."""
+        return ReachableTargets(PoseBatch.at(self.reference, self.orientation[None]), self.joints[None])
+
+    def command(self, belief: RobotBelief) -> PoseBatch:
+        """The command (1) of the reference."""
+        return commands_for(belief, self.target)[0]
+
+    def mode(self, belief: RobotBelief) -> Array:
+        """The assembly mode (1,) of the estimated robot at the reference."""
+        target = self.target
+        return assembly_mode(pose_jacobian(belief.mechanism, belief.estimate, target.poses, target.joints))
+
+
+def estimate_gauge_zero(
+    belief: RobotBelief, poses: PoseBatch, joints: Array, deviations: Array
+) -> GaugeZero:
+    """The weighted mean of the zeros by each of a point's records (n).
+
+    Args:
+        belief: what is known of the robot.
+        poses: of the records, under the estimate; the first is the reference.
+        joints: joint variables (n, 6), mm.
+        deviations: what the gauges showed (n, 3), mm.
+
+    Raises:
+        LimitError: all poses are at a singularity, where the records have no information.
+    """
+    jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses, joints))
+    weights = record_weights(by_joints, belief.noise)
+    try:
+        covariance = np.linalg.inv(weights.sum(axis=0))
+    except np.linalg.LinAlgError:
+        raise LimitError("the records of this point do not determine the ball's position") from None
+    reference = covariance @ np.einsum("nij,nj->i", weights, poses.positions - deviations)
+    mean_jacobian = covariance @ np.einsum("nij,njp->ip", weights, jacobian)
+    return GaugeZero(reference, poses.rotations[0], joints[0], mean_jacobian, covariance)
+
+
+def gauge_zero_at(belief: RobotBelief, found: Identification, point: int) -> GaugeZero:
+    """The zero of a point's gauges by the records of an identification."""
+    problem = found.problem
+    rows = np.flatnonzero(problem.labels[:, 0] == point)
+    return estimate_gauge_zero(belief, found.poses[rows], problem.joints[rows], problem.deviations[rows])
+
+
+def position_derivatives(belief: RobotBelief, targets: ReachableTargets) -> tuple[Array, Array]:
+    """Of the ball's position at n targets: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
+    at = belief.mechanism, belief.estimate, targets.poses, targets.joints
+    sensitivity = free_sensitivity(*at, POSITION)
+    return sensitivity.free, sensitivity.joints
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PredictedRecords:
+    """The records (n) that some targets would give.
+
+    Attributes:
+        targets: the poses.
+        jacobian: of the deviations (n, 3, p) by the free parameters.
+        covariance: of the deviations (n, 3, 3), mm^2, the parameters being known.
+        deviation: expected deviations (n, 3), mm.
+        sigma: standard deviations (n, 3), mm, of what the gauges x, y, z will show, as the parameters are
+            known now.
+    """
+
+    targets: ReachableTargets
+    jacobian: Array
+    covariance: Array
+    deviation: Array
+    sigma: Array
+
+    def __len__(self) -> int:
+        return len(self.targets)
+
+    def __getitem__(self, rows: Mask | NDArray[np.intp] | slice) -> PredictedRecords:
+        return PredictedRecords(
+            self.targets[rows],
+            self.jacobian[rows],
+            self.covariance[rows],
+            self.deviation[rows],
+            self.sigma[rows],
+        )
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[PredictedRecords]) -> PredictedRecords:
+        """The records of several."""
+        return cls(
+            ReachableTargets.concatenate([part.targets for part in parts]),
+            np.concatenate([part.jacobian for part in parts]),
+            np.concatenate([part.covariance for part in parts]),
+            np.concatenate([part.deviation for part in parts]),
+            np.concatenate([part.sigma for part in parts]),
+        )
+
+    def stay_inside(self, limits: Limits) -> Mask:
+        """Which deviations surely stay inside the gauges' room, by linear propagation."""
+        return self.within(limits, TRAVEL_SHARE)
+
+    def within(self, limits: Limits, share: float) -> Mask:
+        """Which deviations stay within a share of the gauges' room, with four sigma."""
+        return limits.within_travel(self.deviation, SAFETY_SIGMAS * self.sigma, share)
+
+
+def predict_records(belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets) -> PredictedRecords:
+    """The records of some targets at a point whose gauges were zeroed at ``zero``."""
+    return _predicted(belief, zero, targets, *position_derivatives(belief, targets))
+
+
+def predict_clear_records(
+    belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets, mode: Array
+) -> tuple[PredictedRecords, Mask]:
+    """The same, and at which targets (n,) the robot has its singularity margin, on an assembly mode (1,).
+
+    At the others the records mean nothing.
+    """
+    at = belief.mechanism, belief.estimate, targets.poses, targets.joints
+    sensitivity, clear = sensitivity_and_margin(*at, POSITION, belief.limits.singularity_margin)
+    records = _predicted(belief, zero, targets, sensitivity.free, sensitivity.joints)
+    return records, clear & (sensitivity.mode == mode)
+
+
+def _predicted(
+    belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets, by_parameters: Array, by_joints: Array
+) -> PredictedRecords:
+    """The records by the derivatives of the ball's position, see :func:`position_derivatives`."""
+    covariance = record_covariance(by_joints, belief.noise) + zero.covariance
+    jacobian = by_parameters - zero.jacobian
+    total = innovation_covariance(belief.covariance, jacobian, covariance)
+    sigma = belief.limits.sigma_along_gauges(total)
+    deviation = targets.poses.positions - zero.reference
+    return PredictedRecords(targets, jacobian, covariance, deviation, sigma)

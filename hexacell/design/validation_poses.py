@@ -1,0 +1,138 @@
+"""Held-out poses that validate the result: commanded as a user would, inside the travel, far apart.
+
+They are far from each other and from the orientations that the geometry was identified with, near which
+it fits in any case: a greedy maximin (space-filling) design (Johnson, Moore & Ylvisaker, J. Stat. Planning
+and Inference 26, 1990).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexacell.design.candidates import ReachableTargets, reachable_targets
+from hexacell.design.criteria import innovation_covariance
+from hexacell.design.predicted_records import TRAVEL_SHARE, position_derivatives
+from hexacell.errors import LimitError
+from hexacell.identification.belief import RobotBelief
+from hexacell.kinematics import rotations
+from hexacell.kinematics.commanded_motion import ActualPoses
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array, Mask
+from hexacell.motion.path_check import is_clear
+
+SAFETY_SIGMAS = 3.0
+"""Fewer than for identification: these poses are few and not chosen near the limit of the travel, and
+smaller tilts would validate too little."""
+
+SHARES = (0.0, 1.0 / 3.0, 2.0 / 3.0)
+"""Of the way to the middle, by which a point is moved that the robot has too few poses at."""
+
+
+def select_near(
+    belief: RobotBelief,
+    point: Array,
+    middle: Array,
+    count: int,
+    orientations: Array,
+    used: Array | None = None,
+) -> PoseBatch:
+    """``count`` poses at a point (3,), mm, or where the robot has so many between it and the ``middle``.
+
+    See :func:`select_validation_poses`.
+
+    Raises:
+        LimitError: too few of them do anywhere; the message is that of the point itself.
+    """
+    failures: list[LimitError] = []
+    for share in SHARES:
+        moved = point + share * (middle - point)
+        try:
+            return select_validation_poses(belief, moved, count, orientations, used)
+        except LimitError as error:
+            failures.append(error)
+    raise failures[0]
+
+
+def select_validation_poses(
+    belief: RobotBelief, point: Array, count: int, orientations: Array, used: Array | None = None
+) -> PoseBatch:
+    """``count`` poses at a point (3,), mm; the first is level.
+
+    The ball stays inside the travel although the controller still commands with its own geometry, and
+    the corrected robot can take them too. Of the orientations (n, 3, 3) that allow this, those are
+    selected whose actual orientations are farthest from each other and from the ``used`` ones (k, 3, 3),
+    wherever these were measured.
+
+    Raises:
+        LimitError: too few of them do.
+    """
+    turns = np.concatenate([np.eye(3)[None], orientations])
+    every = PoseBatch.at(point, belief.limits.orientations(turns))
+    limits = belief.limits
+    allowed = limits.allow_commands(every) & limits.allow_joints(belief.commanded.joints(every))
+    poses = reachable_targets(belief, every[allowed]).poses
+    if not len(poses) or not np.array_equal(poses.rotations[0], every.rotations[0]):
+        raise LimitError(f"the untilted platform cannot reach {every.pose(0)} within the limits")
+    actual = belief.commanded.actual_poses(poses)
+    if not actual.found[0]:
+        raise LimitError(f"the actual pose at the command {poses.pose(0)} cannot be computed")
+    inside = _stays_inside(belief, actual)
+    if not inside[0]:
+        raise LimitError(f"the actual pose at the command {poses.pose(0)} is not within the limits")
+    selected = _select_farthest(belief, poses[inside], actual.poses[inside], used, count)
+    if len(selected) < count:
+        raise LimitError(
+            f"only {len(selected)} orientations at {poses.pose(0)} keep the ball inside the travel"
+        )
+    return poses[inside][selected]
+
+
+def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
+    """At which poses the ball stays inside the travel of gauges that are zeroed at the first of them.
+
+    Only those at which the robot keeps its limits too.
+    """
+    jacobian, _ = position_derivatives(belief, ReachableTargets(actual.poses, actual.joints))
+    noise = 2.0 * belief.noise.gauge_covariance
+    covariance = innovation_covariance(belief.covariance, jacobian - jacobian[0], noise)
+    sigma = belief.limits.sigma_along_gauges(covariance)
+    deviation = actual.poses.positions - actual.poses.positions[0]
+    # They are chosen long before the gauges are placed there.
+    inside = belief.limits.within_travel(deviation, SAFETY_SIGMAS * sigma, TRAVEL_SHARE, surely=True)
+    inside[0] = True
+    inside &= actual.found
+    inside[inside] = belief.keeps_limits(actual.poses[inside], actual.joints[inside])
+    return inside
+
+
+def _select_farthest(
+    belief: RobotBelief, commands: PoseBatch, actual: PoseBatch, used: Array | None, count: int
+) -> list[int]:
+    """Rows of commands: the first, then each next one farthest from those selected and used.
+
+    The straight lines from each to the next, and back to the first, must be clear.
+    """
+    distance = np.full(len(commands), np.inf)
+    for orientation in () if used is None else used:
+        distance = np.minimum(distance, _angles(actual.rotations, orientation))
+    reference, selected = actual.positions[0], [0]
+    while len(selected) < count:
+        last = selected[-1]
+        distance = np.minimum(distance, _angles(actual.rotations, actual.rotations[last]))
+        best = int(np.argmax(distance))
+        while distance[best] > 0.0 and not (
+            is_clear(belief, commands[[last]], commands[[best]], reference)
+            and is_clear(belief, commands[[best]], commands[[0]], reference)
+        ):
+            distance[best] = 0.0
+            best = int(np.argmax(distance))
+        if distance[best] <= 0.0:
+            break
+        selected.append(best)
+    return selected
+
+
+def _angles(orientations: Array, other: Array) -> Array:
+    """Angles (n,), rad, between orientations (n, 3, 3) and another one (3, 3)."""
+    angles: Array = np.linalg.norm(rotations.to_vector(orientations @ other.T), axis=-1)
+    return angles

@@ -1,0 +1,273 @@
+"""A plan carried out on virtual robots, decision by decision, and what it gives: before anything moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from statistics import median
+
+import numpy as np
+
+from hexacell.campaign.budget import TimeModel, noise_minutes
+from hexacell.campaign.decisions import (
+    CampaignState,
+    Decision,
+    Finished,
+    FinishPoint,
+    Forecast,
+    MeasurePose,
+    StartPoint,
+)
+from hexacell.campaign.planner import Plan
+from hexacell.dry_run.held_out_forecast import predicted_verdicts
+from hexacell.dry_run.verdict_forecast import VerdictForecast
+from hexacell.errors import HexacellError, ReachError
+from hexacell.identification.problem.data_requirements import is_determined
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.records import MeasurementSet
+from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
+from hexacell.uncertainty.budget import UncertaintyBudget
+
+ROBOTS = 2
+MOST_TRIED = 6
+
+VisitedPose = tuple[int, int, Pose]
+"""Point, orientation at it, and where that is."""
+
+
+@dataclass(eq=False)
+class VirtualCampaign:
+    """One campaign, from the first reference to the end of the plan.
+
+    The robot is placed at each pose; what is between is left to subclasses. Where the cell says so, the
+    controller commands with the estimate once the robot is known well enough.
+
+    Attributes:
+        state: what the next decision depends on.
+        outside: number of records at which the ball left the gauges' travel; they are not taken.
+        largest_mm: the largest deviation on any axis, of records taken or not.
+        reason: why the plan ended.
+    """
+
+    plan: Plan
+    virtual_robot: VirtualRobot
+    state: CampaignState = field(default_factory=CampaignState)
+    outside: int = 0
+    largest_mm: float = 0.0
+    reason: str = ""
+
+    @property
+    def measurements(self) -> MeasurementSet:
+        """The records taken so far."""
+        return self.state.measurements
+
+    @property
+    def visited(self) -> tuple[VisitedPose, ...]:
+        """The poses of these records, in their order."""
+        return tuple((one.point, one.orientation, one.pose) for one in self.measurements.records)
+
+    def carry_out(self) -> None:
+        """Carry out all that the plan decides.
+
+        Raises:
+            HexacellError: a decision cannot be made or carried out.
+        """
+        while not isinstance(self.step(), Finished):
+            pass
+
+    def step(self) -> Decision:
+        """Make one decision and carry it out.
+
+        Raises:
+            HexacellError: it cannot be made or carried out.
+        """
+        decision = self.plan.decide(self.state)
+        match decision:
+            case StartPoint():
+                self._go_to_point(decision)
+                self.virtual_robot.zero_gauges()
+                self._measure(decision)
+                self._take_pilots()
+            case MeasurePose():
+                self._go_to_pose(decision)
+                self._measure(decision)
+            case FinishPoint(point=point):
+                self._finish(point, self.plan.reference_pose(point))
+            case Finished(reason=reason):
+                self.reason = reason
+        return decision
+
+    def _take_pilots(self) -> None:
+        """Leave the first reference, as to measure the noise, for pilot poses, and come back."""
+        reference = self.state.present
+        while reference is not None and self._depart():
+            self._return_to(reference)
+            self.state = replace(self.state, present=reference)
+
+    def _depart(self) -> bool:
+        """Visit the pilot poses of one departure; whether there is any."""
+        for taken in range(self.plan.pilots_per_departure):
+            pilot = self.plan.pilot_pose(self.state)
+            if pilot is None:
+                return taken > 0
+            self._go_to_pose(pilot)
+            self._take_pilot(pilot)
+        return True
+
+    def _take_pilot(self, pilot: MeasurePose) -> None:
+        state = replace(self.state, present=pilot.pose)
+        record = self.virtual_robot.measure(pilot.point, pilot.orientation)
+        if self.plan.robot.limits.room.holds(np.array(record.deviation)):
+            self.state = replace(state, pilots=(*state.pilots, record))
+        else:
+            self.outside += 1
+            self.state = replace(state, rejections=state.rejections + 1)
+
+    def _go_to_point(self, start: StartPoint) -> None:
+        self.virtual_robot.place(start.pose)
+
+    def _go_to_pose(self, measure: MeasurePose) -> None:
+        """Go there at once, or on the planned way where a singularity lies between the two geometries."""
+        try:
+            self.virtual_robot.place(measure.pose)
+        except ReachError:
+            for pose in (*measure.via, measure.pose):
+                self.virtual_robot.move(pose)
+
+    def _return_to(self, reference: Pose) -> None:
+        """Go back to the reference of the present point."""
+
+    def _leave_point(self) -> None:
+        """Let the controller command with the estimate, if that is wanted and safe."""
+        plan = self.plan
+        if not plan.settings.identification.provisional or plan.robot.uses_provisional:
+            return
+        if plan.allows_provisional(self.state):
+            geometry = plan.estimate(self.state).belief.estimate
+            robot = plan.robot.with_provisional(geometry)
+            self.virtual_robot.load(robot)
+            self.plan = replace(plan, robot=robot)
+
+    def _measure(self, decision: StartPoint | MeasurePose) -> None:
+        state = self.state
+        record = self.virtual_robot.measure(decision.point, decision.orientation)
+        deviation = float(np.abs(record.deviation).max())
+        self.largest_mm = max(self.largest_mm, deviation)
+        if not self.plan.robot.limits.room.holds(np.array(record.deviation)):
+            self.outside += 1
+            self.state = replace(state, present=decision.pose, rejections=state.rejections + 1)
+            return
+        measurements = MeasurementSet((*state.measurements.records, record))
+        self.state = replace(state, measurements=measurements, point=decision.point, present=decision.pose)
+
+    def _finish(self, point: int, reference: Pose) -> None:
+        """Return to the point's reference; it is finished if nothing can be measured from there either."""
+        if self.state.present != reference:
+            self._return_to(reference)
+            self.state = replace(self.state, present=reference)
+            return
+        done = self.state.done | {point}
+        measured, pilots = self.state.measurements, self.state.pilots
+        self.state = CampaignState(measured, done=done, present=reference, pilots=pilots)
+        self._leave_point()
+
+
+@dataclass(frozen=True, slots=True)
+class DryRunResult:
+    """Medians over the robots that the plan gave enough records to identify.
+
+    Attributes:
+        drawn: number of robots that were tried.
+        robots: number of those that could be identified.
+        points: measured, and how many ``records`` there.
+        outside: records at which the ball left the gauges' travel, over all robots.
+        worst_sigma_mm: predicted error at the worst task pose afterwards; none without task poses.
+        minutes: to measure, noise and held-out poses included.
+        expanded_mm: U of the largest error at the task poses, systematic effects included; none likewise.
+        verdicts: what a run will say of healthy machines; none likewise, or without held-out poses.
+        visited: the poses of the first of these robots, in their order, with point and orientation.
+    """
+
+    drawn: int
+    robots: int
+    points: int
+    records: int
+    outside: int
+    worst_sigma_mm: float | None
+    minutes: float
+    expanded_mm: float | None = None
+    verdicts: VerdictForecast | None = None
+    visited: tuple[VisitedPose, ...] = ()
+
+
+def dry_run(plan: Plan, robots: int = ROBOTS) -> DryRunResult:
+    """Carry the plan out on a few robots. Takes a second or two for each."""
+    identified: list[_Outcome] = []
+    tried = 0
+    for truth in robots_within_tolerances(plan.robot, MOST_TRIED, plan.settings.identification.seed):
+        if len(identified) == robots:
+            break
+        outcome = _carry_out(plan, truth, tried)
+        identified += [] if outcome is None else [outcome]
+        tried += 1
+    return _summary(plan, tried, identified)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Outcome:
+    """The campaign on one robot, and the error that remains."""
+
+    campaign: VirtualCampaign
+    forecast: Forecast | None
+    budget: UncertaintyBudget | None
+    verdicts: VerdictForecast | None
+
+
+def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
+    """The outcome for one robot; none if it is not identified."""
+    random = np.random.default_rng([plan.settings.identification.seed, number])
+    campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, truth, random))
+    try:
+        campaign.carry_out()
+        plan = campaign.plan
+        estimate, forecast = plan.estimate(campaign.state), plan.forecast(campaign.state)
+    except HexacellError:
+        return None
+    found = estimate.of_records_alone()
+    if found is None or not is_determined(found.problem):
+        return None
+    zeros, belief = plan.robot.identified_zeros(found), plan.robot.belief(found)
+    belief = belief if zeros is None else replace(belief, covariance=zeros.free_covariance)
+    budget = plan.task.budget(found, belief, plan.robot.effects, zeros=zeros)
+    return _Outcome(campaign, forecast, budget, predicted_verdicts(plan, found, budget))
+
+
+def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult:
+    if not identified:
+        return DryRunResult(tried, 0, 0, 0, 0, None, 0.0)
+    points = round(median(outcome.campaign.state.begun_points for outcome in identified))
+    records = round(median(len(outcome.campaign.measurements) for outcome in identified))
+    pilots = round(median(len(outcome.campaign.state.pilots) for outcome in identified))
+    errors = [outcome.forecast.now_mm for outcome in identified if outcome.forecast is not None]
+    verdicts = [outcome.verdicts for outcome in identified if outcome.verdicts is not None]
+    expanded = [outcome.budget.expanded_mm for outcome in identified if outcome.budget is not None]
+    held_out = plan.settings.verification
+    straight = TimeModel.of(plan.settings, moves=1.0)
+    points_held_out = len(held_out.points)
+    common, wide = points_held_out * held_out.orientations, points_held_out * (held_out.orientations - 1)
+    before, after = (straight.minutes(poses, points_held_out) for poses in (common, common + wide))
+    return DryRunResult(
+        drawn=tried,
+        robots=len(identified),
+        points=points,
+        records=records,
+        outside=sum(outcome.campaign.outside for outcome in identified),
+        worst_sigma_mm=median(errors) if errors else None,
+        minutes=noise_minutes(plan.settings, pilots)
+        + plan.budget.time_model.minutes(records, points)
+        + before
+        + after,
+        expanded_mm=median(expanded) if expanded else None,
+        verdicts=VerdictForecast.mean(verdicts) if verdicts else None,
+        visited=identified[0].campaign.visited,
+    )

@@ -1,0 +1,182 @@
+"""The probability of each verdict on a healthy machine: one that is as stated, calibrated as planned.
+
+The verification will state the error of the written geometry by an estimate that has the held-out records
+as well. If the model is right, that differs from the identification by
+
+    d,   covariance  C - C',      C, C' the covariances before and after the held-out records,
+
+and by what the systematic effects do to the one and not to the other. With zeros alone, that are written as
+G of the estimate, what is held errs as its tolerances say, with their covariance C0, and is seen to err by
+
+    d - H (x - h),    covariance  (C - C') + H (C0 - C) H^T,    H = 1 - G,
+
+x the identification and h what is held (the errors of Bayesian estimates do not depend on them).
+
+Machines are drawn: what is stated of each is the largest error J d over the task poses, and its U is the
+95 % quantile by draws of all that is not known of it, as in a run. The decision rule gives the verdict. The
+tests of the model fail a healthy machine with a probability of 0.1 % each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexacell.identification.identified_zeros import IdentifiedZeros
+from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.rotations import Array
+from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.uncertainty.effects import Occurrence
+from hexacell.uncertainty.statement import COVERAGE, LargestError, covariance_factor
+from hexacell.verdict.decision import ErrorLimits, Verdict
+
+MACHINES = 500
+DRAWS = 1000
+"""Fewer than a run has for its single statement: U is good to 3 %."""
+SEED = 20_100_102
+TESTS = 3
+"""Of the model, in every run: residuals, held-out records, and points by the others."""
+WANTED = 0.95
+"""Probability to pass below which a limit is one that good machines fail."""
+NOISE = "noise of the readings"
+
+
+@dataclass(frozen=True, slots=True)
+class VerdictForecast:
+    """What a run will say of healthy machines.
+
+    Attributes:
+        probabilities: of each verdict under the ``limits``.
+        passing: limits that 95 % of such machines would pass, each by itself.
+        largest_part: the line of the budget that contributes most to U at the worst task pose.
+        largest_part_mm: its standard uncertainty there, and ``standard_mm`` that of all together.
+    """
+
+    probabilities: Mapping[Verdict, float]
+    limits: ErrorLimits
+    passing: ErrorLimits
+    largest_part: str
+    largest_part_mm: float
+    standard_mm: float
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether the limits are such that a good machine passes."""
+        return self.probabilities[Verdict.PASS] >= WANTED
+
+    @classmethod
+    def mean(cls, each: Sequence[VerdictForecast]) -> VerdictForecast:
+        """Over some robots; the limits and the parts are those of the worst of them."""
+        worst = max(each, key=lambda one: one.passing.position_mm)
+        degrees = max(one.passing.orientation_deg for one in each)
+        return cls(
+            {verdict: float(np.mean([one.probabilities[verdict] for one in each])) for verdict in Verdict},
+            worst.limits,
+            replace(worst.passing, orientation_deg=degrees),
+            worst.largest_part,
+            worst.largest_part_mm,
+            worst.standard_mm,
+        )
+
+
+def forecast_verdicts(stated: Array, budget: UncertaintyBudget, limits: ErrorLimits) -> VerdictForecast:
+    """The verdicts on machines that are drawn.
+
+    Args:
+        stated: (t, 6, k) change of the errors that will be stated, by one standard deviation of each
+            independent cause.
+        budget: of all that will not be known of them.
+        limits: of the cell.
+    """
+    unknown = budget.errors_of(np.zeros(budget.jacobian.shape[-1])).effects
+    random = np.random.default_rng(SEED)
+    machines = random.standard_normal((MACHINES, stated.shape[-1]))
+    draws = random.standard_normal((DRAWS, unknown.shape[-1]))
+    errors = np.tensordot(machines, stated, axes=(1, 2))
+    around = np.tensordot(draws, unknown, axes=(1, 2))
+    positions = _statements(errors[..., :3], around[..., :3])
+    orientations = _statements(np.degrees(errors[..., 3:]), np.degrees(around[..., 3:]))
+    verdicts = [
+        limits.decide_largest(first, second) for first, second in zip(positions, orientations, strict=True)
+    ]
+    name, part = _largest_part(budget)
+    factor = limits.guard_band_factor
+    return VerdictForecast(
+        _probabilities(verdicts),
+        limits,
+        ErrorLimits(_passing(positions, factor), _passing(orientations, factor), factor),
+        name,
+        part,
+        budget.standard_mm,
+    )
+
+
+def stated_errors(
+    found: Identification,
+    updated: Identification,
+    first: UncertaintyBudget,
+    second: UncertaintyBudget,
+    zeros: IdentifiedZeros | None = None,
+) -> Array:
+    """How the error that will be stated changes (t, 6, k) by one standard deviation of each cause.
+
+    Args:
+        found: the identification.
+        updated: the same by the held-out records as well.
+        first: the budget of ``found``.
+        second: that of ``updated``.
+        zeros: what is written of ``found``, where that is not all of it.
+    """
+    held = np.zeros_like(found.free_covariance)
+    if zeros is not None:
+        held = np.eye(len(held)) - zeros.projector
+    of_held = zeros.kept.tolerances - found.free_covariance if zeros else held
+    columns = [
+        covariance_factor(found.free_covariance - updated.free_covariance),
+        held @ covariance_factor(of_held),
+    ]
+    before = {line.effect.name: line for line in first.lines}
+    for line in second.lines:
+        effect, earlier = line.effect, before[line.effect.name]
+        if effect.is_estimated or not effect.size:
+            continue
+        if effect.occurrence is Occurrence.EVERY_STOP:
+            # Other stops: what they do to the two estimates differs as their covariances do.
+            old, new = (one.parameter_columns for one in (earlier, line))
+            columns.append(effect.size * covariance_factor(old @ old.T - new @ new.T))
+            columns.append(effect.size * held @ old)
+        elif effect.occurrence.is_in_records:
+            old, new = earlier.parameter_columns, line.parameter_columns
+            columns.append(effect.size * (old - new - held @ old))
+    return np.asarray(second.jacobian @ np.concatenate(columns, axis=1))
+
+
+def _statements(errors: Array, around: Array) -> list[LargestError]:
+    """The largest errors of machines (n, t, 3), each with its U by draws (d, t, 3) around it."""
+    found = []
+    for one in errors:
+        value = float(np.linalg.norm(one, axis=-1).max())
+        largest = np.linalg.norm(one + around, axis=-1).max(axis=-1)
+        found.append(LargestError(value, float(np.quantile(np.abs(largest - value), COVERAGE))))
+    return found
+
+
+def _probabilities(verdicts: Sequence[Verdict]) -> dict[Verdict, float]:
+    """With those of the tests of the model, which fail independently."""
+    tested = (1.0 - SMALLEST_PROBABILITY) ** TESTS
+    shares = {verdict: tested * verdicts.count(verdict) / len(verdicts) for verdict in Verdict}
+    shares[Verdict.NOT_EVALUATED] += 1.0 - tested
+    return shares
+
+
+def _passing(statements: Sequence[LargestError], guard_band_factor: float) -> float:
+    return float(np.quantile([one.value + guard_band_factor * one.expanded for one in statements], WANTED))
+
+
+def _largest_part(budget: UncertaintyBudget) -> tuple[str, float]:
+    parts = [(line.combined_mm, line.effect.name) for line in budget.lines if not line.effect.is_estimated]
+    size, name = max([(budget.noise_mm, NOISE), *parts])
+    return name, size

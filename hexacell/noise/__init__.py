@@ -1,0 +1,1 @@
+"""Noise of instruments and robot, measured at standstill and by repeated visits."""

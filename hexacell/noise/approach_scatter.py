@@ -1,0 +1,207 @@
+"""Scatter between approaches: one pose visited again and again from different directions.
+
+At every visit the gauges see where the ball is, and the encoders where the joints are. What the encoders
+see of the ball's motion is no error of the model. The rest is, for each visit less their mean,
+
+    r = d - G q,      G = dP/dq,      covariance  G diag(s_q^2) G^T + diag(s_d^2)
+
+with the noise of encoders and gauges that is stated for a record. Whether there is more is a chi-square
+test. Where it comes from, ball and joints tell together. With stops s of the joints that differ from
+visit to visit, play p between their encoders and joints, and errors e and g of encoders and gauges,
+
+    q = s + e,      d = G (s + p) + g,
+
+so that play moves the ball and not the encoders, an error of the encoders the encoders and not the ball,
+and an error of one gauge that gauge alone. For each source one variance more is estimated by restricted
+maximum likelihood, with that of the stops. The likeliest source is named; a single instrument only where
+it is ten times as likely as all joints or all encoders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from hexacell.distributions import chi_square_exceedance, chi_square_limit
+from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.rotations import Array
+from hexacell.noise.standstill import SIGNIFICANCE
+
+FEWEST_VISITS = 3
+"""Fewer visits, the first one included, tell nothing."""
+CONFIDENCE = 0.95
+INSTRUMENT_ODDS = 10.0
+"""How many times as likely as all joints or encoders a single instrument must be to be named."""
+LARGEST_EXCESS = 1e3
+"""Times the stated noise up to which sizes are sought."""
+ROUGH = 1e-2
+"""Accuracy of the logarithm of the excess."""
+STOP_SIZES = 100
+"""Sizes of the scatter of the stops that are tried, evenly spaced by their logarithms."""
+
+
+class ScatterSource(StrEnum):
+    """What does not repeat."""
+
+    JOINTS = "joints"
+    ENCODERS = "encoders"
+    GAUGE_X = "gauge x"
+    GAUGE_Y = "gauge y"
+    GAUGE_Z = "gauge z"
+    ENCODER_1 = "encoder 1"
+    ENCODER_2 = "encoder 2"
+    ENCODER_3 = "encoder 3"
+    ENCODER_4 = "encoder 4"
+    ENCODER_5 = "encoder 5"
+    ENCODER_6 = "encoder 6"
+
+    @classmethod
+    def _missing_(cls, value: object) -> ScatterSource | None:
+        """Journals up to version 11 have the word for a Hexaglide's joints."""
+        return cls.JOINTS if value == "sliders" else None
+
+    @property
+    def instruments(self) -> Array:
+        """Which of gauges x, y, z and the encoders of legs 1 to 6 it is noise of: (9,), 1 or 0."""
+        if self in TOGETHER:
+            return np.repeat([0.0, 1.0], [3, LEGS])
+        return np.asarray(np.eye(3 + LEGS)[ALONE.index(self)])
+
+
+TOGETHER = (ScatterSource.JOINTS, ScatterSource.ENCODERS)
+ALONE = tuple(source for source in ScatterSource if source not in TOGETHER)
+
+
+@dataclass(frozen=True, slots=True)
+class ApproachScatter:
+    """What visits of one pose show of the noise of a record.
+
+    Attributes:
+        visits: of the pose, the first one included.
+        degrees_of_freedom: of the chi-square.
+        ball_mm: how far the ball is from its mean, as the gauges see it (root mean square distance).
+        chi_square: of what the encoders do not explain, under the stated noise.
+        source: what does not repeat; none where the stated noise explains everything.
+        excess: one standard deviation of it beside the stated noise, of each joint or encoder or of
+            the instrument.
+    """
+
+    visits: int
+    degrees_of_freedom: int
+    ball_mm: float
+    chi_square: float
+    source: ScatterSource | None = None
+    excess: float = 0.0
+
+    @property
+    def ratio(self) -> float:
+        """The scatter as a multiple of what the stated noise explains."""
+        return float(np.sqrt(self.chi_square / self.degrees_of_freedom))
+
+    @property
+    def ratio_at_most(self) -> float:
+        """Upper limit of the true multiple, with 95 % confidence."""
+        return float(np.sqrt(self.chi_square / chi_square_limit(self.degrees_of_freedom, CONFIDENCE)))
+
+
+def approach_scatter(
+    deviations: Array, joints: Array, by_joints: Array, encoders: Array, gauges_mm: Array
+) -> ApproachScatter | None:
+    """The scatter of visits of one pose; none with fewer than ``FEWEST_VISITS``.
+
+    Args:
+        deviations: of the ball along base x, y, z (m, 3), mm.
+        joints: what the encoders showed (m, 6), mm.
+        by_joints: derivative G (3, 6) of the ball's position by the joint variables.
+        encoders: stated noise of each encoder (6,) in a record.
+        gauges_mm: likewise of the gauges (3,).
+    """
+    if len(deviations) < FEWEST_VISITS:
+        return None
+    shown = np.concatenate([deviations, joints], axis=1)
+    visits = _Visits.of(shown, by_joints, np.diag(np.concatenate([gauges_mm, encoders]) ** 2))
+    freedom, chi_square = 3 * visits.freedom, visits.unexplained()
+    found = ApproachScatter(len(deviations), freedom, visits.ball_mm, chi_square)
+    if chi_square_exceedance(freedom, chi_square) >= SIGNIFICANCE:
+        return found
+    excesses = {source: visits.excess(source) for source in ScatterSource}
+    source = _named(excesses)
+    return ApproachScatter(
+        len(deviations), freedom, visits.ball_mm, chi_square, source, excesses[source][1]
+    )
+
+
+def _named(excesses: Mapping[ScatterSource, tuple[float, float]]) -> ScatterSource:
+    """The source to name, by the log likelihoods of all."""
+    together = max(TOGETHER, key=lambda one: excesses[one][0])
+    alone = max(ALONE, key=lambda one: excesses[one][0])
+    is_proven = excesses[alone][0] >= excesses[together][0] + np.log(INSTRUMENT_ODDS)
+    return alone if is_proven else together
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Visits:
+    """Visits of one pose.
+
+    Attributes:
+        products: (9, 9), mm^2, of ball and joints less their means, summed over the visits.
+        motion: (9, 6) of ball and encoders by the stops of the joints.
+        stated: (9, 9) covariance of the instruments.
+    """
+
+    products: Array
+    motion: Array
+    stated: Array
+    freedom: int
+
+    @classmethod
+    def of(cls, shown: Array, by_joints: Array, stated: Array) -> _Visits:
+        around = shown - shown.mean(axis=0)
+        motion = np.concatenate([by_joints, np.eye(LEGS)])
+        return cls(around.T @ around, motion, stated, len(shown) - 1)
+
+    @property
+    def ball_mm(self) -> float:
+        return float(np.sqrt(np.trace(self.products[:3, :3]) / self.freedom))
+
+    def unexplained(self) -> float:
+        """Chi-square of what the encoders do not explain, which no stop of the joints changes."""
+        rest = np.concatenate([np.eye(3), -self.motion[:3]], axis=1)
+        covariance, products = rest @ self.stated @ rest.T, rest @ self.products @ rest.T
+        return float(np.trace(np.linalg.solve(covariance, products)))
+
+    def excess(self, source: ScatterSource) -> tuple[float, float]:
+        """The largest log likelihood with one more variance, and its standard deviation, mm."""
+        from scipy.optimize import minimize_scalar  # noqa: PLC0415 - its import takes half a second
+
+        added = np.diag(source.instruments)
+        if source is ScatterSource.JOINTS:
+            moved = np.concatenate([self.motion[:3], np.zeros((LEGS, LEGS))])
+            added = moved @ moved.T
+        unit = float(np.sqrt(np.diag(self.stated)[source.instruments > 0.0].mean()))
+
+        def loss(log_size: float) -> float:
+            return -self._best_stops(self.stated + (unit * np.exp(log_size)) ** 2 * added, unit)
+
+        bound = float(np.log(LARGEST_EXCESS))
+        best = minimize_scalar(loss, bounds=(-bound, bound), method="bounded", options={"xatol": ROUGH})
+        return -float(best.fun), unit * float(np.exp(best.x))
+
+    def _best_stops(self, covariance: Array, unit: float) -> float:
+        """The restricted log likelihood, but for a constant, with the likeliest scatter of the stops.
+
+        In the coordinates in which both covariances are diagonal it is a sum.
+        """
+        from scipy.linalg import eigh  # noqa: PLC0415 - as slow to import, and as seldom needed
+
+        shares, axes = eigh(self.motion @ self.motion.T, covariance)
+        squares = np.einsum("ij,ik,kj->j", axes, self.products, axes)
+        bound = np.log(LARGEST_EXCESS)
+        sizes = (unit * np.exp(np.linspace(-bound, bound, STOP_SIZES))) ** 2
+        variances = 1.0 + sizes[:, None] * np.maximum(shares, 0.0)
+        log_dets = np.linalg.slogdet(covariance)[1] + np.log(variances).sum(axis=1)
+        chi_squares = (squares / variances).sum(axis=1)
+        return float(np.max(-0.5 * (self.freedom * log_dets + chi_squares)))

@@ -1,0 +1,135 @@
+"""The noise that a run has measured at its start, and what follows from it for everything after."""
+
+from __future__ import annotations
+
+from pydantic import AliasChoices, Field
+
+from hexacell.campaign.budget import TimeModel
+from hexacell.cell.fields import Frozen, Point, SixNumbers
+from hexacell.cell.model import CellSettings
+from hexacell.cell.uncertainty import repeatability_key
+from hexacell.kinematics.parameters import JointUnit
+from hexacell.noise.approach_scatter import ScatterSource
+
+
+def _once(name: str) -> AliasChoices:
+    """The name of a number, and what it was called in journals up to version 11, when all were in mm."""
+    return AliasChoices(name, f"{name}_mm")
+
+
+class InstrumentNoise(Frozen):
+    """The noise of one gauge or encoder, one standard deviation, in its unit.
+
+    Attributes:
+        reading: of a single reading at standstill, with its degrees of freedom; none without a series.
+        drift: change over the series, zero unless significant.
+        outliers: false readings in the series, which were left out.
+        correlation: of successive readings, zero unless significant.
+        stated: of a record, by the cell file.
+        is_noisier: whether a record is noisier by its readings alone than stated.
+        record: of a record, as the run uses it from now on.
+    """
+
+    name: str
+    unit: JointUnit = JointUnit.MM
+    reading: float | None = Field(None, validation_alias=_once("reading"))
+    degrees_of_freedom: int = 0
+    drift: float = Field(0.0, validation_alias=_once("drift"))
+    outliers: int = 0
+    correlation: float = 0.0
+    stated: float = Field(validation_alias=_once("stated"))
+    is_noisier: bool = False
+    record: float = Field(validation_alias=_once("record"))
+
+
+class RepeatedApproaches(Frozen):
+    """What visits of the first reference from different directions showed.
+
+    Attributes:
+        visits: of the reference, the first one included.
+        ball_mm: how far the ball was from its mean (root mean square distance).
+        ratio: of what the encoders do not explain to what the noise explains.
+        source: what does not repeat beyond that, none unless significant; ``excess`` is one standard
+            deviation of it, in ``unit``.
+    """
+
+    visits: int
+    degrees_of_freedom: int
+    ball_mm: float
+    ratio: float
+    source: ScatterSource | None = None
+    unit: JointUnit = JointUnit.MM
+    excess: float = Field(0.0, validation_alias=_once("excess"))
+
+
+class AveragingForecast(Frozen):
+    """Records that are means of some settled windows.
+
+    Attributes:
+        error_mm: predicted at the worst task pose once all is measured, one standard deviation.
+        minutes: how much longer that takes.
+    """
+
+    windows: int
+    error_mm: float
+    minutes: float
+
+
+class MeasuredNoise(Frozen):
+    """The noise of the gauges x, y and z and of the encoders of legs 1 to 6, as measured.
+
+    Attributes:
+        approaches: none where the reference was not visited again.
+        windows: settled windows that a record is the mean of from now on.
+        forecasts: for different numbers of windows; empty where no accuracy is predicted.
+        encoders_part_mm: what the encoders contribute to the first of these errors.
+    """
+
+    gauges: tuple[InstrumentNoise, InstrumentNoise, InstrumentNoise]
+    encoders: tuple[InstrumentNoise, ...]
+    approaches: RepeatedApproaches | None = None
+    windows: int = 1
+    forecasts: tuple[AveragingForecast, ...] = ()
+    encoders_part_mm: float | None = None
+
+    @property
+    def is_larger(self) -> bool:
+        """Whether something is noisier than the cell file states."""
+        scatter = self.approaches is not None and self.approaches.source is not None
+        return scatter or any(one.is_noisier for one in (*self.gauges, *self.encoders))
+
+
+def with_measured_noise(settings: CellSettings, measured: MeasuredNoise) -> CellSettings:
+    """The settings of a cell with what was measured in the place of what they state."""
+    gauges: Point = tuple(one.record for one in measured.gauges)  # type: ignore[assignment]
+    encoders: SixNumbers = tuple(one.record for one in measured.encoders)  # type: ignore[assignment]
+    noise = settings.noise.model_copy(update={"gauges_mm": gauges, "encoders": encoders})
+    seconds = TimeModel.of(settings).record_seconds + averaging_seconds(settings, measured.windows)
+    return settings.model_copy(
+        update={
+            "noise": noise,
+            "uncertainty": _with_repeatability(settings, measured),
+            "identification": settings.identification.model_copy(update={"seconds_per_record": seconds}),
+        }
+    )
+
+
+def averaging_seconds(settings: CellSettings, windows: int) -> float:
+    """How much longer a record takes that is the mean of some windows."""
+    return (windows - 1) * settings.timing.window_s
+
+
+def _with_repeatability(settings: CellSettings, measured: MeasuredNoise) -> object:
+    """The section of systematic effects; stops that were measured are in the noise of the records."""
+    stated, approaches = settings.uncertainty, measured.approaches
+    if approaches is None or approaches.source is not ScatterSource.JOINTS:
+        return stated
+    key = repeatability_key(approaches.unit)
+    sources = stated.sources | {key: f"{approaches.visits} visits of the first reference"}
+    return stated.model_copy(
+        update={
+            key: 1e3 * approaches.excess,
+            "stop_repeatability_acts": "at work",
+            "sources": sources,
+        }
+    )

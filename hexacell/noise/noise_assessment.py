@@ -1,0 +1,214 @@
+"""From a series at standstill and visits of one pose to the noise that a run counts with.
+
+The stated noise is that of a record, of everything that differs from record to record. A standstill shows
+the part from reading to reading alone, so that it is a lower limit: it replaces what is stated only where
+it is significantly larger. The visits show the whole. What they show beyond the stated noise is added to
+its source. Where the cell file allows it, less than stated counts as well, by the upper limit of what the
+visits show.
+
+The mean of more readings is better in the part from reading to reading, and in no other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.campaign.planner import Plan
+from hexacell.identification.problem.problem import Noise
+from hexacell.kinematics.parameters import JointUnit
+from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.sensitivity import position_sensitivity
+from hexacell.noise.approach_scatter import ApproachScatter, approach_scatter
+from hexacell.noise.averaging import WINDOWS, AveragingForecaster, worthwhile_windows
+from hexacell.noise.measured_noise import InstrumentNoise, MeasuredNoise, RepeatedApproaches
+from hexacell.noise.standstill import SIGNIFICANCE, ReadingNoise, reading_noise
+
+INSTRUMENTS = 9
+"""Three gauges and six encoders, which share the significance of one test."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NoiseReadings:
+    """What was read at the first reference.
+
+    Attributes:
+        reference: its pose, in the controller's frames.
+        series: readings at standstill (n, 9), mm: gauges x, y, z, then the encoders; n may be zero.
+        steps: of their displays (9,), mm.
+        visits: means of the settled windows at each visit (m, 9), mm, the first one included.
+        window_readings: readings in a window.
+    """
+
+    reference: Pose
+    series: Array
+    steps: Array
+    visits: Array
+    window_readings: int
+
+
+def assess_noise(plan: Plan, readings: NoiseReadings) -> MeasuredNoise:
+    """The noise of the records that a plan is carried out with from now on."""
+    return _NoiseAssessment(plan, readings).result()
+
+
+def visits_agree(plan: Plan, readings: NoiseReadings) -> bool:
+    """Whether the noise of a plan's robot, or of the readings at rest, explains the visits so far."""
+    scatter = _NoiseAssessment(plan, readings).scatter
+    return scatter is None or scatter.source is None
+
+
+@dataclass(frozen=True, eq=False)
+class _NoiseAssessment:
+    """The parts of one assessment; arrays (9,) have gauges x, y, z, then the encoders."""
+
+    plan: Plan
+    readings: NoiseReadings
+
+    @cached_property
+    def stated(self) -> Array:
+        """The stated noise of a record (9,), mm."""
+        noise = self.plan.robot.noise
+        return np.concatenate([noise.gauges_mm, noise.encoders])
+
+    @cached_property
+    def reading_noise(self) -> tuple[ReadingNoise, ...]:
+        """What the series shows of each instrument; empty without a series."""
+        series, steps = self.readings.series, self.readings.steps
+        if not len(series):
+            return ()
+        return tuple(
+            reading_noise(values, float(step)) for values, step in zip(series.T, steps, strict=True)
+        )
+
+    def result(self) -> MeasuredNoise:
+        scatter = self.scatter
+        by_windows = {windows: self._of_records(scatter, windows) for windows in WINDOWS}
+        forecaster = AveragingForecaster(self.plan)
+        forecasts = forecaster.forecasts({windows: self._noise(one) for windows, one in by_windows.items()})
+        windows = worthwhile_windows(forecasts, self.plan.settings.noise.averaged_windows)
+        instruments = self._instruments(by_windows[windows])
+        x, y, z = instruments[:3]
+        return MeasuredNoise(
+            gauges=(x, y, z),
+            encoders=tuple(instruments[3:]),
+            approaches=scatter and _approaches(scatter, self._unit_of(scatter)),
+            windows=windows,
+            forecasts=forecasts,
+            encoders_part_mm=forecaster.encoders_part(self._noise(by_windows[1])),
+        )
+
+    @property
+    def scatter(self) -> ApproachScatter | None:
+        """What the visits show beyond the larger of stated noise and that of the readings."""
+        robot, visits, least = self.plan.robot, self.readings.visits, self._at_least(self.stated)
+        commands = robot.from_commands([self.readings.reference])
+        joints = robot.mechanism.inverse(robot.commanding, robot.branch, commands)
+        _, by_joints = position_sensitivity(robot.mechanism, robot.commanding, commands, joints)
+        in_base = robot.frames.base.T @ by_joints[0]
+        return approach_scatter(visits[:, :3], visits[:, 3:], in_base, least[3:], least[:3])
+
+    def _of_records(self, scatter: ApproachScatter | None, windows: int) -> Array:
+        """The noise (9,) of records that are means of some windows."""
+        one = self._with_excess(self._at_least(self._allowed(scatter)), scatter)
+        if not self.reading_noise or windows == 1:
+            return one
+        count = self.readings.window_readings
+        first, mean = (
+            np.array([noise.of_mean(number) for noise in self.reading_noise])
+            for number in (count, windows * count)
+        )
+        several: Array = np.sqrt(np.maximum(one**2 - first**2, 0.0) + mean**2)
+        return several
+
+    def _at_least(self, sigma: Array) -> Array:
+        """Noise (9,) that is no smaller than that of the readings, where these prove it larger."""
+        if not self.reading_noise:
+            return sigma
+        count = self.readings.window_readings
+        significance = SIGNIFICANCE / INSTRUMENTS
+        larger = [
+            noise.of_mean(count) if noise.exceeds(mm, count, significance) else mm
+            for noise, mm in zip(self.reading_noise, sigma.tolist(), strict=True)
+        ]
+        return np.array(larger)
+
+    def _allowed(self, scatter: ApproachScatter | None) -> Array:
+        """The stated noise (9,), or less where the cell file allows it and the visits prove it."""
+        is_allowed = self.plan.settings.noise.figures == "measured"
+        if not is_allowed or scatter is None or scatter.source is not None:
+            return self.stated
+        return self.stated * min(scatter.ratio_at_most, 1.0)
+
+    def _with_excess(self, sigma: Array, scatter: ApproachScatter | None) -> Array:
+        """Noise (9,) with what does not repeat."""
+        if scatter is None or scatter.source is None:
+            return sigma
+        return np.asarray(np.hypot(sigma, scatter.excess * scatter.source.instruments))
+
+    def _noise(self, sigma: Array) -> Noise:
+        return self.plan.robot.noise.with_devices(sigma[3:].tolist(), sigma[:3].tolist())
+
+    @property
+    def joint_unit(self) -> JointUnit:
+        return self.plan.robot.mechanism.words.joint_unit
+
+    def _unit_of(self, scatter: ApproachScatter) -> JointUnit:
+        """That of its excess: gauges show mm."""
+        of_gauge = scatter.source is None or scatter.source.instruments[:3].any()
+        return JointUnit.MM if of_gauge else self.joint_unit
+
+    def _instruments(self, records: Array) -> Sequence[InstrumentNoise]:
+        gauges = sorted(self.plan.settings.gauges, key=lambda gauge: gauge.axis)
+        names = [*(f"gauge {one.name}" for one in gauges), *(f"encoder {leg}" for leg in range(1, 7))]
+        larger = self._at_least(self.stated) > self.stated
+        found = self.reading_noise or (None,) * len(names)
+        units = [JointUnit.MM] * 3 + [self.joint_unit] * 6
+        rows = zip(
+            names, units, found, self.stated.tolist(), larger.tolist(), records.tolist(), strict=True
+        )
+        return [
+            _instrument(name, unit, noise, stated, is_noisier=noisier, record=record)
+            for name, unit, noise, stated, noisier, record in rows
+        ]
+
+
+def _instrument(
+    name: str,
+    unit: JointUnit,
+    found: ReadingNoise | None,
+    stated: float,
+    *,
+    is_noisier: bool,
+    record: float,
+) -> InstrumentNoise:
+    if found is None:
+        return InstrumentNoise(name=name, unit=unit, stated=stated, record=record)
+    return InstrumentNoise(
+        name=name,
+        unit=unit,
+        reading=found.sigma,
+        degrees_of_freedom=found.degrees_of_freedom,
+        drift=found.drift,
+        outliers=found.outliers,
+        correlation=found.correlation,
+        stated=stated,
+        is_noisier=is_noisier,
+        record=record,
+    )
+
+
+def _approaches(scatter: ApproachScatter, unit: JointUnit) -> RepeatedApproaches:
+    return RepeatedApproaches(
+        visits=scatter.visits,
+        degrees_of_freedom=scatter.degrees_of_freedom,
+        ball_mm=scatter.ball_mm,
+        ratio=scatter.ratio,
+        source=scatter.source,
+        unit=unit,
+        excess=scatter.excess,
+    )

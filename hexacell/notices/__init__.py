@@ -1,1 +1,0 @@
-"""Notices of runs that nobody watched: kept on the disk until who is to be told has them."""

@@ -1,1 +1,0 @@
-"""Reports of a result: its assessment, findings in sentences, JSON documents."""

@@ -1,0 +1,1 @@
+"""The results of runs as data, for the journal and for files."""

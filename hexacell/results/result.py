@@ -1,0 +1,178 @@
+"""The result of an identification as data, for files and for the journal.
+
+The acceptance gates and the write-back are derived from it without further computation.
+"""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Any, Self
+
+import numpy as np
+from pydantic import Field
+
+from hexacell.cell.fields import Frozen, GeometryDocument
+from hexacell.identification.identified_zeros import IdentifiedZeros, ParameterChoice
+from hexacell.identification.solver.chi_square import ChiSquareTest
+from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.solver.result import (
+    DataFault,
+    DataFaultKind,
+    GeometryEstimate,
+    Identification,
+)
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import ParameterSet
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import Deviation, RecordId
+from hexacell.results.length_result import LengthResult
+
+
+class OutlierRecord(Frozen):
+    """A record that was left out.
+
+    ``gauges`` are those that alone are wrong, and ``off_mm`` what the gauges x, y and z show too much.
+    """
+
+    point: int
+    orientation: int
+    kind: DataFaultKind = DataFaultKind.GROSS_ERROR
+    gauges: tuple[str, ...] = ()
+    off_mm: Deviation | None = None
+
+    @classmethod
+    def of(cls, record: RecordId, fault: DataFault) -> Self:
+        """A record and its fault; the gauges of a zero shift are named in its finding only."""
+        point, orientation = record
+        gauges = () if fault.kind is DataFaultKind.ZERO_SHIFT else tuple(fault.gauges)
+        return cls(
+            point=point, orientation=orientation, kind=fault.kind, gauges=gauges, off_mm=fault.offset_mm
+        )
+
+
+class IdentificationResult(Frozen):
+    """The identified geometry and its uncertainty: the first part of ``result.json``.
+
+    ``expected_chi2`` is the mean of ``chi2`` if model and noise are right, where an earlier result, or the
+    tolerances of what is held, take part in the estimate; where only the drawing does, it is none, and that
+    mean is ``dof``. ``identifies`` says which parameters are identified; the others are as the controller
+    has them, with their tolerances as sigma.
+    """
+
+    converged: bool
+    termination: Termination
+    iterations: int
+    records: int
+    points: int
+    residual_rms_mm: float
+    chi2: float
+    dof: int
+    geometry: GeometryDocument
+    sigma: GeometryDocument
+    covariance: tuple[tuple[float, ...], ...]
+    undetermined: tuple[str, ...]
+    outliers: tuple[OutlierRecord, ...]
+    frame: str
+    expected_chi2: float | None = None
+    identifies: ParameterChoice = ParameterChoice.ALL
+
+    @classmethod
+    def of(cls, found: Identification, zeros: IdentifiedZeros | None = None) -> Self:
+        """What is kept of an identification, or of the zeros alone."""
+        parameters, told = found.geometry.parameters, zeros or found
+        return cls(
+            converged=found.converged,
+            termination=found.termination,
+            iterations=found.solution.iterations,
+            records=found.records,
+            points=found.points,
+            residual_rms_mm=found.residual_rms_mm,
+            chi2=found.goodness.chi2,
+            dof=found.dof,
+            geometry=parameters.document(told.geometry.vector),
+            sigma=parameters.document(told.sigma),
+            covariance=told.covariance.tolist(),
+            undetermined=told.undetermined,
+            outliers=tuple(OutlierRecord.of(record, fault) for record, fault in found.left_out),
+            frame=found.problem.mechanism.convention.name,
+            expected_chi2=found.goodness.expected if found.problem.prior.is_estimate or zeros else None,
+            identifies=ParameterChoice.ALL if zeros is None else ParameterChoice.ZEROS,
+        )
+
+    def document(self, parameters: ParameterSet) -> dict[str, Any]:
+        """The same as JSON has it, with a row for each of the ``parameters``."""
+        return self.model_dump(mode="json") | {"parameters": self._parameter_rows(parameters)}
+
+    def _parameter_rows(self, parameters: ParameterSet) -> list[dict[str, Any]]:
+        """Value and standard deviation of every parameter, in the order of the covariance."""
+        values, sigmas = parameters.vector(self.geometry), parameters.vector(self.sigma)
+        return [
+            {
+                "name": parameter.name,
+                "kind": parameter.kind.symbol,
+                "leg": parameter.leg,
+                "unit": parameter.kind.unit.value,
+                "value": value,
+                "sigma": sigma,
+            }
+            for parameter, value, sigma in zip(
+                parameters.parameters, values.tolist(), sigmas.tolist(), strict=True
+            )
+        ]
+
+    def estimate(self, parameters: ParameterSet) -> GeometryEstimate:
+        """What the acceptance gates need."""
+        covariance = np.array(self.covariance)
+        return GeometryEstimate(
+            self.identified(parameters), covariance, self.termination, self.undetermined
+        )
+
+    @property
+    def residuals(self) -> ChiSquareTest:
+        """The chi-square test of the residuals."""
+        return ChiSquareTest(
+            self.chi2, float(self.dof) if self.expected_chi2 is None else self.expected_chi2
+        )
+
+    def identified(self, parameters: ParameterSet) -> Geometry:
+        """The geometry in the mechanism's frame convention."""
+        return Geometry.of(parameters, self.geometry)
+
+
+class ExpectedImprovement(Frozen):
+    """The largest position error over the task poses, mm.
+
+    Attributes:
+        now_mm: of the controller's geometry, as the identification has it.
+        expanded_mm: U of the identified geometry.
+    """
+
+    now_mm: float
+    expanded_mm: float
+
+
+class AcceptedResult(Frozen):
+    """A result whose geometry the controller has: it passed, or a person kept it.
+
+    Attributes:
+        run: the folder of its run.
+        at: when that ended.
+        covariance: of the parameters, mm^2, in the mechanism's frame convention.
+        effects: what one unit of each cause of a systematic effect did to the free parameters: by the
+            name of the effect, a row a cause.
+        length: what the length check of its run found; none without one.
+        leg_temperatures_c: mean temperature of each leg while the geometry was measured; none of a leg
+            without a thermometer that answered; empty in older runs.
+    """
+
+    run: str
+    at: datetime
+    covariance: tuple[tuple[float, ...], ...]
+    effects: dict[str, tuple[tuple[float, ...], ...]] = Field(default_factory=dict)
+    length: LengthResult | None = None
+    leg_temperatures_c: tuple[float | None, ...] = ()
+
+    @property
+    def parameter_columns(self) -> dict[str, Array]:
+        """The same as errors (p, k) of the free parameters."""
+        return {name: np.array(rows).T for name, rows in self.effects.items()}

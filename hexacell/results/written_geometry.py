@@ -1,0 +1,84 @@
+"""The geometry as it is written to the controller, and what must be taught anew because of it.
+
+An identified geometry may be written in any frames that its parameters can express. Points, work frames and
+tool frames were taught with an earlier geometry. The one written is in the frames in which the task poses
+move least against that (:mod:`~hexacell.identification.diagnostics.frame_choice`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hexacell.campaign.task_accuracy import Task
+from hexacell.cell.fields import Frozen
+from hexacell.cell.measuring import AcceptanceSettings
+from hexacell.cell.model import CellSettings
+from hexacell.identification.diagnostics.frame_choice import choose_frames
+from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
+from hexacell.identification.identified_zeros import ParameterChoice
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.robot.model import Robot
+
+
+class TaskDisplacement(Frozen):
+    """How far a new geometry moves taught points and frames: task poses at equal joint variables.
+
+    Attributes:
+        position_mm, orientation_deg: the largest of the task poses.
+        poses: how many of these both geometries reach.
+        is_within_limits: whether both are within the limits of the errors there, so that nothing need be
+            taught anew.
+    """
+
+    position_mm: float
+    orientation_deg: float
+    poses: int
+    is_within_limits: bool
+
+    @classmethod
+    def of(cls, moved: PoseErrors, limits: AcceptanceSettings) -> TaskDisplacement | None:
+        """Of n poses; none without any."""
+        if not len(moved.angles):
+            return None
+        distance, angle = moved.position_largest_mm, moved.orientation_largest_deg
+        return cls(
+            position_mm=distance,
+            orientation_deg=angle,
+            poses=len(moved.angles),
+            is_within_limits=distance <= limits.position_mm and angle <= limits.orientation_deg,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WrittenGeometry:
+    """A geometry in the frames in which a controller gets it.
+
+    ``displacement`` is none where no task pose tells it, or no frames were chosen.
+    """
+
+    geometry: Geometry
+    displacement: TaskDisplacement | None
+
+
+def as_written(settings: CellSettings, robot: Robot, identified: Geometry) -> WrittenGeometry:
+    """What the controller gets of an ``identified`` geometry in the mechanism's frame convention.
+
+    With zeros alone it keeps its frames: other ones would change all its numbers.
+    """
+    if robot.taught is None or robot.identifies is not ParameterChoice.ALL:
+        return WrittenGeometry(robot.for_controller(identified), None)
+    choice = choose_frames(
+        robot.mechanism,
+        robot.branch,
+        taught=robot.taught,
+        new=identified,
+        poses=_task_commands(settings, robot),
+    )
+    return WrittenGeometry(choice.geometry, TaskDisplacement.of(choice.displacement, settings.acceptance))
+
+
+def _task_commands(settings: CellSettings, robot: Robot) -> PoseBatch:
+    """The task poses, as they are commanded."""
+    task = Task.of(settings, robot, robot.belief())
+    return robot.frames.inverse().poses(task.poses)

@@ -1,0 +1,382 @@
+"""The model of one robot: what the cell file and the controller's config state together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hexacell.cell.fields import GeometryDocument
+from hexacell.cell.loader import Cell
+from hexacell.cell.model import CellSettings
+from hexacell.config.interface import ControllerGeometry, ControllerLimits
+from hexacell.config.layout import ConfigLayout, FormatOfFile
+from hexacell.config.linuxcnc_limits import limits_of_ini
+from hexacell.errors import FileError, UsageError
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
+from hexacell.identification.identified_zeros import (
+    HeldParameters,
+    IdentifiedZeros,
+    ParameterChoice,
+    zero_columns,
+)
+from hexacell.identification.problem.build import build_problem
+from hexacell.identification.problem.commanded_poses import CommandingGeometry
+from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances
+from hexacell.identification.solver.result import GeometryEstimate, Identification
+from hexacell.kinematics.commanded_motion import CommandedRobot
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
+from hexacell.kinematics.parameters import ParameterSet
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.refused_commands import RefusedCommands
+from hexacell.kinematics.rotations import Array
+from hexacell.limits.limits import Limits
+from hexacell.measurements.records import MeasurementSet
+from hexacell.plugins import Group, load
+from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.stated_limits import stated_limits
+from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.record_effects import RecordEffects
+
+FARTHEST_DRAWING = 0.25
+"""Of the largest number of a config, that the drawing may be away from it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A mechanism, its drawing, and the geometry that its controller commands with.
+
+    ``controller`` is as the config states it, in the config's own frames, ``drawing`` in those in which
+    its tolerances hold; all that is computed is in the mechanism's frame convention.
+
+    Attributes:
+        frames: from the controller's frames to the convention's.
+        provisional: geometries, in the frame convention, that the controller commanded with for a time
+            while measuring.
+        uses_provisional: whether it commands with the last of them now.
+        known: what is known before measuring, if that is more than the drawing with its tolerances.
+        known_effects: what the systematic effects did to that, as errors (p, k) of the free parameters by
+            the name of the effect.
+        taught: the geometry with which points and frames were taught last, in the frames of that time; none
+            in runs of before there was a choice of frames, which wrote a geometry in the convention's.
+        earlier: geometries that may have commanded older records: the drawing, the taught one, and those
+            that the controller had before in the same run.
+        work_frame: the axes of the controller's base frame about which a work frame can be taught.
+        effects: systematic ones, as they are stated of the machine.
+        refused: commands that the controller refused in this run, and those that a person took out.
+        identifies: which parameters are identified.
+    """
+
+    mechanism: Mechanism
+    drawing: Geometry
+    controller: Geometry
+    branch: Branch
+    tolerances: Tolerances
+    noise: Noise
+    limits: Limits
+    frames: FrameTransform
+    provisional: tuple[Geometry, ...] = ()
+    uses_provisional: bool = False
+    known: Prior | None = None
+    known_effects: Mapping[str, Array] = field(default_factory=dict)
+    taught: Geometry | None = None
+    earlier: tuple[CommandingGeometry, ...] = ()
+    work_frame: str = "xyz"
+    effects: tuple[Effect, ...] = ()
+    refused: RefusedCommands = field(default_factory=RefusedCommands)
+    identifies: ParameterChoice = ParameterChoice.ALL
+
+    @cached_property
+    def _commanding_as_written(self) -> CommandingGeometry:
+        """The controller's config, whose frames its commands are in."""
+        return CommandingGeometry.of(self.mechanism, self.controller)
+
+    @cached_property
+    def commanding(self) -> Geometry:
+        """What the controller commands with now, in the frame convention."""
+        if self.uses_provisional:
+            return self.provisional[-1]
+        return self._commanding_as_written.geometry
+
+    @property
+    def free_parameters(self) -> Array:
+        """Those (p,) of that geometry, mm."""
+        return self.mechanism.convention.free_parameters(self.commanding)
+
+    def commanded(self, actual: Geometry) -> CommandedRobot:
+        """This robot under its controller, with an ``actual`` geometry in the convention's frames."""
+        return CommandedRobot(self.mechanism, self.branch, self.commanding, actual)
+
+    @cached_property
+    def prior(self) -> Prior:
+        """What is known before measuring."""
+        if self.known is not None:
+            return self.known
+        return Prior.of(self.mechanism, self.drawing, self.tolerances)
+
+    def tolerance_violations(self, found: GeometryEstimate) -> tuple[ToleranceViolation, ...]:
+        """The parameters of an estimate that are outside the drawing's tolerances."""
+        return tolerance_violations(found, self.mechanism, self.drawing, self.tolerances)
+
+    def identified_zeros(self, found: Identification) -> IdentifiedZeros | None:
+        """The zeros by an identification's records, where these alone are identified."""
+        if self.identifies is ParameterChoice.ALL:
+            return None
+        return IdentifiedZeros.of(found, self.controller)
+
+    @cached_property
+    def held(self) -> HeldParameters | None:
+        """What is not identified; none where all is."""
+        if self.identifies is ParameterChoice.ALL:
+            return None
+        return HeldParameters(zero_columns(self.mechanism, self.controller), self.prior.covariance)
+
+    @cached_property
+    def unknowns(self) -> int:
+        """How many parameters are identified."""
+        if self.identifies is ParameterChoice.ALL:
+            return len(self.mechanism.convention.free_names())
+        return int(zero_columns(self.mechanism, self.controller).shape[1])
+
+    def problem(self, measurements: MeasurementSet, before: Problem | None = None) -> Problem:
+        """The identification problem of records that were commanded with the controller's geometries.
+
+        It takes less time with the problem ``before`` of some of these records.
+        """
+        return build_problem(
+            self.mechanism,
+            measurements,
+            controller=self._commanding_as_written,
+            branch=self.branch,
+            prior=self.prior,
+            noise=self.noise,
+            provisional=self.provisional,
+            earlier=self.earlier,
+            systematic=RecordEffects(self.effects),
+            unknowns=self.unknowns,
+            before=before,
+        )
+
+    def belief(self, identified: Identification | None = None) -> RobotBelief:
+        """What is known of the robot: by an identification, or by its drawing alone."""
+        prior = self.prior
+        free, covariance = prior.free, prior.covariance
+        if identified is not None:
+            free, covariance = identified.free, identified.free_covariance
+        return RobotBelief(
+            self.mechanism,
+            self.commanding,
+            self.branch,
+            free,
+            covariance,
+            self.noise.along(self.frames.base),
+            self.limits,
+            self.frames.base[:, ["xyz".index(axis) for axis in self.work_frame]].T,
+            self.refused,
+        )
+
+    def with_errors_of(self, settings: CellSettings) -> Robot:
+        """The robot with the noise and the systematic effects that some settings state."""
+        return replace(self, noise=noise_of(settings), effects=stated_effects(settings))
+
+    def for_controller(self, geometry: Geometry) -> Geometry:
+        """A geometry in the convention's frames, in the frames of the controller's config."""
+        return self.mechanism.change_frames(geometry, self.frames.inverse())
+
+    def with_controller(self, written: Geometry) -> Robot:
+        """The robot once its controller has a ``written`` geometry, in frames of that geometry's own."""
+        own = self._commanding_as_written.geometry
+        before = (CommandingGeometry(one, self.frames) for one in (own, *self.provisional))
+        frames = self.mechanism.normalize_frames(written)[1]
+        return replace(
+            self,
+            controller=written,
+            frames=frames,
+            limits=replace(self.limits_with(written), frames=frames),
+            provisional=(),
+            uses_provisional=False,
+            earlier=(*before, *self.earlier),
+        )
+
+    def with_provisional(self, geometry: Geometry, *, is_used: bool = True) -> Robot:
+        """The robot once its controller was given a geometry in the convention's frames for a while.
+
+        It commands with it, unless it has its own back (``is_used`` is false).
+        """
+        commanding = self.for_controller(geometry) if is_used else self.controller
+        return replace(
+            self,
+            provisional=(geometry,),
+            uses_provisional=is_used,
+            limits=self.limits_with(commanding),
+        )
+
+    def limits_with(self, commanding: Geometry) -> Limits:
+        """The limits where the controller has a geometry, in its own frames."""
+        return self.limits.with_zeros(joint_zeros(self.mechanism, commanding))
+
+    def from_commands(self, commands: Iterable[Pose]) -> PoseBatch:
+        """Poses (n) commanded in the controller's frames, in the convention's frames."""
+        return self.frames.poses(PoseBatch.of(commands))
+
+    def to_command(self, pose: Pose) -> Pose:
+        """A pose in the convention's frames, in the controller's frames."""
+        return self.frames.inverse().poses(PoseBatch.of([pose])).pose(0)
+
+
+def config_layout(settings: CellSettings) -> ConfigLayout:
+    """The readers and writers of the files of a cell's controller config.
+
+    Raises:
+        UsageError: there is no such format, its options are wrong, or it cannot be one of several.
+    """
+    controller, parameters = settings.controller, settings.mechanism.parameters
+    is_part = bool(controller.further_files)
+    files = [(controller.config_format, controller.config_options)]
+    files += [(one.config_format, one.config_options) for one in controller.further_files]
+    formats = (_format_of(*file, parameters, is_part=is_part) for file in files)
+    return ConfigLayout(parameters, tuple(formats))
+
+
+def _format_of(
+    name: str, options: Mapping[str, Any], parameters: ParameterSet, *, is_part: bool
+) -> FormatOfFile:
+    factory = load(Group.CONFIG_FORMATS, name)
+    if not is_part:
+        return FormatOfFile(name, factory(parameters, options))
+    if not hasattr(factory, "read_part"):
+        raise UsageError(
+            f"the config format '{name}' cannot have a part of the geometry only",
+            action="Remove [[controller.further_files]], or use another format",
+        )
+    return FormatOfFile(name, factory(parameters, options, is_part=True))
+
+
+def controller_geometry(cell: Cell, *paths: Path) -> ControllerGeometry:
+    """What a cell's config states, or a copy of its files; with the limits of the INI file of the cell.
+
+    Raises:
+        FileError: one of the files is absent, or does not hold what it should.
+    """
+    found = config_layout(cell.settings).read(*(paths or cell.config_paths))
+    if (ini := cell.settings.limits.ini) is None:
+        return found
+    limits = limits_of_ini(cell.path.parent / ini, cell.settings.controller.unit_mm)
+    return replace(found, limits=found.limits.narrowed(limits))
+
+
+def robot_of(cell: Cell) -> Robot:
+    """The robot of a cell, with the geometry its controller's config holds now.
+
+    Raises:
+        FileError: the config, or that of the time of teaching, is absent or does not hold a geometry.
+    """
+    controller = controller_geometry(cell)
+    taught = config_layout(cell.settings).read(*cell.taught_paths)
+    if taught.branch != controller.branch:
+        raise FileError(
+            "its branch is not that of the controller's config, so it is not of this robot",
+            subject=cell.taught_path,
+            action="Copy the config there when you teach points and frames, or remove `taught`",
+        )
+    nominal = Geometry.of(cell.settings.mechanism.parameters, cell.settings.robot.nominal.model_dump())
+    for geometry, path in ((controller.geometry, cell.config_path), (taught.geometry, cell.taught_path)):
+        _require_frames(cell.settings.mechanism, geometry, path)
+    line = cell.document.line_of(("robot", "nominal"))
+    _require_frames(cell.settings.mechanism, nominal, cell.path, line)
+    _require_same_robot(cell, nominal, controller.geometry)
+    return make_robot(cell.settings, controller, taught=taught.geometry)
+
+
+def _require_frames(mechanism: Mechanism, geometry: Geometry, path: Path, line: int | None = None) -> None:
+    """Refuse a geometry whose joints do not fix a frame; raises ``FileError``."""
+    try:
+        mechanism.normalize_frames(geometry)
+    except UsageError as error:
+        raise FileError(
+            f"the geometry is no robot's: {error.problem}",
+            subject=path,
+            line=line,
+            action="Correct its joints",
+        ) from error
+
+
+def _require_same_robot(cell: Cell, drawing: Geometry, controller: Geometry) -> None:
+    """Refuse a drawing so far from the config that no calibration leads from one to the other.
+
+    Raises:
+        FileError: names the parameter that differs most.
+    """
+    mechanism = cell.settings.mechanism
+    units = mechanism.parameters.like_a_mm
+    drawn = mechanism.normalize_frames(drawing)[0].vector / units
+    commanding = mechanism.normalize_frames(controller)[0].vector / units
+    difference = np.abs(drawn - commanding)
+    worst = int(difference.argmax())
+    if difference[worst] > FARTHEST_DRAWING * np.abs(commanding).max():
+        parameter = mechanism.parameters.parameters[worst]
+        name, unit = mechanism.convention.display_name(parameter.name), parameter.kind.unit.shown
+        raise FileError(
+            f"the drawing is not of the robot in {cell.config_path}: {name} differs by "
+            f"{difference[worst]:.4g} {unit} once both are in the same frames",
+            subject=cell.path,
+            line=cell.document.line_of(("robot", "nominal")),
+            action="Correct [robot.nominal], or the config",
+        )
+
+
+def robot_of_start(
+    settings: CellSettings,
+    controller: GeometryDocument,
+    branch: Branch,
+    taught: GeometryDocument | None,
+    limits: ControllerLimits,
+) -> Robot:
+    """The robot of a cell's settings and of what its controller had at the start of a run."""
+    parameters = settings.mechanism.parameters
+    commanding = ControllerGeometry(Geometry.of(parameters, controller), branch, limits)
+    return make_robot(
+        settings, commanding, taught=None if taught is None else Geometry.of(parameters, taught)
+    )
+
+
+def noise_of(settings: CellSettings) -> Noise:
+    """The noise of a record that a cell's settings state."""
+    stated = settings.noise
+    alignment = float(np.radians(settings.stations.alignment_deg))
+    noise = Noise(stated.encoder, stated.gauge_mm, alignment, stated.gauge_scale)
+    if stated.encoders is None and stated.gauges_mm is None:
+        return noise
+    encoders, gauges = noise.encoders.tolist(), noise.gauges_mm.tolist()
+    return noise.with_devices(stated.encoders or encoders, stated.gauges_mm or gauges)
+
+
+def make_robot(
+    settings: CellSettings, controller: ControllerGeometry, *, taught: Geometry | None = None
+) -> Robot:
+    """The robot of a cell's settings and a controller geometry; ``taught`` as in :class:`Robot`."""
+    mechanism = settings.mechanism
+    nominal = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
+    drawn = CommandingGeometry.of(mechanism, nominal)
+    frames = mechanism.normalize_frames(controller.geometry)[1]
+    return Robot(
+        mechanism=mechanism,
+        drawing=nominal,
+        controller=controller.geometry,
+        branch=controller.branch,
+        tolerances=Tolerances.of_settings(mechanism.parameters, settings.tolerances.model_dump()),
+        noise=noise_of(settings),
+        limits=stated_limits(settings, controller, frames),
+        frames=frames,
+        taught=taught,
+        earlier=(drawn,) if taught is None else (drawn, CommandingGeometry.of(mechanism, taught)),
+        work_frame=settings.task.work_frame,
+        effects=stated_effects(settings),
+        identifies=(ParameterChoice.ZEROS if settings.identification.only_zeros else ParameterChoice.ALL),
+    )

@@ -1,0 +1,131 @@
+"""The limits of motion that a cell file states, as the mathematics uses them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hexacell.cell.limits import LimitSettings
+from hexacell.cell.model import CellSettings
+from hexacell.config.interface import ControllerGeometry, ControllerLimits
+from hexacell.errors import ReachError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.legs import Legs
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.limits.gauge_travel import GaugeTravel
+from hexacell.limits.joint_ranges import ZeroedRanges
+from hexacell.limits.leg_limits import LegLimits
+from hexacell.limits.limits import AxisLimits, Limits
+
+NO_CONE_DEG = 180.0
+
+
+def stated_limits(settings: CellSettings, controller: ControllerGeometry, frames: FrameTransform) -> Limits:
+    """The limits of a cell; ``frames`` are from the controller's to the convention's.
+
+    Those that the controller's config states hold as well.
+    """
+    limits = settings.limits
+    lowest, highest, told = _joint_ranges(settings, controller)
+    return Limits(
+        limits.gauge_travel_mm,
+        float(np.radians(limits.tilt_deg)),
+        lowest,
+        highest,
+        limits.singularity_margin,
+        frames,
+        float(np.radians(limits.turn_deg)),
+        _axis_limits(limits, controller.limits),
+        _leg_limits(settings, controller),
+        gauge_travel_of(settings),
+        told_joints=told,
+    )
+
+
+def gauge_travel_of(settings: CellSettings) -> GaugeTravel:
+    """The travels of a cell's gauges."""
+    x, y, z = sorted(settings.gauges, key=lambda gauge: gauge.axis)
+    return GaugeTravel(
+        settings.limits.gauge_travel_mm,
+        (x.travel_mm / 2.0, y.travel_mm / 2.0, z.travel_mm / 2.0),
+        (x.middle_coordinate_mm, y.middle_coordinate_mm, z.middle_coordinate_mm),
+        settings.stations.mounting_mm,
+    )
+
+
+def _joint_ranges(
+    settings: CellSettings, controller: ControllerGeometry
+) -> tuple[Array, Array, ZeroedRanges | None]:
+    """The narrowest of the stated ranges, (6,) lowest and (6,) highest, and what depends on the zeros."""
+    limits, told = settings.limits, controller.limits.joints
+    lowest, highest = np.full(6, limits.joint_min), np.full(6, limits.joint_max)
+    if limits.joints is not None:
+        low, high = np.transpose(limits.joints)
+        lowest, highest = np.maximum(lowest, low), np.minimum(highest, high)
+    if told is None:
+        return lowest, highest, None
+    zeroed = ZeroedRanges(lowest, highest, *np.transpose(told))
+    if not settings.controller.joints_include_zeros:
+        return *zeroed.at(np.zeros(6)), None
+    return *zeroed.at(joint_zeros(settings.mechanism, controller.geometry)), zeroed
+
+
+def _axis_limits(limits: LimitSettings, of_controller: ControllerLimits) -> AxisLimits:
+    both = of_controller.narrowed(ControllerLimits(axes=limits.axes.ranges))
+    ranges = [axis or (-np.inf, np.inf) for axis in both.axes or ()]
+    lowest, highest = zip(*ranges, strict=True)
+    return AxisLimits(lowest, highest)
+
+
+def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLimits | None:
+    """What passive joints and legs allow; none if the cell states nothing of them."""
+    stated, distance = settings.limits.passive_joints, settings.limits.leg_distance_mm
+    if distance == 0.0 and min(stated.base_cones + stated.platform_cones) >= NO_CONE_DEG:
+        return None
+    mechanism = settings.mechanism
+    drawing = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
+    legs = _legs_in_the_middle(settings, mechanism, drawing, controller.branch)
+    frames = mechanism.normalize_frames(drawing)[1]
+    base = _unit(legs.directions_in_carriers[0] if stated.base_axes is None else stated.base_axes)
+    platform = legs.directions_in_platform[0] if stated.platform_axes is None else stated.platform_axes
+    return LegLimits(
+        base @ frames.base.T if legs.carriers is None else base,
+        _unit(platform) @ frames.platform.T,
+        np.radians(stated.base_cones),
+        np.radians(stated.platform_cones),
+        distance,
+    )
+
+
+def _legs_in_the_middle(
+    settings: CellSettings, mechanism: Mechanism, drawing: Geometry, branch: Branch
+) -> Legs:
+    """The legs of the untilted robot as drawn in the middle of its points and task poses within reach."""
+    tasks = [pose[:3] for pose in settings.task.poses]
+    points = np.array([*settings.identification.points, *settings.verification.points, *tasks])
+    every = PoseBatch(points, np.broadcast_to(np.eye(3), (len(points), 3, 3)))
+    reached = points[np.isfinite(mechanism.inverse(drawing, branch, every)).all(axis=-1)]
+    if not len(reached):
+        raise _no_axes("the robot as drawn reaches none of the points of this cell")
+    # The median: one point that is far from the others hardly moves it.
+    middle = PoseBatch.at(np.median(reached, axis=0), np.eye(3)[None])
+    joints = mechanism.inverse(drawing, branch, middle)
+    if np.isnan(joints).any():
+        raise _no_axes(f"the robot as drawn cannot reach {middle.pose(0)}, the middle of all points")
+    return mechanism.legs(drawing, middle, joints)
+
+
+def _no_axes(problem: str) -> ReachError:
+    return ReachError(
+        f"the axes of the passive joints are not known: {problem}",
+        subject="[limits.passive_joints]",
+        action="State base_axes and platform_axes there, or correct the points",
+    )
+
+
+def _unit(vectors: ArrayLike) -> Array:
+    given = np.asarray(vectors, dtype=float)
+    unit: Array = given / np.linalg.norm(given, axis=-1, keepdims=True)
+    return unit

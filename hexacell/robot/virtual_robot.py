@@ -1,0 +1,198 @@
+"""Virtual robots: geometries drawn within the tolerances, moved by the real controller's geometry."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexacell.errors import LimitError, ReachError
+from hexacell.identification.problem.problem import Tolerances
+from hexacell.kinematics.commanded_motion import ActualPoses
+from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Mechanism, inverse_kinematics
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.sensitivity import singularity_margin
+from hexacell.measurements.records import Record, deviation_of, joints_of
+from hexacell.motion.trajectory import interpolate_line, trace_path
+from hexacell.robot.model import Robot
+
+PIECES = 24
+"""Pieces that a line is divided into."""
+
+LEAST_MARGIN_SHARE = 0.5
+"""Of the singularity margin that poses are chosen under; the actual robot may have less than estimated."""
+
+AS_DRAWN_MM = 1e-3
+"""A controller whose parameters differ less from the drawing has the drawing's geometry."""
+
+WEAR_SHARE = 0.1
+"""Of the tolerances: how far a robot may have drifted since it was calibrated."""
+
+
+class VirtualRobot:
+    """Goes where its controller commands it, on its own geometry, and answers with records.
+
+    Commands are poses in the controller's frames.
+
+    Attributes:
+        model: what is known of it: mechanism, commanding geometry, noise and limits.
+        truth: its geometry, in the mechanism's frame convention.
+        smallest_margin: the smallest singularity margin of the true geometry along all moves so far.
+    """
+
+    def __init__(self, model: Robot, truth: Geometry, random: np.random.Generator | None = None) -> None:
+        self.model = model
+        self.truth = truth
+        self.smallest_margin = np.inf
+        self._random = random or np.random.default_rng()
+        self._command: Pose | None = None
+        self._actual: PoseBatch | None = None
+        self._zero: Array | None = None
+
+    def actual_poses(self, commands: PoseBatch) -> ActualPoses:
+        """Where it would go for n commands in the convention's frames; itself it does not move."""
+        return self.model.commanded(self.truth).actual_poses(commands)
+
+    def margins(self, commands: PoseBatch) -> Array:
+        """Its singularity margins (n,) at n commands; 0 where it cannot go."""
+        actual, margins = self.actual_poses(commands), np.zeros(len(commands))
+        poses, joints = actual.poses[actual.found], actual.joints[actual.found]
+        margins[actual.found] = singularity_margin(self.model.mechanism, self.truth, poses, joints)
+        return margins
+
+    def can_take(self, commands: PoseBatch) -> Mask:
+        """Which of n commands in the convention's frames it can take, clear of singularities."""
+        can_take: Mask = self.margins(commands) >= self._least_margin
+        return can_take
+
+    def can_stand(self, commands: PoseBatch) -> Mask:
+        """Which of n commands it can take with its passive joints and legs within their limits."""
+        actual, stands = self.actual_poses(commands), self.can_take(commands)
+        poses, joints = actual.poses[stands], actual.joints[stands]
+        stands[stands] = self.model.limits.allow_legs(self.model.mechanism, self.truth, poses, joints)
+        return stands
+
+    def place(self, command: Pose) -> None:
+        """Set the robot to a command at once, without a check of the line.
+
+        Raises:
+            ReachError: it cannot take the command clear of singularities.
+        """
+        commands = self.model.from_commands([command])
+        actual = self.actual_poses(commands)
+        if not actual.found[0] or self._see_margin(actual.poses, actual.joints) < self._least_margin:
+            raise ReachError(f"this robot cannot reach {command}")
+        self._command, self._actual = command, actual.poses
+
+    def move(self, command: Pose) -> None:
+        """Move to a command along the controller's straight line.
+
+        Raises:
+            LimitError: it is not at any pose yet, or a singularity is on the line.
+            ReachError: the controller cannot reach a pose on the line.
+        """
+        end = self.model.from_commands([command])
+        line = interpolate_line(self._commanded, end, PIECES, self.model.frames)
+        joints = self._joints(line)
+        arguments = (line.reshape(-1, 1), joints[:, None], self._actual_pose)
+        traced, found = trace_path(self.model.mechanism, self.truth, *arguments)
+        if not found[0]:
+            raise LimitError("a singularity is on the line")
+        poses = traced.reshape(-1)
+        self._see_margin(poses, joints)
+        self._command, self._actual = command, poses[[-1]]
+
+    def load(self, model: Robot) -> None:
+        """Have the controller command with another geometry, that of ``model``; the joints stay.
+
+        Raises:
+            LimitError: no pose of that geometry belongs to the joint variables.
+        """
+        joints = self._joints(self._commanded)
+        found = continue_solution(
+            model.mechanism,
+            model.commanding,
+            joints,
+            start=self._commanded,
+            start_geometry=self.model.commanding,
+        )
+        if not found.found[0]:
+            raise LimitError("no pose of this geometry belongs to the joint variables")
+        self.model, self._command = model, model.to_command(found.poses.pose(0))
+
+    def zero_gauges(self) -> None:
+        """Zero the gauges: the next record is their zero."""
+        self._zero = None
+
+    def measure(self, point: int, orientation: int) -> Record:
+        """The record of the present pose, with noise.
+
+        Raises:
+            LimitError: it is not at any pose yet.
+        """
+        model = self.model
+        shown = model.frames.base.T @ self._actual_pose.positions[0]
+        shown = shown + model.noise.gauges_mm * self._random.standard_normal(3)
+        joints = self._joints(self._commanded)[0]
+        joints = joints + model.noise.encoders * self._random.standard_normal(6)
+        self._zero = shown if self._zero is None else self._zero
+        deviation = deviation_of(shown - self._zero)
+        return Record(point, orientation, self.command, joints_of(joints), deviation)
+
+    @property
+    def command(self) -> Pose:
+        """The present command, in the controller's frames."""
+        if self._command is None:
+            raise LimitError("the robot is not at any pose yet")
+        return self._command
+
+    @property
+    def _least_margin(self) -> float:
+        return LEAST_MARGIN_SHARE * self.model.limits.singularity_margin
+
+    def _joints(self, commands: PoseBatch) -> Array:
+        model = self.model
+        return inverse_kinematics(model.mechanism, model.commanding, model.branch, commands)
+
+    def _see_margin(self, poses: PoseBatch, joints: Array) -> float:
+        """The smallest singularity margin at some poses."""
+        margin = float(singularity_margin(self.model.mechanism, self.truth, poses, joints).min())
+        self.smallest_margin = min(self.smallest_margin, margin)
+        return margin
+
+    @property
+    def _commanded(self) -> PoseBatch:
+        return self.model.from_commands([self.command])
+
+    @property
+    def _actual_pose(self) -> PoseBatch:
+        if self._actual is None:
+            raise LimitError("the robot is not at any pose yet")
+        return self._actual
+
+
+def robots_within_tolerances(robot: Robot, count: int, seed: int) -> list[Geometry]:
+    """Geometries, each built with errors uniform within the tolerances, in the frame convention.
+
+    The errors are those of all parameters of the drawing, in its frames. A controller whose geometry is not
+    the drawing's was calibrated before. Then they are a share of the tolerances, about its geometry.
+    """
+    mechanism, tolerances = robot.mechanism, robot.tolerances
+    drawn, _ = mechanism.normalize_frames(robot.drawing)
+    is_as_drawn = robot.commanding.largest_difference(drawn) < AS_DRAWN_MM
+    centre = robot.drawing if is_as_drawn else robot.commanding
+    widths = tolerances if is_as_drawn else tolerances.scaled(WEAR_SHARE)
+    random = np.random.default_rng(seed)
+    return [random_robot(mechanism, centre, widths, random) for _ in range(count)]
+
+
+def random_robot(
+    mechanism: Mechanism, drawing: Geometry, tolerances: Tolerances, random: np.random.Generator
+) -> Geometry:
+    """A robot in the frame convention, built after a drawing with errors uniform within the tolerances."""
+    parameters = mechanism.parameters
+    widths = tolerances.widths(parameters)
+    ball = random.uniform(-tolerances.ball_mm, tolerances.ball_mm, 3) @ parameters.ball_offset
+    built = Geometry(parameters, drawing.vector + random.uniform(-widths, widths) + ball)
+    return mechanism.normalize_frames(built)[0]

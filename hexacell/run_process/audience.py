@@ -1,0 +1,212 @@
+"""Who is connected to a run: all are told everything, and one of them gives the commands."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import pwd
+from asyncio import StreamReader, StreamWriter
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from socket import socket
+
+from hexacell.errors import HexacellError, UsageError
+from hexacell.run_process.messages import (
+    LONGEST_MESSAGE,
+    ControlChanged,
+    GiveCommand,
+    HostFailed,
+    HostMessage,
+    Leave,
+    TakeControl,
+    client_message,
+    message_line,
+)
+from hexacell.run_process.outbox import STUCK_S, Outbox
+from hexacell.run_process.run_socket import peer_of
+from procedures.run.commands import Command
+
+
+@dataclass(eq=False)
+class _Client:
+    who: str
+    outbox: Outbox
+    leave: Leave | None = None
+
+
+@dataclass(eq=False)
+class AudienceEvents:
+    """What a host is told of its audience."""
+
+    on_command: Callable[[Command], None]
+    on_control: Callable[[], None]
+    """Somebody is in control now."""
+    on_leave: Callable[[bool], None]
+    """Who was in control has left; whether the run goes on."""
+    on_lost: Callable[[], None]
+    """Who was in control is gone without a word."""
+
+
+class Audience:
+    """The clients of one run.
+
+    The first one to come gives the commands, then whoever takes control explicitly; who comes when nobody
+    is in control gets it.
+
+    Args:
+        told: gives what a new client is told first, in order.
+        events: what to call.
+        stuck_s: see :class:`Outbox`.
+    """
+
+    def __init__(
+        self,
+        told: Callable[[], list[bytes]],
+        events: AudienceEvents,
+        stuck_s: float = STUCK_S,
+    ) -> None:
+        self.first_came = asyncio.Event()
+        self._told = told
+        self._events = events
+        self._stuck_s = stuck_s
+        self._clients: list[_Client] = []
+        self._in_control: _Client | None = None
+        self._serving: set[asyncio.Task[None] | None] = set()
+        self._latest: bytes | None = None
+        self._over = asyncio.Event()
+
+    @property
+    def is_controlled(self) -> bool:
+        """Whether somebody is in control."""
+        return self._in_control is not None
+
+    async def serve(self, reader: StreamReader, writer: StreamWriter) -> None:
+        """One connection, from its beginning to its end; that of another user is refused."""
+        process, user = peer_of(writer.get_extra_info("socket"))
+        outbox = Outbox(writer, self._stuck_s)
+        serving = asyncio.current_task()
+        self._serving.add(serving)
+        try:
+            if user == os.getuid():
+                await self._serve_client(reader, _Client(f"{_name_of(user)}, process {process}", outbox))
+        finally:
+            await outbox.end()
+            self._serving.discard(serving)
+
+    async def _serve_client(self, reader: StreamReader, client: _Client) -> None:
+        self._enter(client)
+        delivering = asyncio.ensure_future(client.outbox.deliver())
+        listening = asyncio.ensure_future(self._listen(reader, client))
+        try:
+            await asyncio.wait([delivering, listening], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._exit(client)
+            listening.cancel()
+            await self._end(client, delivering)
+
+    def tell(self, message: HostMessage) -> None:
+        """Tell all clients."""
+        line = message_line(message)
+        for client in self._clients:
+            client.outbox.put(line)
+
+    def tell_latest(self, message: HostMessage) -> None:
+        """Tell all clients who have been told everything else; the others get a later one."""
+        self._latest = message_line(message)
+        for client in self._clients:
+            client.outbox.offer(self._latest)
+
+    async def dismiss(self) -> None:
+        """Tell all clients what waits for them, and let them go."""
+        self._over.set()
+        for client in self._clients:
+            client.outbox.close()
+        if serving := [task for task in self._serving if task is not None]:
+            await asyncio.wait(serving)
+
+    def _enter(self, client: _Client) -> None:
+        for line in self._told():
+            client.outbox.put(line)
+        if self._latest is not None:
+            client.outbox.offer(self._latest)
+        self._clients.append(client)
+        if self._in_control is None:
+            self._give_control(client)
+        else:
+            self._tell_control(client)
+        self.first_came.set()
+
+    def _exit(self, client: _Client) -> None:
+        if client in self._clients:
+            self._clients.remove(client)
+        if client is not self._in_control:
+            return
+        self._in_control = None
+        for other in self._clients:
+            self._tell_control(other)
+        if client.leave is None:
+            self._events.on_lost()
+        else:
+            self._events.on_leave(client.leave.keep_running)
+
+    async def _end(self, client: _Client, delivering: asyncio.Task[None]) -> None:
+        client.outbox.close()
+        if client.leave is not None:
+            delivering.cancel()
+            if not client.leave.keep_running:  # the end of the connection tells that nothing is left
+                await self._over.wait()
+        with suppress(OSError, asyncio.CancelledError):
+            await delivering
+
+    async def _listen(self, reader: StreamReader, client: _Client) -> None:
+        """Take what the client says, until it leaves or is gone."""
+        with suppress(OSError, ValueError):  # one line was longer than any message
+            while (line := await reader.readline()).endswith(b"\n"):
+                try:
+                    self._take(line, client)
+                except HexacellError as refusal:
+                    failure = HostFailed(problem=refusal.problem, action=refusal.action or "")
+                    client.outbox.put(message_line(failure))
+                if client.leave is not None:
+                    return
+
+    def _take(self, line: bytes, client: _Client) -> None:
+        match client_message(line):
+            case GiveCommand(command=command):
+                if client is not self._in_control:
+                    raise UsageError(
+                        f"{type(command).__name__}: {self._who or 'nobody'} is in control of this run",
+                        action="Take control first",
+                    )
+                self._events.on_command(command)
+            case TakeControl():
+                self._give_control(client)
+            case Leave() as leave:
+                client.leave = leave
+
+    @property
+    def _who(self) -> str:
+        return "" if self._in_control is None else self._in_control.who
+
+    def _give_control(self, client: _Client) -> None:
+        self._in_control = client
+        for one in self._clients:
+            self._tell_control(one)
+        self._events.on_control()
+
+    def _tell_control(self, client: _Client) -> None:
+        changed = ControlChanged(is_in_control=client is self._in_control, who=self._who)
+        client.outbox.put(message_line(changed))
+
+
+async def audience_server(audience: Audience, listener: socket) -> asyncio.Server:
+    """The server of a run, on a socket that listens."""
+    return await asyncio.start_unix_server(audience.serve, sock=listener, limit=LONGEST_MESSAGE)
+
+
+def _name_of(user: int) -> str:
+    try:
+        return pwd.getpwuid(user).pw_name
+    except KeyError:
+        return f"user {user}"

@@ -1,0 +1,197 @@
+"""A connection to a run in another process, and how such a process is started."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+import tempfile
+from asyncio import StreamReader, StreamWriter
+from collections.abc import AsyncIterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
+from hexacell.errors import ExitCode, FileError, HexacellError
+from hexacell.run_process.messages import (
+    LONGEST_MESSAGE,
+    ClientMessage,
+    EventRecorded,
+    GiveCommand,
+    HostFailed,
+    HostMessage,
+    Leave,
+    TakeControl,
+    host_message,
+    message_line,
+)
+from hexacell.run_process.run_socket import peer_of
+from procedures.run import events
+from procedures.run.commands import Command
+
+READY = b"ready\n"
+"""What a host writes to its stdout when it listens; else it writes why it does not, as a message."""
+
+STOP_S = 0.4
+"""How long leaving waits for the end of a run that is to be stopped, s."""
+
+LET_GO_S = 5.0
+"""How long leaving waits until the run has heard that it is to go on, s. Whoever hangs up before may be
+taken for lost, because what is still unread goes with the connection, and the run pauses."""
+
+LOST = HostFailed(
+    problem="the connection to the run is lost: its process was killed, or let this terminal go",
+    action="Attach again. If nothing is there, look at the robot, whose last move may go on, and resume",
+    exit_code=int(ExitCode.HARDWARE),
+)
+
+
+class HostNotStarted(HexacellError):
+    """The process of a run could not begin; the exit code is that of the reason."""
+
+    def __init__(self, failure: HostFailed) -> None:
+        super().__init__(failure.problem, action=failure.action or None)
+        self.exit_code = ExitCode(failure.exit_code or ExitCode.FAULT)
+
+
+class HostConnection:
+    """A :class:`~hexacell.run_process.connection.RunConnection` over a socket."""
+
+    def __init__(self, reader: StreamReader, writer: StreamWriter) -> None:
+        self._reader = reader
+        self._writer = writer
+        self._is_left = False
+        self._goes_on_alone = False
+
+    async def messages(self) -> AsyncIterator[HostMessage]:
+        """See :meth:`RunConnection.messages`; a connection that is lost ends with a failure."""
+        is_told = False
+        with suppress(ConnectionError):
+            while (line := await self._reader.readline()).endswith(b"\n"):
+                if self._goes_on_alone:  # what it still says was on its way
+                    continue
+                message = host_message(line)
+                is_told = is_told or _is_ending(message)
+                yield message
+        self._writer.close()
+        if not is_told and not self._is_left:
+            yield LOST
+
+    async def give(self, command: Command) -> None:
+        """See :meth:`RunConnection.give`."""
+        await self._send(GiveCommand(command=command))
+
+    async def take_control(self) -> None:
+        """See :meth:`RunConnection.take_control`."""
+        await self._send(TakeControl())
+
+    async def leave(self, *, keep_running: bool) -> None:
+        """See :meth:`RunConnection.leave`; the run hangs up when it has heard, or when it has ended."""
+        self._is_left, self._goes_on_alone = True, keep_running
+        with suppress(HexacellError, TimeoutError):
+            await self._send(Leave(keep_running=keep_running))
+            await asyncio.wait_for(self._until_gone(), LET_GO_S if keep_running else STOP_S)
+        self._writer.close()
+
+    async def _send(self, message: ClientMessage) -> None:
+        try:
+            self._writer.write(message_line(message))
+            await self._writer.drain()
+        except OSError as error:
+            raise FileError(
+                "the run cannot be reached any more", action="Look at it with `hexacell history`"
+            ) from error
+
+    async def _until_gone(self) -> None:
+        """Until the other side has closed; somebody else may be reading what it says."""
+        while not self._reader.at_eof():  # noqa: ASYNC110 - a stream tells this to its only reader
+            await asyncio.sleep(0.01)
+
+
+def _is_ending(message: HostMessage) -> bool:
+    """Whether a message says that the run is over."""
+    match message:
+        case EventRecorded(event=events.Ended() | events.Interrupted()):
+            return True
+        case HostFailed(exit_code=int()):
+            return True
+        case _:
+            return False
+
+
+async def connect_to_run(path: Path) -> HostConnection | None:
+    """A connection to the run whose socket is there; none if there is no run.
+
+    Raises:
+        FileError: it is another user's.
+    """
+    try:
+        reader, writer = await asyncio.open_unix_connection(str(path), limit=LONGEST_MESSAGE)
+    except OSError:
+        return None
+    _, user = peer_of(writer.get_extra_info("socket"))
+    if user != os.getuid():
+        writer.transport.abort()
+        raise FileError("this run is another user's", subject=path, action="Remove the socket")
+    return HostConnection(reader, writer)
+
+
+async def start_host(
+    path: Path, arguments: Sequence[str], removed: RemovedPoses = NOTHING_REMOVED
+) -> HostConnection:
+    """Start ``hexacell host`` with these arguments, and connect to it; its socket is ``path``.
+
+    A new run goes without what is ``removed`` from its plan.
+
+    Raises:
+        HostNotStarted: the reason.
+    """
+    await asyncio.to_thread(_spawn, list(arguments), removed)
+    connection = await connect_to_run(path)
+    if connection is None:
+        raise HostNotStarted(HostFailed(problem="the run's process ended at once"))
+    return connection
+
+
+def _spawn(arguments: list[str], removed: RemovedPoses) -> None:
+    """Start the process and wait until it listens; it is no child of this one then."""
+    told, telling = os.pipe()
+    with (
+        tempfile.NamedTemporaryFile() as without,
+        tempfile.TemporaryFile() as errors,
+        os.fdopen(told, "rb") as answers,
+    ):
+        without.write(removed.model_dump_json().encode())
+        without.flush()
+        command = [sys.executable, "-m", "hexacell", "host", *arguments, "--removed", without.name]
+        try:
+            process = os.posix_spawn(
+                sys.executable, command, os.environ, file_actions=_streams(telling, errors), setsid=True
+            )
+        finally:
+            os.close(telling)
+        os.waitpid(process, 0)
+        answer = answers.readline()
+        if answer != READY:
+            raise HostNotStarted(_failure_in(answer, errors))
+
+
+def _streams(telling: int, errors: BinaryIO) -> list[tuple[int, ...] | tuple[int, int, str, int, int]]:
+    """Nothing to read, the answer on stdout, and messages of the interpreter in a file."""
+    return [
+        (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
+        (os.POSIX_SPAWN_DUP2, telling, 1),
+        (os.POSIX_SPAWN_DUP2, errors.fileno(), 2),
+    ]
+
+
+def _failure_in(answer: bytes, errors: BinaryIO) -> HostFailed:
+    with suppress(HexacellError):
+        message = host_message(answer)
+        if isinstance(message, HostFailed):
+            return message
+    errors.seek(0)
+    words = errors.read().decode(errors="replace").strip().splitlines()
+    problem = words[-1] if words else "its process ended without a word"
+    return HostFailed(problem=f"the run could not begin: {problem}", exit_code=int(ExitCode.FAULT))

@@ -1,0 +1,269 @@
+"""The process that an engine runs in: it tells its clients everything and obeys one of them.
+
+It outlives the terminal that began the run. If that is gone without a word, the run pauses after the record
+in progress and goes on when somebody who has attached says so. Where nobody does for the time that the
+cell file states, it ends in place and can be resumed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from socket import socket
+
+from hexacell.campaign.pose_list import pose_list_of
+from hexacell.errors import ExitCode, HexacellError, SeveralErrors
+from hexacell.run_process.audience import Audience, AudienceEvents, audience_server
+from hexacell.run_process.messages import (
+    EventRecorded,
+    HostFailed,
+    QuestionClosed,
+    QuestionOpened,
+    RunDescribed,
+    StatusChanged,
+    message_line,
+)
+from hexacell.run_process.outbox import STUCK_S
+from hexacell.run_process.run_device_watch import RunDeviceWatch
+from hexacell.services.run.calibration_run import RunRequest, calibrate
+from procedures.calibration.expected_records import expected_records
+from procedures.devices.device_set import Devices
+from procedures.engine.command_loop import Status
+from procedures.engine.engine import Engine
+from procedures.journal.journal import read_entries
+from procedures.journal.line_format import now
+from procedures.run import events
+from procedures.run.commands import Abort, Command, CommandQueue, Pause, Stop
+from procedures.run.questions import Question
+from procedures.run.state import RunState
+from procedures.run.steps import Compute
+
+FIRST_CLIENT_S = 30.0
+"""How long a host waits for who started it; nothing moves before."""
+
+ABORT_S = 0.2
+"""How long an abandoned computation may last that moves nothing and writes nothing but its result."""
+
+
+STOPPED = HostFailed(problem="stopped by who left it", exit_code=int(ExitCode.INTERRUPTED))
+
+_ONLY_COMPUTING = {"assess noise", "identify", "propose", "judge"}
+
+
+class RemoteOperator:
+    """A person who answers by commands; nobody else does."""
+
+    async def ask(self, question: Question) -> str | None:  # noqa: ARG002 - clients are told of it
+        """Wait for ever."""
+        await asyncio.Event().wait()
+        return None
+
+
+class RunHost:
+    """One run and its audience.
+
+    Args:
+        request: the run; its operator should be a :class:`RemoteOperator`.
+        queue: the commands of the engine.
+        away_s: how long the run waits for a person while nobody is in control, s; by default as the cell
+            file has it.
+        stuck_s: see :class:`~hexacell.run_process.outbox.Outbox`.
+    """
+
+    def __init__(
+        self,
+        request: RunRequest,
+        queue: CommandQueue,
+        *,
+        away_s: float | None = None,
+        stuck_s: float = STUCK_S,
+    ) -> None:
+        settings = request.cell.settings
+        self._watching = RunDeviceWatch(settings.gauges)
+        self._request = request
+        self._queue = queue
+        self._away_s = 60.0 * settings.recovery.away_minutes if away_s is None else away_s
+        self._audience = Audience(
+            self._told,
+            AudienceEvents(self._obey, self._on_control, self._on_leave, self._on_lost),
+            stuck_s,
+        )
+        self._lines: list[bytes] = [message_line(self._description())]
+        self._sequence = 0
+        self._status = Status.IDLE
+        self._question: Question | None = None
+        self._failure: HostFailed | None = None
+        self._last: events.Event | None = None
+        self._is_lost = False
+        self._giving_up: asyncio.TimerHandle | None = None
+        self._aborted = asyncio.Event()
+
+    async def serve(self, listener: socket) -> ExitCode:
+        """Carry out the run with who connects to ``listener``; how it ended.
+
+        The run begins when the first client has come, and does not if none does.
+        """
+        server = await audience_server(self._audience, listener)
+        try:
+            await asyncio.wait_for(self._audience.first_came.wait(), FIRST_CLIENT_S)
+        except TimeoutError:
+            return ExitCode.INTERRUPTED
+        else:
+            return await self._run_to_end()
+        finally:
+            server.close()
+
+    async def _run_to_end(self) -> ExitCode:
+        watching = asyncio.ensure_future(self._watch_devices())
+        running = asyncio.ensure_future(self._run())
+        aborting = asyncio.ensure_future(self._until_aborted(running))
+        try:
+            await asyncio.wait([running, aborting], return_when=asyncio.FIRST_COMPLETED)
+            if running.done():
+                return running.result()
+            self._fail(STOPPED)
+            return ExitCode.INTERRUPTED
+        finally:
+            self._watching.close()
+            for task in (watching, aborting, self._giving_up):
+                if task is not None:
+                    task.cancel()
+            await self._audience.dismiss()
+
+    async def _run(self) -> ExitCode:
+        request, live = self._request, self._watching.live
+        try:
+            ended = await calibrate(request, [self._record], self._queue, live, self._watch)
+        except HexacellError as error:
+            self._fail(failure_message(error))
+            return error.exit_code
+        except asyncio.CancelledError:
+            self._fail(STOPPED)
+            return ExitCode.INTERRUPTED
+        except Exception as error:
+            problem = f"this is a fault of the program: {type(error).__name__}: {error}"
+            self._fail(HostFailed(problem=problem, exit_code=int(ExitCode.FAULT)))
+            raise
+        return ExitCode(ended.exit_code)
+
+    def _fail(self, failure: HostFailed) -> None:
+        self._failure = failure
+        self._audience.tell(failure)
+
+    async def _until_aborted(self, running: asyncio.Future[ExitCode]) -> None:
+        """Ends a little after an abort, if all that is left of the run is a computation in a thread."""
+        await self._aborted.wait()
+        if not self._queue.is_attended:  # it has not begun
+            running.cancel()
+        await asyncio.wait([running], timeout=ABORT_S)
+        if not self._is_only_computing():
+            await asyncio.wait([running])
+
+    def _is_only_computing(self) -> bool:
+        match self._last:
+            case events.StepBegun(step=Compute(kind=kind)):
+                return kind in _ONLY_COMPUTING
+            case _:
+                return False
+
+    # What the engine says.
+
+    def _watch(self, engine: Engine, devices: Devices) -> None:
+        """Called with the engine before it begins: what happened before is told first."""
+        for entry in read_entries(self._request.folder.journal):
+            self._tell_event(EventRecorded(sequence=entry.number, at=entry.at, event=entry.event))
+        self._watching.follow(engine, devices)
+        engine.watch(self._on_status)
+        engine.watch_questions(self._on_question)
+
+    def _record(self, event: events.Event, _: RunState) -> None:
+        at = now()[0]
+        self._tell_event(EventRecorded(sequence=self._sequence + 1, at=at, event=event))
+
+    def _tell_event(self, recorded: EventRecorded) -> None:
+        self._sequence, self._last = recorded.sequence, recorded.event
+        self._lines.append(message_line(recorded))
+        self._audience.tell(recorded)
+        self._watching.note(recorded.event)
+
+    def _on_status(self, status: Status) -> None:
+        self._status = status
+        self._audience.tell(StatusChanged(status=status))
+        if self._is_lost and status is Status.RUNNING:
+            self._queue.put(Pause())
+        self._reconsider()
+
+    def _on_question(self, question: Question | None) -> None:
+        self._question = question
+        self._audience.tell(QuestionClosed() if question is None else QuestionOpened(question=question))
+        self._reconsider()
+
+    # What the audience does.
+
+    def _told(self) -> list[bytes]:
+        """What a new client is told first."""
+        present = [message_line(StatusChanged(status=self._status))]
+        if self._question is not None:
+            present.append(message_line(QuestionOpened(question=self._question)))
+        if self._failure is not None:
+            present.append(message_line(self._failure))
+        return [*self._lines, *present]
+
+    def _obey(self, command: Command) -> None:
+        self._queue.put(command)
+
+    def _on_control(self) -> None:
+        self._is_lost = False
+        self._reconsider()
+
+    def _on_leave(self, keep_running: bool) -> None:
+        if not keep_running:
+            self._queue.put(Abort(STOPPED.problem))
+            self._aborted.set()
+        self._reconsider()
+
+    def _on_lost(self) -> None:
+        self._is_lost = True
+        if self._status is Status.RUNNING:
+            self._queue.put(Pause())
+        self._reconsider()
+
+    # What follows from both.
+
+    def _reconsider(self) -> None:
+        """Count the time while the run waits and nobody is there."""
+        is_away = self._watching.is_waiting and not self._audience.is_controlled
+        if self._giving_up is not None and not is_away:
+            self._giving_up.cancel()
+            self._giving_up = None
+        elif self._giving_up is None and is_away:
+            loop = asyncio.get_running_loop()
+            self._giving_up = loop.call_later(self._away_s, self._give_up)
+
+    def _give_up(self) -> None:
+        self._queue.put(Stop(f"nobody was connected for {self._away_s / 60.0:g} minutes"))
+
+    async def _watch_devices(self) -> None:
+        async for snapshot in self._watching.snapshots():
+            self._audience.tell_latest(snapshot)
+
+    def _description(self) -> RunDescribed:
+        request = self._request
+        listed = pose_list_of(request.cell)
+        return RunDescribed(
+            cell=request.cell.settings.name,
+            cell_file=request.cell.path.absolute(),
+            folder=request.folder.path.absolute(),
+            mode=request.mode.value,
+            expected_records=expected_records(
+                request.cell.settings, request.mode, listed, length_check=request.length_check
+            ),
+        )
+
+
+def failure_message(error: HexacellError) -> HostFailed:
+    """An error that ends a run, as a message."""
+    if isinstance(error, SeveralErrors):
+        return HostFailed(problem=str(error), exit_code=int(error.exit_code))
+    plain = HexacellError(error.problem, subject=error.subject, line=error.line)
+    text = str(plain) if type(error).__str__ is HexacellError.__str__ else str(error)
+    return HostFailed(problem=text, action=error.action or "", exit_code=int(error.exit_code))

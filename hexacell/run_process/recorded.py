@@ -1,0 +1,200 @@
+"""A recorded run, watched again: a connection with a cursor in time."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Sequence
+from dataclasses import dataclass
+
+from hexacell.clock import CellClock
+from hexacell.errors import FileError, UsageError
+from hexacell.kinematics.pose import Pose
+from hexacell.run_process.messages import (
+    CursorMoved,
+    EventRecorded,
+    HostMessage,
+    QuestionClosed,
+    QuestionOpened,
+    RunDescribed,
+    StatusChanged,
+)
+from hexacell.runs.run_folder import RunFolder
+from procedures.engine.command_loop import Status
+from procedures.journal.journal import read_entries
+from procedures.journal.line_format import Entry
+from procedures.run import events
+from procedures.run.commands import Command
+from procedures.run.questions import ask_placement
+from procedures.run.state import fold
+from procedures.run.steps import Place
+
+LONGEST_WAIT_S = 60.0
+"""Of recorded time between two events: a run that was resumed the next day is not waited for."""
+
+
+@dataclass
+class _Cursor:
+    """Where the run is wanted, and how fast it advances from there."""
+
+    sequence: int
+    speed: float
+
+
+class RecordedRun:
+    """A :class:`~hexacell.run_process.connection.RunConnection` that tells a journal up to its cursor.
+
+    Questions are told where the journal shows that they were asked: those to place gauges.
+
+    Args:
+        folder: of the run; it may still be going on, and is told as far as it was.
+        sequence: the line of the journal at which the cursor stands at first; 0 is the end.
+        clock: by which it advances.
+
+    Raises:
+        FileError: the journal cannot be read, or is empty.
+    """
+
+    def __init__(self, folder: RunFolder, sequence: int = 0, clock: CellClock | None = None) -> None:
+        self._folder = folder
+        self._entries: Sequence[Entry] = read_entries(folder.journal)
+        if not self._entries or not isinstance(self._entries[0].event, events.RunStarted):
+            raise FileError("the journal is empty", subject=folder.journal, action="Choose another run")
+        self._started = self._entries[0].event
+        self._clock = clock or CellClock()
+        self._cursor = _Cursor(0, 0.0)
+        self._moved = asyncio.Event()
+        self._is_left = False
+        self.jump(sequence or self.last)
+
+    @property
+    def last(self) -> int:
+        """How many lines its journal has."""
+        return len(self._entries)
+
+    @property
+    def sequence(self) -> int:
+        """The line of the journal that was told last, from 1."""
+        return self._cursor.sequence
+
+    def step(self, count: int = 1) -> None:
+        """Advance by a number of events, or go back if it is negative; stops at both ends."""
+        self.jump(self._cursor.sequence + count)
+
+    def jump(self, sequence: int) -> None:
+        """Go to a line of the journal; stops at both ends."""
+        self._cursor.sequence = min(max(sequence, 1), self.last)
+        self._moved.set()
+
+    def set_speed(self, speed: float) -> None:
+        """Advance by itself, ``speed`` times as fast as recorded; 0 stops there.
+
+        Raises:
+            UsageError: the speed is no number from 0.
+        """
+        if not 0.0 <= speed < float("inf"):
+            raise UsageError(f"{speed:g} is no speed", action="Give a number from 0")
+        self._cursor.speed = speed
+        self._moved.set()
+
+    async def messages(self) -> AsyncIterator[HostMessage]:
+        """See :meth:`RunConnection.messages`; going back tells the run anew."""
+        told = 0
+        while not self._is_left:
+            self._moved.clear()
+            if told == 0 or told > self._cursor.sequence:
+                told = 0
+                yield self._description()
+            while told < self._cursor.sequence and not self._is_left:
+                told += 1
+                yield self._event(told)
+            for message in self._present(told):
+                yield message
+            await self._until_moved(told)
+
+    async def give(self, command: Command) -> None:
+        """Refused: raises ``UsageError``."""
+        raise UsageError(
+            f"{type(command).__name__}: this run is recorded and takes no commands",
+            action="Go on in time, or leave it",
+        )
+
+    async def take_control(self) -> None:
+        """Refused: raises ``UsageError``."""
+        raise UsageError(
+            "this run is recorded; nobody is in control of it", action="Go on in time, or leave it"
+        )
+
+    async def leave(self, *, keep_running: bool) -> None:  # noqa: ARG002 - nothing runs
+        """End the messages."""
+        self._is_left = True
+        self._moved.set()
+
+    def _description(self) -> RunDescribed:
+        return RunDescribed(
+            cell=self._started.cell,
+            cell_file=self._folder.cell_file,
+            folder=self._folder.path,
+            mode=self._started.mode,
+            expected_records=fold(entry.event for entry in self._entries).completed,
+            is_recorded=True,
+        )
+
+    def _event(self, sequence: int) -> EventRecorded:
+        entry = self._entries[sequence - 1]
+        return EventRecorded(sequence=sequence, at=entry.at, event=entry.event)
+
+    def _present(self, sequence: int) -> list[HostMessage]:
+        """What else a run tells: its status, its question, and where the cursor is."""
+        entry = self._entries[sequence - 1]
+        at_cursor = CursorMoved(sequence=sequence, last=self.last, at=entry.at, speed=self._cursor.speed)
+        status = StatusChanged(status=_status_after(entry.event))
+        return [status, _question_after(entry.event), at_cursor]
+
+    async def _until_moved(self, told: int) -> None:
+        """Wait until the cursor is moved, or moves by itself."""
+        if self._moved.is_set():
+            return
+        moved = asyncio.ensure_future(self._moved.wait())
+        advancing = asyncio.ensure_future(self._advance(told))
+        try:
+            await asyncio.wait([moved, advancing], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            moved.cancel()
+            advancing.cancel()
+
+    async def _advance(self, told: int) -> None:
+        if self._cursor.speed == 0.0 or told >= self.last:
+            await self._moved.wait()
+            return
+        await self._clock.sleep(self._wait_s(told) / self._cursor.speed)
+        if self._cursor.sequence == told:
+            self._cursor.sequence = told + 1
+
+    def _wait_s(self, told: int) -> float:
+        """The recorded time from one event to the next, s."""
+        here, following = self._entries[told - 1], self._entries[told]
+        elapsed = (following.at - here.at).total_seconds()
+        if here.monotonic_s is not None and following.monotonic_s is not None:
+            by_clock = following.monotonic_s - here.monotonic_s
+            elapsed = by_clock if by_clock >= 0.0 else elapsed
+        return min(max(elapsed, 0.0), LONGEST_WAIT_S)
+
+
+def _status_after(event: events.Event) -> Status:
+    match event:
+        case events.Ended() | events.Interrupted():
+            return Status.ENDED
+        case events.Paused():
+            return Status.PAUSED
+        case events.StepBegun(step=Place()):
+            return Status.AWAITING_OPERATOR
+        case _:
+            return Status.RUNNING
+
+
+def _question_after(event: events.Event) -> QuestionOpened | QuestionClosed:
+    match event:
+        case events.StepBegun(step=Place(at=at, pose=pose)):
+            return QuestionOpened(question=ask_placement(at, Pose(*pose)))
+        case _:
+            return QuestionClosed()

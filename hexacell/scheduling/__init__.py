@@ -1,1 +1,0 @@
-"""Runs without a person: when they begin, and what starts them."""

@@ -1,0 +1,236 @@
+"""One gauge, or the encoders, watched for some seconds while nothing is commanded."""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from drivers.errors import GaugeAtEnd, GaugeSilent, InvalidSampleError, WrongAnswer
+from drivers.interfaces import DeviceIdentity, Gauge
+from drivers.serial.shared_port import SharedSerialPorts
+from drivers.wire_trace import WireTrace
+from hexacell.cell.loader import Cell
+from hexacell.cell.model import CellSettings
+from hexacell.errors import HexacellError, UsageError
+from hexacell.runs.cell_lock import cell_lock
+from hexacell.services.devices.device_setup import device_addresses, devices_of
+from procedures.devices.device_set import Devices
+from procedures.run.cancellation import shielded
+
+ENCODERS = "encoders"
+FEWEST_FOR_SCATTER = 3
+
+
+class Failure(StrEnum):
+    """What came instead of a reading, in words."""
+
+    DAMAGED = "damaged or foreign"
+    MISSING = "missing"
+    AT_END = "at an end of the travel"
+    INVALID = "invalid"
+
+
+FAILURES: Mapping[type[HexacellError], Failure] = {
+    WrongAnswer: Failure.DAMAGED,
+    GaugeSilent: Failure.MISSING,
+    GaugeAtEnd: Failure.AT_END,
+    InvalidSampleError: Failure.INVALID,
+}
+
+Read = Callable[[], Awaitable[tuple[float, ...]]]
+"""One reading of all numbers of a device."""
+
+
+@dataclass(frozen=True)
+class SeriesFigures:
+    """What one number did: its range and scatter, in ``unit``, and how many values were distinct.
+
+    ``scatter`` is one standard deviation about a straight line; none of fewer than three readings.
+    """
+
+    name: str
+    unit: str
+    lowest: float
+    highest: float
+    scatter: float | None
+    distinct: int
+
+
+@dataclass(frozen=True)
+class FailureFigures:
+    """How often something came instead of a reading, and what was said of it the last time."""
+
+    kind: Failure
+    count: int
+    latest: str
+
+
+@dataclass(frozen=True)
+class DeviceDiagnosis:
+    """What was seen of a device.
+
+    Attributes:
+        failures: what came instead of a reading.
+        problem: why it was not watched to the end, or what its settings are wrong by; empty if neither.
+    """
+
+    device: str
+    identities: tuple[DeviceIdentity, ...]
+    seconds: float
+    readings: int
+    series: tuple[SeriesFigures, ...]
+    failures: tuple[FailureFigures, ...] = ()
+    problem: str = ""
+    stated_noise: float = 0.0
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether it could be read throughout."""
+        return bool(self.readings) and not self.problem
+
+
+async def diagnose(cell: Cell, device: str, seconds: float) -> DeviceDiagnosis:
+    """Watch a gauge, by its name, or ``encoders``.
+
+    Raises:
+        UsageError: the cell has no such device.
+        CellBusy: a run uses it.
+        HexacellError: the device cannot be opened.
+    """
+    known = [gauge.name for gauge in cell.settings.gauges] + [ENCODERS]
+    if device not in known:
+        raise UsageError(f"the cell has no device '{device}'", action=f"Name one of {', '.join(known)}")
+    with cell_lock(*cell.config_paths), device_addresses(cell, other_processes=False) as settings:
+        async with _devices(settings) as devices:
+            if device == ENCODERS:
+                return await _watch_encoders(devices, settings, seconds)
+            [mounted] = [one for one in devices.gauges if one.gauge.name == device]
+            return await _watch_gauge(mounted.gauge, settings.noise.gauge_at(mounted.axis.index), seconds)
+
+
+@asynccontextmanager
+async def _devices(settings: CellSettings) -> AsyncIterator[Devices]:
+    """The drivers, of which only those that are watched are opened."""
+    trace = WireTrace()
+    links = SharedSerialPorts(trace=trace)
+    try:
+        yield devices_of(settings, links, trace)
+    finally:
+        await shielded(links.close())
+
+
+async def _watch_gauge(gauge: Gauge, stated_mm: float, seconds: float) -> DeviceDiagnosis:
+    async def read() -> tuple[float, ...]:
+        return ((await gauge.read_once()).value_mm,)
+
+    try:
+        identity = await gauge.open()
+        watched = await _watched(read, seconds)
+        problem = watched.problem or await _check(gauge)
+    finally:
+        await gauge.close()
+    figures = _figures(watched.values, [f"gauge {gauge.name}"], "mm")
+    return DeviceDiagnosis(
+        gauge.name,
+        (identity,),
+        watched.seconds,
+        len(watched.values),
+        figures,
+        watched.failure_figures(),
+        problem,
+        stated_mm,
+    )
+
+
+async def _watch_encoders(devices: Devices, settings: CellSettings, seconds: float) -> DeviceDiagnosis:
+    async def read() -> tuple[float, ...]:
+        return (await devices.encoders.read()).positions
+
+    try:
+        identities = await devices.encoders.open()
+        watched = await _watched(read, seconds)
+    finally:
+        await devices.encoders.close()
+    names = [f"encoder {leg}" for leg in range(1, 7)]
+    return DeviceDiagnosis(
+        ENCODERS,
+        identities,
+        watched.seconds,
+        len(watched.values),
+        _figures(watched.values, names, str(settings.encoders.unit)),
+        watched.failure_figures(),
+        watched.problem,
+        settings.noise.encoder,
+    )
+
+
+@dataclass
+class _Watched:
+    """Readings as they come."""
+
+    seconds: float = 0.0
+    values: list[tuple[float, ...]] = field(default_factory=list)
+    failures: defaultdict[Failure, list[str]] = field(default_factory=lambda: defaultdict(list))
+    problem: str = ""
+
+    def failure_figures(self) -> tuple[FailureFigures, ...]:
+        """The same by kind: each damaged answer is damaged in its own way."""
+        return tuple(FailureFigures(kind, len(told), told[-1]) for kind, told in self.failures.items())
+
+
+async def _watched(read: Read, seconds: float) -> _Watched:
+    """Read as fast as the device answers, at least once."""
+    watched, begun = _Watched(), time.monotonic()
+    while not watched.problem and (not watched.seconds or watched.seconds < seconds):
+        try:
+            watched.values.append(await read())
+        except tuple(FAILURES) as error:
+            kind = next(kind for base, kind in FAILURES.items() if isinstance(error, base))
+            watched.failures[kind].append(error.problem)
+        except HexacellError as error:
+            watched.problem = str(error)
+        watched.seconds = time.monotonic() - begun
+    return watched
+
+
+async def _check(gauge: Gauge) -> str:
+    try:
+        await gauge.check()
+    except HexacellError as error:
+        return str(error)
+    return ""
+
+
+def _figures(
+    values: Sequence[tuple[float, ...]], names: Sequence[str], unit: str
+) -> tuple[SeriesFigures, ...]:
+    if not values:
+        return ()
+    columns = np.array(values).T
+    return tuple(
+        SeriesFigures(
+            name,
+            unit,
+            float(column.min()),
+            float(column.max()),
+            _scatter(column),
+            len(set(column.tolist())),
+        )
+        for name, column in zip(names, columns, strict=True)
+    )
+
+
+def _scatter(values: np.ndarray) -> float | None:
+    """The standard deviation about a straight line: a drift is no noise."""
+    count = len(values)
+    if count < FEWEST_FOR_SCATTER:
+        return None
+    times = np.arange(count)
+    line = np.polynomial.Polynomial.fit(times, values, 1)
+    return float(np.sqrt(np.sum((values - line(times)) ** 2) / (count - 2)))

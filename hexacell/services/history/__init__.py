@@ -1,0 +1,1 @@
+"""The runs of a cell so far: results, comparison, drift, retention."""

@@ -1,0 +1,121 @@
+"""A run as its report needs it: from its folder alone, so that the report is the same at any time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from hexacell.cell.loader import load_cell
+from hexacell.cell.model import CellSettings
+from hexacell.config.receipt import AFTER, BEFORE
+from hexacell.errors import FileError, UsageError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.runs.run_folder import CELL_FILE, JOURNAL, MEASUREMENTS, RESULT, RunFolder
+from hexacell.services.recorded.journal_soundness import require_sound
+from hexacell.services.recorded.started_robot import geometry_before
+from hexacell.storage import atomic_files
+from procedures.journal.journal import read_entries
+from procedures.run import events
+from procedures.run.state import RunState
+
+FINGERPRINTED = (JOURNAL, CELL_FILE, MEASUREMENTS, RESULT, BEFORE, AFTER)
+"""Files of a run folder that the report vouches for, where they are there; of a config every file."""
+
+IDENTIFIER_DIGITS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class ReportedRun:
+    """One run that is over, or was interrupted.
+
+    Attributes:
+        settings: the cell file as it was when the run began.
+        began, ended: when its first and last event were written, UTC.
+        document: the identification as ``fit --json`` has it; empty where there is none.
+        fingerprints: SHA-256 of the files of the folder, by their names.
+    """
+
+    folder: RunFolder
+    settings: CellSettings
+    state: RunState
+    began: datetime
+    ended: datetime
+    document: Mapping[str, Any]
+    fingerprints: Mapping[str, str]
+
+    @property
+    def name(self) -> str:
+        """That of its folder."""
+        return self.folder.path.resolve().name
+
+    @property
+    def started(self) -> events.RunStarted:
+        """The first event."""
+        assert self.state.started is not None  # noqa: S101 - checked when it is read
+        return self.state.started
+
+    @property
+    def geometry_before(self) -> Geometry:
+        """That of the controller when the run began, in the mechanism's frame convention."""
+        return geometry_before(self.settings, self.started)
+
+    @property
+    def identifier(self) -> str:
+        """What names this report and no other: cell, run, and a part of the journal's fingerprint."""
+        digits = self.fingerprints[JOURNAL][:IDENTIFIER_DIGITS]
+        return f"{self.settings.name} / {self.name} / {digits}"
+
+
+def reported_run(run: Path) -> ReportedRun:
+    """Read a run folder.
+
+    Raises:
+        UsageError: it is no run folder, or nothing happened in the run.
+        FileError: one of its files cannot be read, or is damaged.
+    """
+    folder = RunFolder(run)
+    if not folder.journal.is_file() and folder.attempts.is_file():
+        action = "`hexacell history CELL --json` says why"
+        raise UsageError("this run never began", subject=run, action=action)
+    if not folder.journal.is_file():
+        raise UsageError("this is no run folder", subject=run, action="`hexacell history CELL` lists them")
+    entries = read_entries(folder.journal)
+    settings = load_cell(folder.cell_file).settings
+    history = (entry.event for entry in entries)
+    state = require_sound(history, settings, folder.journal, follows_plan=False)
+    if state.started is None:
+        raise UsageError("nothing happened in this run", subject=run, action="Name another")
+    return ReportedRun(
+        folder=folder,
+        settings=settings,
+        state=state,
+        began=entries[0].at,
+        ended=entries[-1].at,
+        document=_document(folder.result),
+        fingerprints=_fingerprints(run),
+    )
+
+
+def _document(path: Path) -> Mapping[str, Any]:
+    data = atomic_files.read_if_present(path)
+    if data is None:
+        return {}
+    try:
+        found = json.loads(data)
+    except ValueError as error:
+        raise FileError(
+            f"is damaged: {error}", subject=path, action="`hexacell fit` makes it again"
+        ) from error
+    if not isinstance(found, dict):
+        raise FileError("is no result of an identification", subject=path)
+    return found
+
+
+def _fingerprints(run: Path) -> dict[str, str]:
+    further = (path.name for name in (BEFORE, AFTER) for path in sorted(run.glob(f"{name}-*")))
+    contents = {name: atomic_files.read_if_present(run / name) for name in (*FINGERPRINTED, *further)}
+    return {name: atomic_files.sha256(data) for name, data in contents.items() if data is not None}

@@ -1,0 +1,44 @@
+"""What the journal of a run tells of its measurement file: the geometries in command, and the noise."""
+
+from __future__ import annotations
+
+from hexacell.cell.model import CellSettings
+from hexacell.errors import HexacellError
+from hexacell.identification.problem.commanded_poses import CommandingGeometry
+from hexacell.kinematics.geometry import Geometry
+from hexacell.noise.measured_noise import MeasuredNoise
+from hexacell.runs.run_folder import RunFolder
+from hexacell.services.recorded.journal_soundness import require_sound
+from procedures.journal.journal import read_journal
+from procedures.run.state import RunState
+
+
+def noise_of_run(folder: RunFolder, settings: CellSettings) -> MeasuredNoise | None:
+    """The noise that a run measured; none if it did not, or the folder is not that of a run."""
+    measured = _state_of(folder, settings).noise
+    return None if measured is None else measured.noise
+
+
+def commanding_geometries(folder: RunFolder, settings: CellSettings) -> tuple[CommandingGeometry, ...]:
+    """By the journal of a run: that of its controller, and a provisional one in the same frames.
+
+    None if the folder is not that of a run of such a mechanism.
+    """
+    state, mechanism = _state_of(folder, settings), settings.mechanism
+    started, parameters = state.started, mechanism.parameters
+    if started is None:
+        return ()
+    own = CommandingGeometry.of(mechanism, Geometry.of(parameters, started.controller))
+    if state.provisional is None:
+        return (own,)
+    lent = Geometry.of(parameters, state.provisional.geometry)
+    return own, CommandingGeometry(lent, own.frames)
+
+
+def _state_of(folder: RunFolder, settings: CellSettings) -> RunState:
+    """A run as far as it got; empty if its journal cannot be read, or be of such a machine."""
+    try:
+        history = read_journal(folder.journal)
+        return require_sound(history, settings, folder.journal, follows_plan=False)
+    except HexacellError:
+        return RunState()

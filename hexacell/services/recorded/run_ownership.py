@@ -1,0 +1,157 @@
+"""Whether the folder of an interrupted run belongs to the cell that resumes it.
+
+A run folder may come from anywhere. What it names is therefore compared with the cell before anything moves
+or is written: the config, the geometry that commanded the records, and the poses that the robot may be sent
+to again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from hexacell.cell.loader import Cell
+from hexacell.config.change import ConfigChange
+from hexacell.config.contents import are_same_files, fingerprint_of, read_contents_if_present
+from hexacell.config.interface import ControllerGeometry, ControllerLimits
+from hexacell.config.receipt import BEFORE, RECEIPT, Receipt, kept_paths
+from hexacell.errors import FileError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import SAME_FRAMES
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.robot.model import Robot, controller_geometry
+from hexacell.robot.stated_limits import stated_limits
+from hexacell.runs.run_folder import RunFolder
+from hexacell.services.recorded.started_robot import started_robot
+from procedures.engine.config_edits import PROVISIONAL_FOLDER
+from procedures.journal.line_format import RESTORE
+from procedures.run import events
+from procedures.run.state import RunState
+from procedures.run.steps import SixNumbers
+
+
+def require_own_run(cell: Cell, folder: RunFolder, state: RunState) -> None:
+    """Check a run folder before its run is resumed; ``state`` is what its journal tells.
+
+    Raises:
+        FileError: a file in it is a link, names another config, or has a geometry or a pose that is not of
+            this robot.
+    """
+    folders = (folder.path, folder.path / PROVISIONAL_FOLDER)
+    for path in folders:
+        _require_no_links(path)
+        if (path / RECEIPT).exists():
+            _require_own_config(cell, path / RECEIPT, Receipt.of(path).paths)
+    if folder.proposal.exists():
+        _require_own_config(cell, folder.proposal, ConfigChange.load(folder.proposal).paths)
+    assert state.started is not None  # noqa: S101 - a journal without a start is not resumed
+    _require_own_geometry(cell, folder, state, state.started)
+    _require_own_poses(cell, folder, state, state.started)
+
+
+def _require_no_links(folder: Path) -> None:
+    """What is written to a link is written elsewhere."""
+    entries = sorted(folder.iterdir()) if folder.is_dir() else []
+    for path in (folder, *entries) if folder.name == PROVISIONAL_FOLDER else entries:
+        if path.is_symlink():
+            raise FileError("is a link; a run's files are no links", subject=path, action=RESTORE)
+
+
+def _require_own_config(cell: Cell, path: Path, named: tuple[Path, ...]) -> None:
+    if not are_same_files(named, cell.config_paths):
+        raise FileError(
+            f"is for another config, {' and '.join(map(str, named))}",
+            subject=path,
+            action=f"Resume the run of {' and '.join(map(str, cell.config_paths))}, or restore the run "
+            "folder from a copy",
+        )
+
+
+def _require_own_geometry(
+    cell: Cell, folder: RunFolder, state: RunState, started: events.RunStarted
+) -> None:
+    """The journal must state the geometry of the config that the run began with."""
+    count = len(cell.config_paths)
+    kept = (kept_paths(one, BEFORE, count) for one in (folder.path, folder.path / PROVISIONAL_FOLDER))
+    candidates = (cell.config_paths, *kept)
+    paths = next((one for one in candidates if _have_fingerprint(one, started.config_sha256)), None)
+    if paths is None:
+        if state.committed or state.provisional or state.rolling_back or state.config_write_pending:
+            raise FileError(
+                "the config of before the run is not in it", subject=folder.path, action=RESTORE
+            )
+        return
+    found = controller_geometry(cell, *paths)
+    stated = Geometry.of(cell.settings.mechanism.parameters, started.controller)
+    if not _is_same(found, stated, started):
+        raise _differs(folder, f"another geometry than {paths[0]}")
+    own = stated_limits(cell.settings, found, SAME_FRAMES).joint_ranges
+    limits = started.limits or ControllerLimits(joints=found.limits.joints)  # of older versions: no axes
+    if started.joint_ranges != own or limits != found.limits:
+        raise _differs(
+            folder, f"other limits than the cell file, {paths[0]} and [limits] ini, if one is named"
+        )
+
+
+def _differs(folder: RunFolder, what: str) -> FileError:
+    problem = f"states {what}, with which the run began"
+    return FileError(problem, subject=folder.journal, line=1, action=RESTORE)
+
+
+def _have_fingerprint(paths: tuple[Path, ...], sha256: str) -> bool:
+    contents = read_contents_if_present(paths)
+    return contents is not None and fingerprint_of(contents) == sha256
+
+
+def _is_same(found: ControllerGeometry, stated: Geometry, started: events.RunStarted) -> bool:
+    return found.branch == started.branch and np.array_equal(found.geometry.vector, stated.vector)
+
+
+def _require_own_poses(cell: Cell, folder: RunFolder, state: RunState, started: events.RunStarted) -> None:
+    """Poses that may be commanded again must be ones that the robot may take.
+
+    They were commanded with one of the geometries that the controller had during the run.
+    """
+    poses = list(dict.fromkeys(_poses_to_come(state)))
+    if not poses:
+        return
+    robot = started_robot(cell.settings, started)
+    batch = PoseBatch.of(Pose(*pose) for pose in poses)
+    reached = np.zeros(len(poses), dtype=bool)
+    for geometry in _commanding(robot, state):
+        joints = robot.mechanism.inverse(geometry, robot.branch, batch)
+        reached |= robot.limits_with(geometry).allow_joints(joints)
+    allowed = reached & robot.limits.allow_commands(robot.frames.poses(batch))
+    if not allowed.all():
+        wrong = poses[int(np.flatnonzero(~allowed)[0])]
+        pose = ", ".join(f"{number:g}" for number in wrong)
+        raise FileError(
+            f"has the pose {pose}, which the robot cannot take", subject=folder.journal, action=RESTORE
+        )
+
+
+def _poses_to_come(state: RunState) -> Iterator[SixNumbers]:
+    """References, discarded records and held-out poses."""
+    for measured in state.sets.values():
+        yield from (sample.pose for sample in measured.samples)
+        yield from (pose for _, pose in measured.again)
+    if state.identified is not None:
+        for at_point in (*state.identified.held_out, *state.identified.held_out_after):
+            yield from at_point
+    if state.confirmation is not None:
+        for at_point in state.confirmation.poses:
+            yield from at_point
+
+
+def _commanding(robot: Robot, state: RunState) -> Iterator[Geometry]:
+    """The geometries that the controller had, or will have, in its own frames."""
+    parameters = robot.mechanism.parameters
+    yield robot.controller
+    if state.provisional is not None:
+        yield robot.for_controller(Geometry.of(parameters, state.provisional.geometry))
+    if state.proposed is not None and state.proposed.written is not None:
+        yield Geometry.of(parameters, state.proposed.written)
+    if state.identified is not None:
+        yield robot.for_controller(state.identified.result.identified(parameters))

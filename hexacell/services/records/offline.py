@@ -1,0 +1,170 @@
+"""What a cell file and a measurement file tell without a run: the geometry, the next pose, a dry run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from hexacell.campaign.decisions import (
+    CampaignState,
+    Finished,
+    FinishPoint,
+    Forecast,
+    MeasurePose,
+    StartPoint,
+)
+from hexacell.campaign.feasibility import unreachable_share
+from hexacell.campaign.planner import Plan
+from hexacell.campaign.pose_list import pose_list_of
+from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses, require_enough
+from hexacell.cell.loader import Cell
+from hexacell.dry_run.campaign import DryRunResult, dry_run
+from hexacell.errors import UsageError
+from hexacell.identification.estimator import identify
+from hexacell.identification.identified_zeros import ParameterChoice
+from hexacell.measurements.records import MeasurementSet, RecordId
+from hexacell.noise.averaging import WINDOWS, AveragingForecaster, mean_of_independent
+from hexacell.noise.measured_noise import AveragingForecast, with_measured_noise
+from hexacell.robot.model import robot_of
+from hexacell.runs.run_folder import RunFolder
+from hexacell.services.recorded.recorded_commands import commanding_geometries, noise_of_run
+from hexacell.services.records.stated_poses import require_points
+from hexacell.verdict.assessment import Assessment, assess
+
+MOST_RECORDS_BEFORE_NEXT = 500
+"""The estimate is made again record by record, as in a run."""
+
+
+@dataclass(frozen=True, slots=True)
+class NextPose:
+    """What to measure next.
+
+    Attributes:
+        forecast: absent where the robot can take no task pose.
+        left_out: the records so far that the others prove false.
+    """
+
+    decision: StartPoint | MeasurePose | Finished
+    forecast: Forecast | None
+    left_out: tuple[RecordId, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PlanTrial:
+    """A plan carried out on simulated robots.
+
+    Attributes:
+        unreachable: share of the robots within the tolerances that cannot reach a point, by point.
+        target_mm: predicted error at which measuring ends, if the cell file states one.
+        averaging: what means of more readings would gain if all noise differed from reading to reading.
+        encoders_part_mm: what the encoders contribute to the first of these errors.
+    """
+
+    result: DryRunResult
+    unreachable: Mapping[int, float]
+    target_mm: float | None
+    averaging: tuple[AveragingForecast, ...] = ()
+    encoders_part_mm: float | None = None
+
+
+def fit_measurements(
+    cell: Cell,
+    measurements: MeasurementSet,
+    folder: RunFolder | None = None,
+    identify_only: ParameterChoice | None = None,
+) -> Assessment:
+    """Identify the geometry of a cell's robot from records, and check it.
+
+    ``folder`` is where they are kept: if it is that of a run, its journal tells what commanded them, and
+    the noise that it measured. ``identify_only``: in the place of what the cell file says.
+
+    Raises:
+        IdentifiabilityError: the records cannot determine it.
+        FileError: the controller's config cannot be read.
+    """
+    robot = robot_of(cell)
+    if folder is not None:
+        recorded = commanding_geometries(folder, cell.settings)
+        robot = replace(robot, earlier=(*recorded, *robot.earlier))
+    settings, measured = cell.settings, None if folder is None else noise_of_run(folder, cell.settings)
+    if measured is not None:
+        settings = with_measured_noise(settings, measured)
+        robot = robot.with_errors_of(settings)
+    if identify_only is not None:
+        robot = replace(robot, identifies=identify_only)
+    found = identify(robot.problem(measurements))
+    return assess(settings, robot, measurements, found, measured_noise=measured)
+
+
+def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) -> NextPose:
+    """The pose worth measuring after these records.
+
+    ``rejections`` counts the poses at the present point that could not be measured.
+
+    Raises:
+        HexacellError: a point is out of reach, the records do not belong to this cell, or no geometry fits
+            them.
+    """
+    if len(measurements) > MOST_RECORDS_BEFORE_NEXT:
+        raise UsageError(
+            f"there are {len(measurements)} records; a next pose is found for {MOST_RECORDS_BEFORE_NEXT}",
+            action="Use `hexacell fit`; some 60 records identify a robot",
+        )
+    plan = plan_of(cell)
+    require_points(cell, plan)
+    state = _state_of_records(plan, measurements, rejections)
+    decision = _decide(plan, state)
+    forecast = decision.forecast if isinstance(decision, MeasurePose) else plan.forecast(state)
+    return NextPose(decision, forecast, tuple(sorted(plan.estimate(state).false_records)))
+
+
+def try_plan(cell: Cell, removed: RemovedPoses = NOTHING_REMOVED) -> PlanTrial:
+    """Carry out a cell's plan on robots drawn within its tolerances; takes some seconds.
+
+    Raises:
+        UsageError: without what is removed too little is left.
+        FileError: see :func:`plan_of`.
+    """
+    require_enough(removed, len(cell.settings.identification.points))
+    plan = plan_of(cell, removed)
+    averaging, noise = AveragingForecaster(plan), plan.robot.noise
+    return PlanTrial(
+        dry_run(plan),
+        unreachable_share(plan),
+        cell.settings.identification.target_mm,
+        averaging.forecasts({windows: mean_of_independent(noise, windows) for windows in WINDOWS}),
+        averaging.encoders_part(noise),
+    )
+
+
+def plan_of(cell: Cell, removed: RemovedPoses = NOTHING_REMOVED) -> Plan:
+    """The plan of a cell; raises ``FileError`` if its config or its list of poses cannot be read."""
+    robot = replace(robot_of(cell), refused=removed.refused)
+    listed = removed.left_of(pose_list_of(cell))
+    return Plan(cell.settings, robot, listed, left_points=frozenset(removed.points))
+
+
+def _state_of_records(plan: Plan, measurements: MeasurementSet, rejections: int) -> CampaignState:
+    """The state after the last record: the gauges are at its point, all other points are done."""
+    for point in measurements.points.tolist():
+        if point not in plan.points:
+            raise UsageError(
+                f"there are records of point {point}, but the cell file has {len(plan.points)} points",
+                action="Take the measurement file and the cell file that belong together",
+            )
+    if not len(measurements):
+        return CampaignState(rejections=rejections)
+    last = measurements.records[-1]
+    others = frozenset(measurements.points.tolist()) - {last.point}
+    return CampaignState(measurements, last.point, others, last.pose, rejections)
+
+
+def _decide(plan: Plan, state: CampaignState) -> StartPoint | MeasurePose | Finished:
+    """What to measure now; where a point is done, at the next one."""
+    decision = plan.decide(state)
+    if isinstance(decision, FinishPoint):
+        leaving = replace(state, point=None, done=state.done | {decision.point}, present=None, rejections=0)
+        decision = plan.decide(leaving)
+    if isinstance(decision, FinishPoint):  # impossible: between points there is none to finish
+        raise TypeError(decision)
+    return decision

@@ -1,0 +1,1 @@
+"""A run of a cell: put together, executed, resumed, replayed."""

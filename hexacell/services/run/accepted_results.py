@@ -1,0 +1,134 @@
+"""The last accepted result of a cell: what is known of the geometry that its controller runs with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from hexacell.campaign.task_accuracy import Task
+from hexacell.cell.loader import Cell
+from hexacell.config.contents import fingerprint
+from hexacell.config.receipt import Receipt
+from hexacell.errors import HexacellError
+from hexacell.identification.estimator import identify
+from hexacell.results.length_result import LengthResult, with_measured_scale
+from hexacell.results.result import AcceptedResult
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.recorded.journal_soundness import require_sound
+from hexacell.services.recorded.started_robot import started_robot
+from hexacell.services.write_back.proposals import later_approval
+from hexacell.verdict.decision import Verdict
+from procedures.calibration.workflow import Calibration, Mode
+from procedures.journal.journal import read_entries
+from procedures.run import events
+from procedures.run.leg_temperatures import mean_leg_temperatures
+from procedures.run.state import RunState
+from procedures.run.steps import Phase
+
+
+def last_accepted_result(cell: Cell) -> AcceptedResult | None:
+    """The newest accepted result whose config is the one that the controller has now, byte for byte.
+
+    Runs whose files cannot be read are left out.
+
+    Raises:
+        FileError: the controller's config cannot be read.
+    """
+    written = fingerprint(*cell.config_paths)
+    folder = runs_folder(cell)
+    paths = sorted(folder.iterdir()) if folder.is_dir() else []
+    found = (_accepted(cell, path) for path in paths if _wrote(path, written))
+    newest = max((one for one in found if one is not None), key=lambda one: one.at, default=None)
+    return None if newest is None else _result(cell, newest)
+
+
+@dataclass(frozen=True, slots=True)
+class _AcceptedRun:
+    """A run whose result stayed in the controller, and when it ended."""
+
+    path: Path
+    at: datetime
+    state: RunState
+    identified: events.Identified
+
+
+def _wrote(path: Path, sha256: str) -> bool:
+    """Whether a run wrote the config with this fingerprint."""
+    try:
+        return Receipt.of(path).sha256_after == sha256
+    except HexacellError:
+        return False
+
+
+def _accepted(cell: Cell, path: Path) -> _AcceptedRun | None:
+    """A run, if its result stayed in the controller."""
+    try:
+        journal = RunFolder(path).journal
+        entries = read_entries(journal)
+        history = (entry.event for entry in entries)
+        state = require_sound(history, cell.settings, journal, follows_plan=False)
+        is_applied_later = later_approval(RunFolder(path)) is not None
+    except HexacellError:
+        return None
+    if state.identified is None or not _is_accepted(state, is_applied_later=is_applied_later):
+        return None
+    return _AcceptedRun(path, entries[-1].at, state, state.identified)
+
+
+def _is_accepted(state: RunState, *, is_applied_later: bool) -> bool:
+    """Whether the result passed, or a person kept it although its error is not certain to be within limits.
+
+    Who had the proposal applied after the run kept it too. Where the model did not hold, nothing is known
+    of the geometry, whoever kept it.
+    """
+    is_back = state.rolled_back or state.rolling_back
+    if state.judged is None or (is_back and not is_applied_later):
+        return False
+    if state.judged.verdict is Verdict.PASS:
+        return True
+    verification = state.judged.verification
+    holds = verification is not None and all(test.passed for test in verification.tests)
+    is_kept = state.accepted is not None and state.accepted.by is not None
+    return holds and (is_kept or is_applied_later)
+
+
+def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
+    return AcceptedResult(
+        run=str(accepted.path),
+        at=accepted.at,
+        covariance=accepted.identified.result.covariance,
+        effects=_effects(cell, accepted.state),
+        length=_length(accepted.state),
+        leg_temperatures_c=mean_leg_temperatures(
+            cell.settings.thermometers, accepted.state.samples(Phase.IDENTIFY)
+        ),
+    )
+
+
+def _length(state: RunState) -> LengthResult | None:
+    """What the length check of a run found, or, if it had none, of that which it started from."""
+    verification = None if state.judged is None else state.judged.verification
+    accuracy = None if verification is None else verification.accuracy
+    found = None if accuracy is None else accuracy.length
+    before = None if state.started is None else state.started.accepted
+    return found or (None if before is None else before.length)
+
+
+def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], ...]]:
+    """What the systematic effects, as the cell file has them now, did to the result."""
+    if state.started is None:
+        return {}
+    settings, started = cell.settings, state.started
+    start = started_robot(settings, started)
+    robot = Calibration(settings, start, Mode(started.mode), accepted=started.accepted).robot_of(state)
+    effects = [one for one in with_measured_scale(robot.effects, _length(state)) if one.size]
+    if not effects:
+        return {}
+    found = identify(robot.problem(state.measurements()))
+    belief = robot.belief(found)
+    budget = Task.of(settings, robot, belief).budget(
+        found, belief, effects, robot.known_effects, zeros=robot.identified_zeros(found)
+    )
+    columns = {} if budget is None else budget.parameter_columns
+    return {name: tuple(map(tuple, each.T.tolist())) for name, each in columns.items()}

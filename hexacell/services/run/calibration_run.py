@@ -1,0 +1,331 @@
+"""One calibration run of a cell: lock, connect, check, then run the engine."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from drivers.interfaces import DeviceIdentity
+from hexacell import __version__
+from hexacell.campaign.pose_list import pose_list_of
+from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses, require_enough
+from hexacell.cell.loader import Cell
+from hexacell.config.contents import fingerprint
+from hexacell.config.current import CurrentConfig
+from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
+from hexacell.robot.model import config_layout, controller_geometry, robot_of
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.devices.changed_devices import with_changes
+from hexacell.services.devices.device_setup import Connected, device_addresses, open_devices
+from hexacell.services.recorded.journal_soundness import require_sound
+from hexacell.services.recorded.run_ownership import require_own_run
+from hexacell.services.recorded.started_robot import started_robot
+from hexacell.services.run.accepted_results import last_accepted_result
+from hexacell.services.write_back.held_config import held_config
+from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
+from procedures.calibration.preflight import (
+    device_failures,
+    plan_failures,
+    position_failures,
+    raise_all,
+    start_failures,
+)
+from procedures.calibration.workflow import Calibration, Mode
+from procedures.devices.device_set import Devices
+from procedures.devices.live_values import LiveValues
+from procedures.devices.reconnection import require_known
+from procedures.engine.config_transactions import holds_provisional
+from procedures.engine.engine import Engine, Listener
+from procedures.engine.recovery import RecoveryPolicy
+from procedures.engine.step_executor import StepExecutor
+from procedures.guards.position_check import PositionCheck
+from procedures.journal.journal import Journal, read_journal, read_version
+from procedures.journal.line_format import RULES_SINCE
+from procedures.run import events
+from procedures.run.commands import CommandQueue
+from procedures.run.questions import Operator, QuestionBroker
+from procedures.run.state import fold
+
+EngineWatcher = Callable[[Engine, Devices], None]
+
+
+def _watch_nothing(_engine: Engine, _devices: Devices) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """One run of a cell, new or resumed, and the folder that keeps it.
+
+    ``removed`` is what a person took out of the plan of a new one; a resumed one keeps its own.
+    ``keeps_hours`` is whether the cell's quiet hours, window and longest duration hold for it.
+    """
+
+    cell: Cell
+    folder: RunFolder
+    mode: Mode
+    operator: Operator
+    unattended: bool = False
+    resume: bool = False
+    length_check: bool = False
+    removed: RemovedPoses = NOTHING_REMOVED
+    keeps_hours: bool = False
+
+
+async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[DeviceIdentity, ...]:
+    """Check everything that must hold before motion; nothing moves. Gives the devices that answered.
+
+    Raises:
+        HexacellError: every failure, in one report.
+    """
+    calibration = new_calibration(cell, mode)
+    with held_config(*cell.config_paths):
+        async with _checked_devices(cell, calibration, runs_folder(cell), unattended) as connected:
+            raise_all(await _position_failures(cell, connected))
+            return connected.identities
+
+
+async def calibrate(
+    request: RunRequest,
+    listeners: Sequence[Listener] = (),
+    queue: CommandQueue | None = None,
+    live: LiveValues | None = None,
+    on_engine: EngineWatcher = _watch_nothing,
+) -> events.Ended:
+    """Measure, identify, verify, propose and write back, as far as the mode and the results allow.
+
+    Args:
+        request: the run.
+        listeners: called with every event.
+        queue: commands for the engine (:mod:`procedures.run.commands`).
+        live: gets what the devices show during the run.
+        on_engine: called with the engine before it begins, and with the devices that it uses.
+
+    Raises:
+        Interruption: a command ended it.
+        HexacellError: it could not begin, or a step failed.
+    """
+    cell, folder = request.cell, request.folder
+    with held_config(*cell.config_paths):
+        for path in cell.config_paths:
+            remove_stale_temporaries(path)
+        started = _resumed_start(request) if request.resume else None
+        if started is None:
+            _require_own_geometry(cell)
+            require_enough(request.removed, len(cell.settings.identification.points))
+            whole = new_calibration(cell, request.mode, length_check=request.length_check)
+            calibration = whole.without(request.removed)
+        else:
+            calibration = calibration_of_run(cell, started)
+        async with _checked_devices(cell, calibration, folder.path, request.unattended) as connected:
+            require_known(connected.identities, started.devices if started else ())
+            if started is None:  # a resumed run may have to finish a change of the config first
+                raise_all(await _position_failures(cell, connected))
+            devices = connected.devices if live is None else replace(connected.devices, live=live)
+            watched = replace(connected, devices=devices)
+            return await _run(request, calibration, watched, listeners, queue, on_engine)
+
+
+@asynccontextmanager
+async def _checked_devices(
+    cell: Cell, calibration: Calibration, folder: Path, unattended: bool
+) -> AsyncIterator[Connected]:
+    """Connect the devices; ``folder`` is where the run is kept.
+
+    Raises:
+        HexacellError: every failure of the plan, the devices, the stop input and the disk, in one report.
+    """
+    failures = await plan_failures(calibration, unattended=unattended)
+    if cell.settings.simulation is not None:
+        # A simulated robot starts at its first point and cannot be served if that is out of reach.
+        raise_all(failures)
+    try:
+        with device_addresses(cell) as settings:
+            async with open_devices(settings, cell.path.parent) as connected:
+                failures += await device_failures(connected.devices)
+                failures += await start_failures(connected.devices, folder, settings.guards.free_disk_mb)
+                raise_all(failures)
+                yield replace(connected, identities=with_changes(cell, connected.identities))
+    except HexacellError as error:
+        if not failures:
+            raise
+        raise_all([*failures, *(one for one in flatten_errors(error) if one not in failures)])
+
+
+async def _position_failures(cell: Cell, connected: Connected) -> list[HexacellError]:
+    """See :func:`~procedures.calibration.preflight.position_failures`."""
+    config = CurrentConfig(cell.config_paths, config_layout(cell.settings))
+    check = PositionCheck(connected.settings, connected.devices, connected.clock, config)
+    return await position_failures(check)
+
+
+def is_unverified(folder: RunFolder) -> bool:
+    """Whether a run, as far as its journal can be read, left a written geometry without a verdict."""
+    try:
+        return fold(read_journal(folder.journal)).is_unverified
+    except HexacellError:
+        return False
+
+
+def _require_own_geometry(cell: Cell) -> None:
+    """Refuse to begin while the config holds the provisional geometry of an interrupted run.
+
+    Raises:
+        UsageError: names that run.
+    """
+    folder = runs_folder(cell)
+    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
+        if holds_provisional(RunFolder(path), cell.config_paths):
+            raise UsageError(
+                f"the run {path} was interrupted and left its provisional geometry here",
+                subject=cell.config_path,
+                action="Resume that run, which takes it back",
+            )
+
+
+async def _run(
+    request: RunRequest,
+    calibration: Calibration,
+    connected: Connected,
+    listeners: Sequence[Listener],
+    queue: CommandQueue | None,
+    on_engine: EngineWatcher,
+) -> events.Ended:
+    cell, folder = replace(request.cell, settings=connected.settings), request.folder
+    if not request.resume:
+        folder.create(cell)
+    broker = QuestionBroker(request.operator)
+    policy = RecoveryPolicy.of(cell.settings.recovery, attended=not request.unattended)
+    executor = StepExecutor(
+        cell,
+        calibration,
+        connected.devices,
+        connected.clock,
+        broker,
+        folder,
+        connected.thermometers,
+    )
+    try:
+        with Journal(folder.journal) as journal:
+            remove_stale_temporaries(folder.path)
+            engine = Engine(executor, journal, listeners, queue=queue, broker=broker, policy=policy)
+            on_engine(engine, connected.devices)
+            if engine.state.started is None:
+                engine.record(run_started(cell, calibration, connected.identities))
+            engine.reopen_sets()
+            return await engine.run()
+    finally:
+        # The trace only helps to find faults: whether it can be kept does not decide how a run ends.
+        with suppress(FileError):
+            write_atomically(folder.new_wire(), connected.trace.text().encode())
+
+
+def run_started(
+    cell: Cell, calibration: Calibration, identities: tuple[DeviceIdentity, ...]
+) -> events.RunStarted:
+    """The first event of a new run."""
+    robot = calibration.robot
+    return events.RunStarted(
+        software=f"hexacell {__version__}",
+        cell=cell.settings.name,
+        cell_text=cell.text_without_secrets,
+        mode=calibration.mode.value,
+        config=str(cell.config_path),
+        further_configs=tuple(map(str, cell.config_paths[1:])),
+        config_sha256=fingerprint(*cell.config_paths),
+        controller=robot.controller.document(),
+        branch=robot.branch,
+        devices=identities,
+        pose_list=None if calibration.listed is None else read_text(calibration.listed.path),
+        taught=None if robot.taught is None else robot.taught.document(),
+        accepted=calibration.accepted,
+        joint_ranges=robot.limits.joint_ranges,
+        limits=controller_geometry(cell).limits,
+        length_check=calibration.length_check,
+        removed=calibration.removed,
+        expired=cell.settings.expired_on(datetime.now(UTC).date()),
+    )
+
+
+def _resumed_start(request: RunRequest) -> events.RunStarted:
+    """The first event of the run to resume.
+
+    Raises:
+        UsageError: it is over, was begun by other rules, or the cell file has changed since it began.
+        FileError: its journal cannot be read, or its folder is not that of a run of this cell.
+    """
+    history = read_journal(request.folder.journal)
+    state = fold(history)
+    if state.started is None:
+        raise FileError("the journal is empty", subject=request.folder.journal, action="Begin a new run")
+    if state.ended is not None:
+        raise UsageError(f"the run {request.folder.path} is over: {state.ended.line}")
+    if (version := read_version(request.folder.journal)) < RULES_SINCE:
+        raise UsageError(
+            f"{state.started.software} began this run by other rules (version {version} of the journal)",
+            subject=request.folder.path,
+            action="Finish it with that version, or begin a new run",
+        )
+    if state.started.cell_text not in {request.cell.text_without_secrets, request.cell.text}:
+        raise UsageError(
+            f"{request.cell.path} has changed since the run began",
+            action="Undo the change, or begin a new run",
+        )
+    if state.started.mode != request.mode.value:
+        raise UsageError(
+            f"the run was begun in the mode {state.started.mode}", action="Resume it in that mode"
+        )
+    if request.length_check and not state.started.length_check:
+        raise UsageError(
+            "the run was begun without a length check",
+            action="Resume it without --length-check, and check the length with `hexacell length`",
+        )
+    require_sound(history, request.cell.settings, request.folder.journal)
+    require_own_run(request.cell, request.folder, state)
+    return state.started
+
+
+def calibration_of_run(cell: Cell, started: events.RunStarted) -> Calibration:
+    """The calibration or check that a run was begun for."""
+    robot = started_robot(cell.settings, started)
+    return Calibration(
+        cell.settings,
+        robot,
+        Mode(started.mode),
+        pose_list_of(cell),
+        started.accepted,
+        length_check=started.length_check,
+    ).without(started.removed)
+
+
+def new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Calibration:
+    """The calibration or check of a cell as it is now.
+
+    Raises:
+        UsageError: a length check has no fixture, or one of its own no calibrated machine.
+    """
+    if (length_check or mode is Mode.LENGTH) and cell.settings.length_check is None:
+        raise UsageError(
+            "a length check needs a fixture with two seats, and the cell file has none",
+            subject=cell.path,
+            action="Add [length_check] with first_seat, distance_mm and uncertainty_mm",
+        )
+    accepted = None if mode is Mode.OPTIMISE else last_accepted_result(cell)
+    if mode is Mode.QUICK and accepted is None:
+        raise UsageError(
+            "no accepted result has this config: the quick level carries on from one",
+            subject=cell.config_path,
+            action="Calibrate the robot with `hexacell run CELL --mode optimise`",
+        )
+    if mode is Mode.LENGTH and accepted is None:
+        raise UsageError(
+            "no accepted result has this config: a length check needs a calibrated machine",
+            subject=cell.config_path,
+            action="Calibrate it with `hexacell run CELL --length-check`, which checks the scale as well",
+        )
+    return Calibration(
+        cell.settings, robot_of(cell), mode, pose_list_of(cell), accepted, length_check=length_check
+    )

@@ -1,0 +1,143 @@
+"""Simulated cells: served to other processes, and calibrated as a demo in a folder of its own."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+from hexacell.cell.bundled import CONTROLLER, bundled_config
+from hexacell.cell.controller import FurtherFileSettings
+from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.cell.passwords import password_path
+from hexacell.cell.simulation import FaultKind, SimulatedFault
+from hexacell.errors import FileError, UsageError
+from hexacell.runs.cell_lock import cell_lock, lock_path
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.devices.device_setup import device_addresses
+from hexacell.services.run.calibration_run import RunRequest
+from hexacell.storage.atomic_files import create_folder_durably, os_error_to_file_error, write_atomically
+from procedures.calibration.workflow import Mode
+from procedures.run.questions import UnattendedOperator
+
+MARKER = ".hexacell-demo"
+"""Name of the file that marks a folder as a demo's, which the next demo may replace."""
+
+RUN = "demo"
+"""Name of its run, among the runs of its cell; the same each time, so that it can be referred to."""
+
+
+def require_simulation(cell: Cell) -> Cell:
+    """The same cell, once it is certain that it needs no devices.
+
+    Raises:
+        UsageError: it is a real cell.
+    """
+    if cell.settings.simulation is None:
+        raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell.path)
+    return cell
+
+
+def with_faults(cell: Cell, faults: Sequence[str]) -> Cell:
+    """A simulated cell with more faults, each as ``KIND:DEVICE@MOVE``; see :class:`SimulatedFault`.
+
+    Raises:
+        UsageError: one cannot be read, or names an unknown kind; or it is a real cell.
+    """
+    simulation = require_simulation(cell).settings.simulation
+    if simulation is None or not faults:
+        return cell
+    more = {"faults": (*simulation.faults, *(_fault(words) for words in faults))}
+    changed = {"simulation": simulation.model_copy(update=more)}
+    return replace(cell, settings=cell.settings.model_copy(update=changed))
+
+
+def _fault(words: str) -> SimulatedFault:
+    what, at, move = words.partition("@")
+    kind, _, device = what.partition(":")
+    stated = {"kind": kind.strip(), "device": device.strip(), **({"at_move": move} if at else {})}
+    try:
+        return SimulatedFault.model_validate(stated)
+    except ValueError as error:
+        kinds = ", ".join(get_args(FaultKind))
+        raise UsageError(
+            f"--fault {words} is no fault that can be simulated",
+            action=f"Write it like damaged:x@12; kinds are {kinds}",
+        ) from error
+
+
+@contextmanager
+def served_cell(cell: Cell) -> Iterator[str]:
+    """Serve a simulated cell within this context; gives a cell file that reaches it, as text.
+
+    Raises:
+        UsageError: it is a real cell.
+        HexacellError: the simulation cannot start.
+    """
+    require_simulation(cell)
+    with device_addresses(cell, other_processes=True) as settings:
+        paths = {"config": str(cell.config_path.resolve())}
+        if settings.controller.taught is not None:
+            paths["taught"] = str(cell.taught_path.resolve())
+        if (passwords := password_path(settings.controller, cell.path.parent)) is not None:
+            paths["password_file"] = str(passwords.resolve())
+        further = {"further_files": tuple(_absolute_files(cell))}
+        controller = settings.controller.model_copy(update=paths | further)
+        yield dump(settings.model_copy(update={"controller": controller}))
+
+
+def _absolute_files(cell: Cell) -> Iterator[FurtherFileSettings]:
+    files = zip(
+        cell.settings.controller.further_files, cell.config_paths[1:], cell.taught_paths[1:], strict=True
+    )
+    for one, config, taught in files:
+        paths = {"config": str(config.resolve()), "taught": one.taught and str(taught.resolve())}
+        yield one.model_copy(update=paths)
+
+
+def prepare_demo(folder: Path, config_name: str) -> RunRequest:
+    """Copy a bundled cell into ``folder`` and request a calibration of it.
+
+    Raises:
+        UsageError: there is no such cell, or it has no simulation.
+        FileError: the folder is not empty and not an earlier demo's.
+        CellBusy: a demo is running in it.
+    """
+    bundled = require_simulation(load_cell(bundled_config(config_name)))
+    cell = load_cell(_copy_cell(bundled.path, folder))
+    run = RunFolder(runs_folder(cell) / RUN)
+    return RunRequest(cell, run, Mode.OPTIMISE, UnattendedOperator(), unattended=True)
+
+
+def _copy_cell(cell_file: Path, folder: Path) -> Path:
+    """Replace what an earlier demo left in ``folder`` by a copy of the cell."""
+    if folder.is_dir() and any(folder.iterdir()):
+        if not (folder / MARKER).is_file():
+            raise FileError(
+                "this folder is not empty, and no earlier demo's",
+                subject=folder,
+                action="Choose another with --folder",
+            )
+        _clear(folder)
+    create_folder_durably(folder)
+    write_atomically(folder / MARKER, b"made by hexacell demo, which replaces this folder\n")
+    for source in cell_file.parent.glob(f"{cell_file.stem}*.toml"):
+        write_atomically(folder / source.name, source.read_bytes())
+    return folder / cell_file.name
+
+
+def _clear(folder: Path) -> None:
+    """Remove all but the marker, which is kept so that a removal that fails can be repeated."""
+    configs = list(folder.glob(f"*{CONTROLLER}"))
+    kept = {folder / MARKER, *(folder / lock_path(config).name for config in configs)}
+    with ExitStack() as locks:
+        for config in configs:
+            locks.enter_context(cell_lock(config))
+        try:
+            for item in set(folder.iterdir()) - kept:
+                shutil.rmtree(item) if item.is_dir() and not item.is_symlink() else item.unlink()
+        except OSError as error:
+            raise os_error_to_file_error("the earlier demo cannot be removed", folder, error) from error

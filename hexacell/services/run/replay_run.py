@@ -1,0 +1,159 @@
+"""Replay of a recorded run in a temporary folder: without devices, and without any real config."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from hexacell.cell.controller import ControllerSettings
+from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.cell.measuring import IdentificationSettings
+from hexacell.cell.model import CellSettings, geometry_settings
+from hexacell.config.change import ConfigChange
+from hexacell.config.contents import Contents, fingerprint_of, read_contents_if_present
+from hexacell.config.receipt import BEFORE, kept_paths
+from hexacell.errors import FileError, HexacellError, UsageError
+from hexacell.runs.run_folder import CELL_FILE, RunFolder
+from hexacell.services.recorded.journal_soundness import require_sound
+from hexacell.services.run.calibration_run import calibration_of_run
+from procedures.journal.journal import read_entries, read_version
+from procedures.journal.line_format import RESTORE, RULES_SINCE, Entry
+from procedures.replay.comparison import TOLERANCE, ReplayReport
+from procedures.replay.recorded_executor import RecordedStepExecutor
+from procedures.replay.replayer import Replayer, Scope
+from procedures.run.events import RunStarted
+
+CONFIG = "controller-config"
+POSES = "poses.csv"
+
+
+async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERANCE) -> ReplayReport:
+    """Put a recorded run through the procedure again and compare.
+
+    Args:
+        run: a run folder, or a journal.
+        scope: what is repeated.
+        tolerance: allowed difference of a number, in its unit; relative above 1.
+
+    Raises:
+        FileError: the journal, or the cell file in it, cannot be read.
+    """
+    folder, journal = _found(run)
+    entries = read_entries(journal)
+    started = _started(journal, entries)
+    _require_rules(journal, scope)
+    report = ReplayReport(journal, started.software, len(entries))
+    with TemporaryDirectory(prefix="hexacell-replay-") as name:
+        executor, started = _set_up(Path(name), folder, started, entries)
+        replayer = Replayer(executor, report, scope, tolerance)
+        await replayer.replay([replace(entries[0], event=started), *entries[1:]])
+    return report
+
+
+def _found(run: Path) -> tuple[RunFolder, Path]:
+    if run.is_dir():
+        return RunFolder(run), RunFolder(run).journal
+    return RunFolder(run.parent), run
+
+
+def _require_rules(journal: Path, scope: Scope) -> None:
+    """Earlier versions decided by other rules; only their identification can be repeated.
+
+    Raises:
+        UsageError: more than that is to be repeated.
+    """
+    if (version := read_version(journal)) < RULES_SINCE and scope is not Scope.IDENTIFICATION:
+        raise UsageError(
+            f"the journal has version {version}, whose runs were decided by other rules",
+            subject=journal,
+            action="Replay it with --only identification",
+        )
+
+
+def _started(journal: Path, entries: Sequence[Entry]) -> RunStarted:
+    first = entries[0].event if entries else None
+    if not isinstance(first, RunStarted):
+        raise FileError("the journal has no start", subject=journal, action="Copy the whole run folder")
+    return first
+
+
+def _set_up(
+    scratch: Path, folder: RunFolder, started: RunStarted, entries: Sequence[Entry]
+) -> tuple[RecordedStepExecutor, RunStarted]:
+    """The procedure with recorded devices, and the run's start with the config of the temporary folder."""
+    cell = _cell(scratch, started, folder.journal)
+    require_sound((entry.event for entry in entries), cell.settings, folder.journal)
+    contents = _config_contents(folder, started, len(cell.config_paths))
+    settings = cell.settings.model_copy(
+        update={
+            "controller": _in_scratch(cell.settings.controller),
+            "identification": _identification(cell, started),
+        }
+    )
+    if contents is None:
+        native = {"config_format": "toml", "config_options": {}, "further_files": ()}
+        controller = settings.controller.model_copy(update=native)
+        settings = settings.model_copy(update={"controller": controller})
+        contents = (_native_config(settings, started),)
+    cell = replace(cell, settings=settings)
+    for path, data in zip(cell.config_paths, contents, strict=True):
+        path.write_bytes(data)
+    run = RunFolder(scratch / "run")
+    run.path.mkdir()
+    executor = RecordedStepExecutor.of(cell, calibration_of_run(cell, started), run)
+    return executor, started.model_copy(update={"config_sha256": fingerprint_of(contents)})
+
+
+def _in_scratch(controller: ControllerSettings) -> ControllerSettings:
+    """The controller with the files of its config beside the cell file, under names of their own."""
+    further = (
+        one.model_copy(update={"config": f"{CONFIG}-{number}"})
+        for number, one in enumerate(controller.further_files, start=2)
+    )
+    return controller.model_copy(update={"config": CONFIG, "further_files": tuple(further)})
+
+
+def _cell(scratch: Path, started: RunStarted, journal: Path) -> Cell:
+    path = scratch / CELL_FILE
+    path.write_text(started.cell_text, encoding="utf-8")
+    try:
+        return load_cell(path)
+    except HexacellError as error:
+        raise FileError(
+            f"this version cannot read the cell file in it ({error})",
+            subject=journal,
+            action=f"Replay it with {started.software}",
+        ) from error
+
+
+def _identification(cell: Cell, started: RunStarted) -> IdentificationSettings:
+    """The plan; a list of poses is written to a file in the temporary folder."""
+    plan = cell.settings.identification
+    if started.pose_list is None and plan.poses is not None:
+        raise FileError(
+            f"it names a list of poses, {plan.poses}, and does not have it",
+            subject="the journal",
+            action=RESTORE,
+        )
+    if started.pose_list is None:
+        return plan
+    (cell.path.parent / POSES).write_text(started.pose_list, encoding="utf-8")
+    return plan.model_copy(update={"poses": POSES})
+
+
+def _config_contents(folder: RunFolder, started: RunStarted, count: int) -> Contents | None:
+    """What the files of the controller's config held at the start of the run, if the run folder kept it."""
+    kept = read_contents_if_present(kept_paths(folder.path, BEFORE, count))
+    if kept is None and folder.proposal.is_file():
+        kept = ConfigChange.load(folder.proposal).before_contents
+    return kept if kept is not None and fingerprint_of(kept) == started.config_sha256 else None
+
+
+def _native_config(settings: CellSettings, started: RunStarted) -> bytes:
+    """A config in the native format with the geometry that commanded the run."""
+    parameters = settings.mechanism.parameters
+    geometry = dump(geometry_settings(parameters).model_validate(started.controller))
+    branch = f"branch = {list(started.branch)}\n" if started.branch else ""
+    return f"[geometry]\n{geometry}{branch}".encode()

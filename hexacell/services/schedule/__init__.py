@@ -1,0 +1,1 @@
+"""Runs without a person: when they begin, what starts them, and when they end."""

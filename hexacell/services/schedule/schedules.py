@@ -1,0 +1,265 @@
+"""The schedule of a cell: units of systemd written, shown and removed; nothing else is touched."""
+
+from __future__ import annotations
+
+import grp
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+
+from hexacell.cell.loader import Cell
+from hexacell.cell.unattended import DAY_MINUTES
+from hexacell.errors import FileError, UsageError
+from hexacell.services.schedule.scheduled_run import MOST_MINUTES, ScheduledRun, time_of_day
+from hexacell.services.schedule.systemd_units import cell_of, service_text, timer_text
+from hexacell.storage import atomic_files
+
+SYSTEM_UNITS = Path("/etc/systemd/system")
+USER_UNITS = Path(".config/systemd/user")
+DEVICE_GROUPS = ("dialout",)
+"""Who may open serial lines, on Debian and its like; named where it exists."""
+
+VERIFYING_S = 20.0
+SPARE_MINUTES = 10.0
+"""Beside its longest duration, for a run to go back to its reference."""
+_UNIT_NAME = re.compile(r"[A-Za-z0-9:_.@%\\-]+\.[a-z]+")
+
+
+@dataclass(frozen=True, slots=True)
+class ScheduleRequest:
+    """What a person asks for; times in minutes."""
+
+    daily: str
+    mode: str = "check"
+    longest_minutes: int = 120
+    retry_minutes: int = 15
+    retries: int = 3
+    on_failure: str | None = None
+    metrics: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """The units of one cell.
+
+    Attributes:
+        is_of_system: whether they run without a user being logged in.
+        complaints: what systemd says is wrong with them.
+    """
+
+    unit: str
+    files: tuple[Path, ...]
+    is_of_system: bool
+    complaints: tuple[str, ...] = ()
+
+
+def scheduled_run(cell: Cell, request: ScheduleRequest) -> ScheduledRun:
+    """What is to be started.
+
+    Raises:
+        UsageError: it cannot run without a person, or a number or the time makes no sense.
+    """
+    _require_possible(cell, request)
+    hour, minute = time_of_day(request.daily)
+    _require_not_quiet(cell, hour, minute)
+    longest, retries = _times(cell, request)
+    if (retries + 1) * (longest + request.retry_minutes) > MOST_MINUTES:
+        raise UsageError("all tries together last longer than a day", action="Lower --longest or --retries")
+    path = cell.path.resolve()
+    configs = [path.resolve().parent for path in cell.config_paths]
+    metrics = None if request.metrics is None else request.metrics.resolve()
+    return ScheduledRun(
+        cell=path,
+        name=cell.settings.name,
+        program=(sys.executable, "-m", "hexacell"),
+        mode=request.mode,
+        hour=hour,
+        minute=minute,
+        longest_minutes=longest,
+        retry_minutes=request.retry_minutes,
+        retries=retries,
+        metrics=metrics,
+        writable=tuple(
+            dict.fromkeys((path.parent, *configs, *([] if metrics is None else [metrics.parent])))
+        ),
+    )
+
+
+def write_schedule(cell: Cell, request: ScheduleRequest, folder: Path | None) -> Schedule:
+    """Write the units, into a folder or where this user's units are.
+
+    Those that the cell had under an earlier name are removed: a cell has one schedule.
+
+    Raises:
+        UsageError: as :func:`scheduled_run`, or another cell's units have this name.
+        FileError: they cannot be written.
+    """
+    run = scheduled_run(cell, request)
+    place, is_of_system = _place(folder)
+    service, timer = _files(run.unit, place)
+    for path in (service, timer):
+        _require_ours(path, run.cell)
+    user = _owner_of(run.cell) if is_of_system else None
+    groups = [group for group in DEVICE_GROUPS if _exists(group)]
+    atomic_files.create_folder_durably(place)
+    _remove_units([path for path in _units_of(run.cell, place) if path not in {service, timer}])
+    atomic_files.write_atomically(service, service_text(run, user, groups, request.on_failure).encode())
+    atomic_files.write_atomically(timer, timer_text(run).encode())
+    return Schedule(run.unit, (service, timer), is_of_system, _verified((service, timer)))
+
+
+def present_schedule(cell: Cell, folder: Path | None) -> Schedule | None:
+    """The units of a cell; none if it has none."""
+    place, is_of_system = _place(folder)
+    found = _units_of(cell.path.resolve(), place)
+    return Schedule(found[0].stem, found, is_of_system) if found else None
+
+
+def remove_schedule(cell: Cell, folder: Path | None) -> Schedule | None:
+    """Remove the units of a cell, and that they begin with the computer; gives what there was.
+
+    Raises:
+        FileError: they cannot be removed.
+    """
+    present = present_schedule(cell, folder)
+    if present is None:
+        return None
+    _remove_units(present.files)
+    return present
+
+
+def _units_of(cell: Path, place: Path) -> tuple[Path, ...]:
+    return tuple(path for path in sorted(place.glob("hexacell-*.*")) if _cell_of(path) == cell)
+
+
+def _remove_units(files: Sequence[Path]) -> None:
+    enabled = [path.parent / "timers.target.wants" / path.name for path in files]
+    for path in (*enabled, *files):
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise atomic_files.os_error_to_file_error("cannot be removed", path, error) from error
+
+
+def _require_possible(cell: Cell, request: ScheduleRequest) -> None:
+    settings = cell.settings
+    if settings.stations.placement == "by-hand":
+        raise UsageError(
+            "unattended running is not possible: the gauges are put at each point by hand",
+            subject=cell.path,
+            action='Fix gauges at every point and write placement = "fixed" in [stations]',
+        )
+    if not str(cell.path.resolve()).isprintable():
+        raise UsageError("a path with control characters cannot be scheduled", subject=cell.path)
+    for what, minutes in (("longest", request.longest_minutes), ("retry", request.retry_minutes)):
+        if not 1 <= minutes <= MOST_MINUTES:
+            action = f"Give 1 to {MOST_MINUTES} minutes"
+            raise UsageError(f"--{what} {minutes} is no duration", action=action)
+    if request.metrics is not None and not request.metrics.resolve().parent.is_dir():
+        raise UsageError(
+            "the folder of the metrics does not exist", subject=request.metrics, action="Make it"
+        )
+    if request.on_failure is not None and not _UNIT_NAME.fullmatch(request.on_failure):
+        raise UsageError(
+            f"'{request.on_failure}' is no name of a unit", action="Write it as mail-me@%n.service"
+        )
+
+
+def _times(cell: Cell, request: ScheduleRequest) -> tuple[int, int]:
+    """After how many minutes a service is stopped, and how often it is tried again.
+
+    What the cell file says of window and longest duration the run itself keeps: a service must leave it the
+    time for that, and does not try again what was tried for a whole window.
+    """
+    stated = cell.settings.unattended
+    needed = stated.window_minutes + (stated.longest_minutes or request.longest_minutes) + SPARE_MINUTES
+    has_hours = stated.window_minutes > 0.0 or stated.longest_minutes is not None
+    longest = max(request.longest_minutes, ceil(needed)) if has_hours else request.longest_minutes
+    return longest, 0 if stated.window_minutes > 0.0 else request.retries
+
+
+def _require_not_quiet(cell: Cell, hour: int, minute: int) -> None:
+    """Refuse a time at which quiet hours begin or go on, on whatever day."""
+    stated, at = cell.settings.unattended, 60 * hour + minute
+    for begin, length in stated.quiet_spans:
+        if (at - begin) % DAY_MINUTES < length:
+            raise UsageError(
+                f"{hour:02}:{minute:02} is in the quiet hours of the cell",
+                subject=cell.path,
+                action="Choose another time, or change quiet_hours in [unattended]",
+            )
+
+
+def _place(folder: Path | None) -> tuple[Path, bool]:
+    is_of_system = os.geteuid() == 0
+    if folder is not None:
+        return folder, is_of_system
+    return (SYSTEM_UNITS if is_of_system else Path.home() / USER_UNITS), is_of_system
+
+
+def _files(unit: str, place: Path) -> tuple[Path, Path]:
+    return place / f"{unit}.service", place / f"{unit}.timer"
+
+
+def _cell_of(path: Path) -> Path | None:
+    try:
+        return cell_of(atomic_files.read_text(path))
+    except FileError:
+        return None
+
+
+def _require_ours(path: Path, cell: Path) -> None:
+    if not path.exists():
+        return
+    other = _cell_of(path)
+    if other is None:
+        raise UsageError("this file is not of `hexacell schedule`", subject=path, action="Move it away")
+    if other != cell:
+        raise UsageError(
+            f"this is the schedule of {other}", subject=path, action="Give one of the cells another name"
+        )
+
+
+def _owner_of(cell: Path) -> str:
+    """Whoever owns the cell file runs it: not root, where root only writes the units."""
+    try:
+        return cell.owner()
+    except (OSError, KeyError) as error:
+        raise UsageError(
+            "nobody on this computer owns it", subject=cell, action="Give it an owner"
+        ) from error
+
+
+def _exists(group: str) -> bool:
+    try:
+        grp.getgrnam(group)
+    except KeyError:
+        return False
+    return True
+
+
+def _verified(units: Sequence[Path]) -> tuple[str, ...]:
+    """What systemd finds wrong with them; nothing where there is no systemd."""
+    program = shutil.which("systemd-analyze")
+    if program is None:
+        return ()
+    try:
+        done = subprocess.run(  # noqa: S603 - our own files
+            [program, "verify", *map(str, units)],
+            capture_output=True,
+            text=True,
+            timeout=VERIFYING_S,
+            check=False,
+            stdin=subprocess.DEVNULL,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ()
+    names = [path.name for path in units]
+    lines = done.stderr.splitlines()
+    return tuple(line for line in lines if any(name in line for name in names))

@@ -1,0 +1,112 @@
+"""Runs without a person: refused in quiet hours, tried again for a while, ended when their time is over."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from hexacell.cell.model import CellSettings
+from hexacell.errors import ExitCode, HexacellError, OutOfTime
+from hexacell.runs.run_folder import new_run_in, runs_folder_of_unreadable
+from hexacell.runs.start_attempts import StartAttempt, StartAttempts, note_attempt
+from hexacell.services.run.calibration_run import RunRequest
+from hexacell.services.schedule.quiet_hours import next_quiet, quiet_until
+from procedures.run.commands import CommandQueue, EndAtReference
+
+MAY_PASS = frozenset({ExitCode.HARDWARE, ExitCode.BUSY, ExitCode.OUT_OF_TIME})
+"""Of refusals that another try may not meet: device, stop line, full disk; the lock; quiet hours."""
+
+
+@dataclass(frozen=True, slots=True)
+class RefusedStart:
+    """A run that could not begin.
+
+    Attributes:
+        attempts: all tries so far; none where they could not be written.
+        wait_s: so long until the next try; none where there is none.
+    """
+
+    attempts: StartAttempts | None
+    wait_s: float | None
+
+
+def local_now() -> datetime:
+    """The present moment in the computer's time zone."""
+    return datetime.now(UTC).astimezone()
+
+
+def refuse_quiet_hours(settings: CellSettings, at: datetime) -> None:
+    """Refuse a run that would begin in quiet hours.
+
+    Raises:
+        OutOfTime: names their end.
+    """
+    until = quiet_until(settings.unattended, at)
+    if until is not None:
+        raise OutOfTime(
+            f"these are quiet hours of the cell, until {until:%H:%M}: no run begins without a person",
+            action="Let it begin later, or change quiet_hours in [unattended]",
+        )
+
+
+def refused_start(request: RunRequest, error: HexacellError, began: datetime, at: datetime) -> RefusedStart:
+    """Note that a run could not begin, where the history finds it; and when it is tried again, if it is.
+
+    ``began`` is when it was tried first. A disk that takes no note does not change what is reported.
+    """
+    attempt = StartAttempt(at=at.astimezone(UTC), reason=str(error), exit_code=int(error.exit_code))
+    try:
+        attempts = note_attempt(request.folder, request.mode.value, attempt)
+    except HexacellError:
+        attempts = None
+    return RefusedStart(attempts, _wait_s(request.cell.settings, error, began, at))
+
+
+def note_unreadable_cell(path: Path, mode: str, error: HexacellError) -> None:
+    """Note that a run could not begin, as the cell file at ``path`` has mistakes.
+
+    That is left where nothing tells whose file it is, or the disk takes no note.
+    """
+    folder = runs_folder_of_unreadable(path)
+    if folder is not None:
+        attempt = StartAttempt(at=datetime.now(UTC), reason=str(error), exit_code=int(error.exit_code))
+        with suppress(HexacellError):
+            note_attempt(new_run_in(folder), mode, attempt)
+
+
+def _wait_s(settings: CellSettings, error: HexacellError, began: datetime, at: datetime) -> float | None:
+    """How long until another try; none where it would not help, or the window is over by then."""
+    wanted = settings.unattended
+    again = at + timedelta(minutes=wanted.retry_minutes)
+    is_open = again <= began + timedelta(minutes=wanted.window_minutes)
+    return 60.0 * wanted.retry_minutes if is_open and error.exit_code in MAY_PASS else None
+
+
+def time_limit(settings: CellSettings, at: datetime) -> tuple[float, str] | None:
+    """How many seconds a run that begins now may last, and why no longer; none where nothing limits it."""
+    wanted, limits = settings.unattended, []
+    if wanted.longest_minutes is not None:
+        seconds = 60.0 * wanted.longest_minutes / settings.timing.clock_factor
+        limits.append((seconds, f"it lasted longer than longest_minutes = {wanted.longest_minutes:g}"))
+    if (quiet := next_quiet(wanted, at)) is not None:
+        limits.append(((quiet - at).total_seconds(), f"quiet hours begin at {quiet:%H:%M}"))
+    return min(limits, default=None)
+
+
+@contextmanager
+def ended_in_time(request: RunRequest, queue: CommandQueue) -> Iterator[None]:
+    """Within this context, in a running loop, a run that keeps the cell's hours is ended in time."""
+    limit = time_limit(request.cell.settings, local_now()) if request.keeps_hours else None
+    if limit is None:
+        yield
+        return
+    seconds, reason = limit
+    timer = asyncio.get_running_loop().call_later(seconds, queue.put, EndAtReference(reason))
+    try:
+        yield
+    finally:
+        timer.cancel()

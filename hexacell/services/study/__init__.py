@@ -1,0 +1,1 @@
+"""A study carried out by processes of this computer or by a Dask cluster."""

@@ -1,0 +1,1 @@
+"""A result and the controller's config: applied by a person, recorded, rolled back."""

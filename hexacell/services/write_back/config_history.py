@@ -1,0 +1,177 @@
+"""All writes into a cell's config, the newest first: who, when, what and why.
+
+They are those recorded beside the run folders. Of a write that has no record, as those of programs before
+there were records, or where none could be written, the run's own folder tells when it was, who approved it
+and why: its journal, and ``applied.json``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from hexacell.cell.loader import Cell
+from hexacell.config.receipt import Receipt
+from hexacell.config.write_record import (
+    RECORDS,
+    THE_RUN,
+    WriteKind,
+    WriteRecord,
+    read_records,
+)
+from hexacell.errors import HexacellError
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.write_back.config_rollback import receipts_of
+from hexacell.services.write_back.proposals import later_approval
+from hexacell.verdict.decision import Verdict
+from procedures.engine.config_transactions import reason_to_take_back
+from procedures.journal.journal import read_entries
+from procedures.journal.line_format import Entry
+from procedures.run import events
+from procedures.run.state import RunState, apply
+
+_OF_THE_RESULT = (WriteKind.RESULT, WriteKind.APPLIED, WriteKind.TAKEN_BACK)
+"""Writes that the verdict of the run is about."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigWrite:
+    """One write into the config of a cell.
+
+    Attributes:
+        record: what is known of it.
+        is_recorded: whether a record was kept; else the run's folder told it.
+        verdict: that of its run, and ``line`` is the outcome in words; none and empty where there is none.
+    """
+
+    record: WriteRecord
+    is_recorded: bool
+    verdict: Verdict | None = None
+    line: str = ""
+
+    @property
+    def why(self) -> str:
+        """The cause; of a result its outcome, which came after it was written; empty if it is not known."""
+        return self.line if self.record.kind is WriteKind.RESULT else self.record.why or self.line
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigHistory:
+    """The writes into a cell's config, the newest first.
+
+    ``damaged`` are the lines of ``path``, the file of the records, that cannot be read; they are left out.
+    """
+
+    writes: tuple[ConfigWrite, ...]
+    path: Path
+    damaged: tuple[int, ...]
+
+
+def config_history(cell: Cell) -> ConfigHistory:
+    """Every write into the config of a cell that its runs know of.
+
+    Raises:
+        FileError: the records cannot be read.
+    """
+    folder = runs_folder(cell)
+    records, damaged = read_records(folder)
+    runs = {run.name: run for run in _written_runs(cell)}
+    found: list[ConfigWrite] = []
+    for name in sorted({*runs, *(record.run for record in records)}):
+        own = [record for record in records if record.run == name]
+        found += _writes_of(runs.get(name) or _Run(name), own)
+    # Reversed only when sorted: of two in the same millisecond the later one stays the newer.
+    oldest_first = sorted(found, key=lambda one: _in_milliseconds(one.record.at))
+    return ConfigHistory(tuple(reversed(oldest_first)), folder / RECORDS, damaged)
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """What the folder of a run tells of its writes; nothing where there is none any more."""
+
+    name: str
+    told: tuple[WriteRecord, ...] = ()
+    verdict: Verdict | None = None
+    line: str = ""
+
+
+def _writes_of(run: _Run, records: Sequence[WriteRecord]) -> Iterator[ConfigWrite]:
+    every = [*((one, True) for one in records), *((one, False) for one in _unrecorded(run.told, records))]
+    for record, is_recorded in every:
+        if record.kind in _OF_THE_RESULT:
+            yield ConfigWrite(record, is_recorded, run.verdict, run.line)
+        else:
+            yield ConfigWrite(record, is_recorded)
+
+
+def _unrecorded(told: Sequence[WriteRecord], records: Sequence[WriteRecord]) -> list[WriteRecord]:
+    """Those without a record of their kind, in their order; each record is of the first that it fits."""
+    left = list(told)
+    for record in records:
+        fitting = (index for index, one in enumerate(left) if _is_of(record, one))
+        if (match := next(fitting, None)) is not None:
+            del left[match]
+    return left
+
+
+def _is_of(record: WriteRecord, told: WriteRecord) -> bool:
+    """A record is kept between the write and the line of the journal. ``applied.json`` is before both.
+
+    Journals have milliseconds, so that what came after it may seem to have come before.
+    """
+    recorded_at, told_at = _in_milliseconds(record.at), _in_milliseconds(told.at)
+    in_order = told_at <= recorded_at if record.kind is WriteKind.APPLIED else recorded_at <= told_at
+    return record.kind is told.kind and in_order
+
+
+def _in_milliseconds(at: datetime) -> datetime:
+    return at.replace(microsecond=at.microsecond // 1000 * 1000)
+
+
+def _written_runs(cell: Cell) -> Iterator[_Run]:
+    """The runs that wrote the config; those that cannot be read are left out."""
+    for receipt in receipts_of(cell):
+        with suppress(HexacellError):
+            yield _read(RunFolder(receipt.backup_folder), receipt)
+
+
+def _read(run: RunFolder, receipt: Receipt) -> _Run:
+    state, told = RunState(), list[WriteRecord]()
+    for entry in read_entries(run.journal):
+        told += _told_by(entry, state, run, receipt)
+        state = apply(state, entry.event)
+    if (approval := later_approval(run)) is not None:
+        told.append(_record(WriteKind.APPLIED, approval.at, approval.by, run, receipt))
+    judged = state.judged
+    return _Run(run.name, tuple(told), judged.verdict if judged else None, judged.line if judged else "")
+
+
+def _told_by(entry: Entry, state: RunState, run: RunFolder, receipt: Receipt) -> Iterator[WriteRecord]:
+    """The write that a line of the journal tells, if it does; ``state`` is that before it."""
+    match entry.event:
+        case events.Committed(approved_by=by):
+            yield _record(WriteKind.RESULT, entry.at, by, run, receipt)
+        case events.RolledBack() if state.committed is not None:
+            why = reason_to_take_back(state)
+            yield _record(WriteKind.TAKEN_BACK, entry.at, THE_RUN, run, receipt, why)
+
+
+def _record(
+    kind: WriteKind, at: datetime, by: str, run: RunFolder, receipt: Receipt, why: str = ""
+) -> WriteRecord:
+    before, after = receipt.sha256_before, receipt.sha256_after
+    if kind is WriteKind.TAKEN_BACK:
+        before, after = after, before
+    return WriteRecord(
+        at=at,
+        kind=kind,
+        by=by,
+        run=run.name,
+        files=receipt.paths,
+        sha256_before=before,
+        sha256_after=after,
+        why=why,
+    )

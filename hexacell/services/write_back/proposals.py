@@ -1,0 +1,231 @@
+"""The proposal of a run, written into the controller's config afterwards by a person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import ClassVar
+
+from hexacell.cell.loader import load_cell
+from hexacell.config.change import ConfigChange, JsonRecord
+from hexacell.config.contents import are_same_files, fingerprint
+from hexacell.config.layout import ConfigLayout
+from hexacell.config.three_way import ConfigEditedSince, compare_versions
+from hexacell.config.write_back import commit
+from hexacell.config.write_record import WriteCause, WriteKind, recorded_write, stated_reason
+from hexacell.errors import FileError, LimitError, UsageError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import ParameterSet
+from hexacell.results.written_geometry import TaskDisplacement
+from hexacell.robot.model import config_layout
+from hexacell.runs.run_folder import RunFolder
+from hexacell.services.write_back.held_config import held_config
+from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.decision import Verdict
+from procedures.engine.config_transactions import holds_provisional
+from procedures.journal.journal import read_journal
+from procedures.journal.line_format import RESTORE, now
+from procedures.run import events
+from procedures.run.questions import Operator, Question, ask_approval
+from procedures.run.state import RunState, fold
+
+COMMAND = "the command"
+"""Who approves what needs no person: who typed ``apply``."""
+
+
+class LaterApproval(JsonRecord):
+    """Who had a proposal written after its run, and when: ``applied.json`` in the run folder."""
+
+    noun: ClassVar[str] = "approval of a proposal"
+
+    by: str
+    at: datetime
+    sha256_after: str
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """The change of the config that a run proposed, and the conditions under which it may be written."""
+
+    folder: RunFolder
+    cell: str
+    change: ConfigChange
+    gates: tuple[AcceptanceGate, ...]
+    layout: ConfigLayout
+    parameters: ParameterSet
+    state: RunState
+
+    @property
+    def displacement(self) -> TaskDisplacement | None:
+        """How far it moves taught points and frames; none if that is not known."""
+        return None if self.state.proposed is None else self.state.proposed.displacement
+
+
+@dataclass(frozen=True, slots=True)
+class AppliedProposal:
+    """A proposal that the config has now.
+
+    Attributes:
+        by: who had it written, empty if it was there already.
+        unrecorded: why the history has no record of it, in a sentence; empty if it has.
+    """
+
+    proposal: Proposal
+    by: str
+    unrecorded: str = ""
+
+
+def read_proposal(folder: RunFolder) -> Proposal:
+    """The proposal of a run.
+
+    Raises:
+        UsageError: the run proposed nothing.
+        FileError: its files cannot be read, or do not belong together.
+    """
+    state = fold(read_journal(folder.journal))
+    if state.started is None or state.proposed is None or not folder.proposal.exists():
+        raise UsageError(
+            "this run proposed no change of a config",
+            subject=folder.path,
+            action="Name a calibration that identified a geometry",
+        )
+    change = ConfigChange.load(folder.proposal)
+    _require_together(folder, state.started, state.proposed, change)
+    settings = load_cell(folder.cell_file).settings
+    return Proposal(
+        folder,
+        state.started.cell,
+        change,
+        (*state.proposed.gates, _verification_gate(state)),
+        config_layout(settings),
+        settings.mechanism.parameters,
+        state,
+    )
+
+
+def approval_question(proposal: Proposal) -> Question:
+    """What a person is asked before it is written, with the gates that may refuse it."""
+    state = proposal.state
+    improvement = state.identified.improvement if state.identified else None
+    return ask_approval(
+        proposal.gates, proposal.change.diff, proposal.displacement, improvement, cell=proposal.cell
+    )
+
+
+async def apply_proposal(
+    proposal: Proposal, operator: Operator, *, typed_by: str = COMMAND, reason: str = ""
+) -> AppliedProposal:
+    """Write a proposal into the controller's config, once a person has accepted what needs one.
+
+    Args:
+        proposal: of a run of the cell.
+        operator: who is asked where a gate needs a person.
+        typed_by: who approves where none does.
+        reason: why, as the history of the config is to have it.
+
+    Raises:
+        UsageError: ``reason`` is no line of text.
+        LimitError: a gate refuses it, or the person declined.
+        AnswerNeeded: a person must accept it, and nobody is there.
+        ConfigEditedSince: the config was edited since the run began.
+        CellBusy, FileError, WriteBackUndone: see :func:`~hexacell.config.write_back.commit`.
+    """
+    change, reason = proposal.change, stated_reason(reason)
+    with held_config(*change.paths):
+        if fingerprint(*change.paths) == change.sha256_after:
+            return AppliedProposal(proposal, "")
+        _require_unedited(proposal)
+        by = await _approval(proposal, operator, typed_by)
+        approval = LaterApproval(by=by, at=now()[0], sha256_after=change.sha256_after)
+        approval.save(_approval_path(proposal.folder), like=change.path)
+        cause = WriteCause(WriteKind.APPLIED, by, proposal.folder.name, _outcome(proposal.state), reason)
+        folder, layout = proposal.folder.siblings, proposal.layout
+        try:
+            with recorded_write(folder, change.paths, layout, cause) as recording:
+                commit(change, proposal.folder.path)
+        except BaseException:
+            _approval_path(proposal.folder).unlink(missing_ok=True)
+            raise
+    return AppliedProposal(proposal, by, recording.problem)
+
+
+def later_approval(folder: RunFolder) -> LaterApproval | None:
+    """Who had the proposal of a run written after it; none if nobody did. Raises ``FileError``."""
+    path = _approval_path(folder)
+    return LaterApproval.load(path) if path.exists() else None
+
+
+def _approval_path(folder: RunFolder) -> Path:
+    return folder.path / "applied.json"
+
+
+async def _approval(proposal: Proposal, operator: Operator, typed_by: str) -> str:
+    failed = [gate for gate in proposal.gates if not gate.passed]
+    if refused := [gate.sentence for gate in failed if not gate.needs_person]:
+        raise LimitError("the new geometry is refused: " + " ".join(refused))
+    if not failed:
+        return typed_by
+    if (name := await operator.ask(approval_question(proposal))) is None:
+        raise LimitError("the new geometry was declined; nothing was applied")
+    return name
+
+
+def _outcome(state: RunState) -> str:
+    """What the run itself said of the geometry."""
+    return "not verified by its run" if state.judged is None else state.judged.line
+
+
+def _verification_gate(state: RunState) -> AcceptanceGate:
+    """What the held-out records say of the written geometry."""
+    judged = state.judged
+    if judged is None or judged.verification is None:
+        sentence = "No held-out record has verified it."
+        return AcceptanceGate(name="verified", passed=False, sentence=sentence, needs_person=True)
+    return AcceptanceGate(
+        name="verified",
+        passed=judged.verdict is Verdict.PASS,
+        sentence=f"Its verification: {judged.line}.",
+        needs_person=judged.verification.is_offered,
+    )
+
+
+def _require_unedited(proposal: Proposal) -> None:
+    change = proposal.change
+    if fingerprint(*change.paths) == change.sha256_before:
+        return
+    if holds_provisional(proposal.folder, change.paths):
+        raise UsageError(
+            "the run was interrupted and left its provisional geometry here",
+            subject=change.path,
+            action="Resume that run, which takes it back",
+        )
+    versions = compare_versions(
+        change.paths,
+        proposal.layout,
+        (Geometry.of(proposal.parameters, change.before), change.before_contents),
+        (Geometry.of(proposal.parameters, change.after), change.after_contents),
+    )
+    raise ConfigEditedSince(
+        "the config changed since the run began; its geometry does not belong to it",
+        versions,
+        path=change.path,
+        action="Nothing was written: undo the edit and repeat, or calibrate again",
+    )
+
+
+def _require_together(
+    folder: RunFolder, started: events.RunStarted, proposed: events.Proposed, change: ConfigChange
+) -> None:
+    """The proposal is the one of the journal, and for the config that the run began with."""
+    files = tuple(Path(name) for name in (started.config, *started.further_configs))
+    is_same_config = are_same_files(change.paths, files)
+    is_same_text = change.sha256_before == started.config_sha256
+    if folder.proposal.is_symlink() or not (is_same_config and is_same_text) or _differs(proposed, change):
+        raise FileError(
+            "this proposal is not the one of its journal", subject=folder.proposal, action=RESTORE
+        )
+
+
+def _differs(proposed: events.Proposed, change: ConfigChange) -> bool:
+    return proposed.written is not None and proposed.written != change.after

@@ -1,0 +1,123 @@
+"""Text for changes of the controller's config outside a run: applied, rolled back, or edited by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from hexacell.config.contents import names_of
+from hexacell.config.receipt import BEFORE, kept_paths
+from hexacell.config.three_way import ConfigVersions, NumberVersions
+from hexacell.config.write_record import WriteKind, WriteRecord
+from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
+from hexacell.services.write_back.config_rollback import ConfigRollback
+from hexacell.services.write_back.proposals import AppliedProposal
+from hexacell.text.layout import wrapped
+from hexacell.text.teaching import teaching_line
+
+RELOAD = "Restart or reload the controller before it moves: until then it has the geometry of before."
+
+
+def applied_text(applied: AppliedProposal) -> str:
+    """What an application of a proposal did, and what is to be done next."""
+    proposal = applied.proposal
+    if not applied.by:
+        files = files_named(proposal.change.paths, "has", "have")
+        return f"{files} this geometry already; nothing was written."
+    kept = kept_paths(proposal.folder.path, BEFORE, len(proposal.change.paths))
+    teaching = () if proposal.displacement is None else (teaching_line(proposal.displacement),)
+    return "\n".join(
+        (
+            f"Written into {files_named(proposal.change.paths)}, approved by {applied.by}.",
+            *teaching,
+            wrapped(RELOAD),
+            f"`hexacell rollback` undoes it; the old config is {files_named(kept)}.",
+            *_unrecorded_lines(applied.unrecorded),
+        )
+    )
+
+
+def rollback_text(done: ConfigRollback) -> str:
+    """What a rollback did, and what is to be done next."""
+    if not done.change:
+        files = files_named(done.paths, "is", "are")
+        return f"{files} as in {files_named(done.restored)} already; nothing was written."
+    undone = "" if done.undone is None else f", which undoes the run {done.undone.name}"
+    copies = zip(done.paths, done.restored, strict=True)
+    back = ",\n".join(f"{path} is {copy} again" for path, copy in copies)
+    lines = (done.change, f"{back}, bit for bit{undone}.", wrapped(RELOAD))
+    return "\n".join([*lines, *_unrecorded_lines(done.unrecorded)])
+
+
+def _unrecorded_lines(problem: str) -> list[str]:
+    return [wrapped(problem)] if problem else []
+
+
+NO_WRITES = "No run of this cell wrote its config."
+
+_TOLD = {
+    WriteKind.RESULT: "the result of {run} written",
+    WriteKind.APPLIED: "the proposal of {run} applied",
+    WriteKind.ROLLED_BACK: "rolled back",
+    WriteKind.TAKEN_BACK: "the result of {run} taken back by itself",
+    WriteKind.PROVISIONAL: "a provisional geometry of {run} written",
+    WriteKind.PROVISIONAL_TAKEN_BACK: "the provisional geometry of {run} taken back by itself",
+}
+
+
+def config_history_text(found: ConfigHistory) -> str:
+    """Each write into the config, the newest first: when and what; then who, how much and why."""
+    if not found.writes:
+        return NO_WRITES
+    return "\n".join(_write_text(one) for one in found.writes)
+
+
+def _write_text(write: ConfigWrite) -> str:
+    one = write.record
+    head = f"{one.at:%Y-%m-%d %H:%M:%S}  {_TOLD[one.kind].format(run=one.run)}"
+    parts = [
+        _who(one),
+        _how_much(one),
+        write.why or "no verdict on it is known",
+        f'given as the reason: "{one.reason}"',
+    ]
+    stated = parts if one.reason else parts[:-1]
+    return "\n".join([wrapped(head, indent=2), *(wrapped(f"  {part}", indent=4) for part in stated)])
+
+
+def _who(one: WriteRecord) -> str:
+    process = f", as {one.user} on {one.host}" if one.user else ""
+    return f"by {one.by}{process}"
+
+
+def _how_much(one: WriteRecord) -> str:
+    files = files_named([Path(name) for name in names_of(one.files)])
+    if one.numbers_changed is None:
+        return f"{files}: how many numbers is not known"
+    plural = "" if one.numbers_changed == 1 else "s"
+    told = f"{files}: {one.numbers_changed} number{plural}"
+    if one.largest is None:
+        return told
+    return (
+        f"{told}, most of all {one.largest.name} by {one.largest.change:+.4f} {one.largest.unit}".rstrip()
+    )
+
+
+def files_named(paths: Sequence[Path], verb: str = "", verb_of_several: str = "") -> str:
+    """The files of a config in a sentence, with its verb."""
+    return f"{' and '.join(map(str, paths))} {verb_of_several if paths[1:] else verb}".rstrip()
+
+
+def versions_text(versions: ConfigVersions) -> str:
+    """The three versions of an edited config, number by number, and the edit itself."""
+    origin = "the run wrote it" if versions.is_from_written else "it was before the run"
+    numbers = [_number_line(one) for one in versions.numbers]
+    head = f"{'number':9}{'before':>16}{'written':>16}{'now':>16}"
+    table = [head, *numbers] if numbers else ["No number of the geometry differs."]
+    return "\n".join([*table, f"The edit since {origin}:", versions.edit.rstrip("\n")])
+
+
+def _number_line(number: NumberVersions) -> str:
+    now = f"{'unreadable':>16}" if number.now is None else f"{number.now:16.6f}"
+    edited = "  edited by hand" if number.is_edited else ""
+    return f"{number.name:9}{number.before:16.6f}{number.written:16.6f}{now}{edited}"

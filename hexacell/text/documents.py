@@ -1,0 +1,346 @@
+"""The JSON documents that commands print for programs (``docs/interface.md``)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from drivers.interfaces import DeviceIdentity
+from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.dry_run.quick_level import QuickTrial
+from hexacell.results.run_comparison import ParameterTrend, RunComparison
+from hexacell.services.history.drift_history import DriftHistory, FoundChange
+from hexacell.services.history.evidence_comparison import EvidenceComparison
+from hexacell.services.history.history import PastRun
+from hexacell.services.history.refit import RefittedRun
+from hexacell.services.history.retention import Retention
+from hexacell.services.records.offline import NextPose, PlanTrial
+from hexacell.services.run.calibration_run import RunRequest
+from hexacell.services.schedule.schedules import Schedule
+from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
+from hexacell.services.write_back.config_rollback import ConfigRollback
+from hexacell.services.write_back.proposals import AppliedProposal
+from hexacell.text.run_story import run_story
+from hexacell.text.teaching import teaching_sentence
+from procedures.journal.line_format import Entry
+from procedures.replay.comparison import ReplayReport
+from procedures.run import events
+from procedures.run.state import RunState
+
+
+def next_document(proposed: NextPose) -> dict[str, Any]:
+    """What ``next --json`` prints."""
+    decision, forecast = proposed.decision, proposed.forecast
+    now = None if forecast is None else forecast.now_mm
+    expanded = None if forecast is None else forecast.expanded_mm(forecast.now_mm)
+    left_out = [list(record) for record in proposed.left_out]
+    if isinstance(decision, Finished):
+        return {
+            "done": True,
+            "reason": decision.reason,
+            "present_worst_sigma_mm": now,
+            "present_expanded_mm": expanded,
+            "left_out": left_out,
+        }
+    return {
+        "done": False,
+        "left_out": left_out,
+        "point": decision.point,
+        **_expected_record(decision),
+        "pose": asdict(decision.pose),
+        "joint_targets": list(decision.joints),
+        "present_worst_sigma_mm": now,
+        "present_expanded_mm": expanded,
+        "predicted_worst_sigma_mm": None if forecast is None else forecast.next_mm,
+        "going_on": None if forecast is None else _remainder(forecast),
+    }
+
+
+def _expected_record(decision: StartPoint | MeasurePose) -> dict[str, Any]:
+    if isinstance(decision, StartPoint):
+        zero = [0.0, 0.0, 0.0]
+        return {
+            "orientation": 1,
+            "reference": True,
+            "predicted_deviation": zero,
+            "sigma": zero,
+            "gain": 0.0,
+            "via": [],
+        }
+    return {
+        "orientation": decision.orientation,
+        "reference": False,
+        "predicted_deviation": list(decision.deviation),
+        "sigma": list(decision.sigma),
+        "gain": decision.gain,
+        "via": [asdict(pose) for pose in decision.via],
+    }
+
+
+def _remainder(forecast: Forecast) -> dict[str, Any]:
+    return {
+        "records": forecast.records,
+        "minutes": forecast.minutes,
+        "worst_sigma_mm": forecast.end_mm,
+        "expanded_mm": forecast.expanded_mm(forecast.end_mm),
+        "gain_mm": forecast.gain_mm,
+    }
+
+
+def preflight_document(devices: Sequence[DeviceIdentity], trial: PlanTrial) -> dict[str, Any]:
+    """What ``preflight --json`` prints."""
+    return {
+        "ready": True,
+        "devices": [asdict(identity) for identity in devices],
+        "expected": {
+            **asdict(trial.result),
+            "averaging": [one.model_dump() for one in trial.averaging],
+            "encoders_part_mm": trial.encoders_part_mm,
+            "lost": {str(point): share for point, share in trial.unreachable.items()},
+        },
+    }
+
+
+def quick_preflight_document(devices: Sequence[DeviceIdentity], trial: QuickTrial) -> dict[str, Any]:
+    """What ``preflight --mode quick --json`` prints."""
+    return {
+        "ready": True,
+        "devices": [asdict(identity) for identity in devices],
+        "expected": {
+            "points": trial.points,
+            "minutes": trial.minutes,
+            "quick": trial.accuracy and trial.accuracy.model_dump(mode="json"),
+        },
+    }
+
+
+def run_document(request: RunRequest, ended: events.Ended, state: RunState) -> dict[str, Any]:
+    """What ``run --json`` and ``demo --json`` print."""
+    judged, noise, found = state.judged, state.noise, state.identified
+    measurements, moved = request.folder.measurements, ended.displacement
+    return {
+        "exit_code": ended.exit_code,
+        "line": ended.line,
+        "verdict": judged and judged.verdict.value,
+        "verification": judged and judged.verification and judged.verification.model_dump(mode="json"),
+        "check": judged and judged.check and judged.check.model_dump(mode="json"),
+        "quick": found and found.quick and found.quick.model_dump(mode="json"),
+        "design": asdict(found.design) if found and found.design else None,
+        "length": judged and judged.length and judged.length.model_dump(mode="json"),
+        "measured_noise": noise and noise.noise.model_dump(mode="json"),
+        "displacement": moved and moved.model_dump(mode="json"),
+        "teaching": moved and teaching_sentence(moved),
+        "run": str(request.folder.path),
+        "measurements": str(measurements) if measurements.is_file() else None,
+        "config": str(request.cell.config_path),
+    }
+
+
+def replay_document(replayed: ReplayReport) -> dict[str, Any]:
+    """What ``replay --json`` prints."""
+    return {
+        "same": replayed.is_same,
+        "journal": str(replayed.journal),
+        "events": replayed.events,
+        "decisions": replayed.decisions,
+        "results": replayed.results,
+        "taken": replayed.taken,
+        "recorded_by": replayed.recorded_by,
+        "replayed_by": replayed.replayed_by,
+        "differences": [
+            {
+                "line": difference.line,
+                "place": difference.place,
+                "aspect": difference.aspect.value,
+                "counts": replayed.counts(difference),
+                **asdict(difference.change),
+            }
+            for difference in replayed.differences
+        ],
+    }
+
+
+def applied_document(applied: AppliedProposal) -> dict[str, Any]:
+    """What ``apply --json`` prints."""
+    change, moved = applied.proposal.change, applied.proposal.displacement
+    return {
+        "applied": bool(applied.by),
+        "by": applied.by or None,
+        "config": str(change.path),
+        "further_configs": [str(path) for path in change.paths[1:]],
+        "run": str(applied.proposal.folder.path),
+        "sha256": change.sha256_after,
+        "teach": None if moved is None else teaching_sentence(moved),
+        "recorded": not applied.unrecorded,
+    }
+
+
+def rollback_document(done: ConfigRollback) -> dict[str, Any]:
+    """What ``rollback --json`` prints."""
+    return {
+        "restored": bool(done.change),
+        "config": str(done.paths[0]),
+        "further_configs": [str(path) for path in done.paths[1:]],
+        "from": str(done.restored[0]),
+        "undone": None if done.undone is None else str(done.undone),
+        "recorded": not done.unrecorded,
+    }
+
+
+def config_history_document(found: ConfigHistory) -> dict[str, Any]:
+    """What ``history --changes --json`` prints: the writes, the newest first."""
+    return {"changes": [_write_document(one) for one in found.writes], "damaged_lines": list(found.damaged)}
+
+
+def _write_document(write: ConfigWrite) -> dict[str, Any]:
+    one = write.record
+    return {
+        "at": one.at.isoformat(),
+        "kind": one.kind.value,
+        "by": one.by,
+        "user": one.user or None,
+        "host": one.host or None,
+        "run": one.run or None,
+        "config": str(one.files[0]),
+        "further_configs": [str(path) for path in one.files[1:]],
+        "sha256_before": one.sha256_before or None,
+        "sha256_after": one.sha256_after or None,
+        "numbers_changed": one.numbers_changed,
+        "largest": None if one.largest is None else one.largest.model_dump(),
+        "verdict": None if write.verdict is None else write.verdict.value,
+        "why": write.why or None,
+        "reason": one.reason or None,
+        "recorded": write.is_recorded,
+    }
+
+
+def history_document(runs: Sequence[PastRun]) -> dict[str, Any]:
+    """What ``history --json`` prints: the runs, the newest first."""
+    return {"runs": [past_run_document(run) for run in runs]}
+
+
+def past_run_document(run: PastRun) -> dict[str, Any]:
+    """One of them."""
+    was = run.summary
+    error = None if was.accuracy is None else was.accuracy.position
+    return {
+        "run": str(run.folder.path),
+        "began": None if was.began is None else was.began.isoformat(),
+        "ended": None if was.ended is None else was.ended.isoformat(),
+        "mode": was.mode or None,
+        "records": was.records,
+        "verdict": None if was.verdict is None else was.verdict.value,
+        "position_mm": None if error is None else error.value,
+        "expanded_mm": None if error is None else error.expanded,
+        "limit_mm": None if error is None else error.limit,
+        "line": was.line,
+        "begun": was.has_begun,
+        "over": was.is_over,
+        "in_controller": run.is_in_controller,
+        "written": was.has_written,
+        "proposal": was.has_proposal,
+    }
+
+
+def comparison_document(before: PastRun, after: PastRun, compared: RunComparison) -> dict[str, Any]:
+    """What ``history --compare --json`` prints."""
+    return {
+        "before": str(before.folder.path),
+        "after": str(after.folder.path),
+        "frame": compared.frame,
+        "changed": compared.is_changed,
+        "chi2": compared.test.chi2,
+        "dof": compared.test.expected,
+        "probability": compared.test.probability,
+        "parameters": [
+            {**asdict(one), "change": one.change, "significant": one.is_significant}
+            for one in compared.parameters
+        ],
+    }
+
+
+def evidence_comparison_document(found: EvidenceComparison) -> dict[str, Any]:
+    """What ``history --compare --json`` prints where one of the runs has no geometry of its own."""
+    return {
+        "before": str(found.before.path),
+        "after": str(found.after.path),
+        "changed": found.is_changed,
+        "leg": found.leg if found.is_changed else None,
+        "limit": found.limit,
+        "causes": [asdict(one) for one in found.causes],
+    }
+
+
+def drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> dict[str, Any]:
+    """What ``history --drift --json`` prints."""
+    return {
+        "parameters": [{**asdict(one), "walking": one.is_walking} for one in found],
+        "runs": [at.isoformat() for at in watched.runs],
+        "temperatures_c": list(watched.celsius),
+        "changes": [_change_document(one) for one in watched.changes],
+        "shares_of_limit": dict(watched.shares),
+        "rates": [asdict(one) for one in watched.rates],
+    }
+
+
+def _change_document(found: FoundChange) -> dict[str, Any]:
+    return {
+        "leg": found.leg,
+        "possible_legs": list(found.possible_legs),
+        "after": found.after.isoformat(),
+        "before": found.before.isoformat(),
+        "noticed": found.noticed.isoformat(),
+        "parameter": found.parameter.name,
+        "unit": found.parameter.kind.unit.value,
+        "change": found.change,
+        "sigma": found.sigma,
+        "per_day": found.per_day,
+        "sigma_per_day": found.sigma_per_day,
+        "moves_on": found.moves_on,
+        "other_legs": list(found.other_legs),
+    }
+
+
+def schedule_document(schedule: Schedule | None) -> dict[str, Any]:
+    """What ``schedule --json`` prints."""
+    if schedule is None:
+        return {"unit": None, "files": [], "complaints": []}
+    return {
+        "unit": schedule.unit,
+        "files": list(map(str, schedule.files)),
+        "complaints": list(schedule.complaints),
+    }
+
+
+def refit_document(found: RefittedRun) -> dict[str, Any]:
+    """What ``history --refit --json`` prints."""
+    return {
+        "run": str(found.folder.path),
+        "frame": found.today.frame,
+        **{
+            name: {"chi2": one.chi2, "dof": one.dof, "records": one.records, "converged": one.converged}
+            for name, one in (("then", found.then), ("today", found.today))
+        },
+        "parameters": [{**asdict(one), "change": one.change} for one in found.parameters],
+    }
+
+
+def retention_document(found: Retention, *, is_deleted: bool) -> dict[str, Any]:
+    """What ``history --keep --json`` prints."""
+    return {
+        "before": found.before.isoformat(),
+        "deleted": is_deleted,
+        "runs": [str(run.folder.path) for run in found.leaving],
+        "kept": [{"run": str(run.folder.path), "reason": reason.value} for run, reason in found.kept],
+    }
+
+
+def story_document(entries: Sequence[Entry]) -> dict[str, Any]:
+    """What ``history --show --json`` prints."""
+    return {
+        "events": [
+            {"line": entry.number, "at": entry.at.isoformat(), "kind": entry.event.kind, "text": text}
+            for entry, text in run_story(entries)
+        ]
+    }

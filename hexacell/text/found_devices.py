@@ -1,0 +1,187 @@
+"""Devices that were found: in words, and as text for a cell file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from typing import Any
+
+import tomlkit
+
+from drivers.discovery.encoders import BusFindings, FoundNode
+from drivers.discovery.frames import FoundFrame
+from drivers.discovery.gauges import FoundGauge, PortFindings
+from drivers.serial.adapters import SerialPortFound
+from hexacell.kinematics.parameters import JointUnit
+from hexacell.services.devices.device_search import UNTRIED, SearchFindings
+from hexacell.services.devices.found_cell import (
+    LEGS,
+    encoder_keys,
+    found_bank,
+    found_gauges,
+    gauge_keys,
+    unknown_encoders,
+)
+
+AXES = "xyz"
+FRAMES_TOLD = 12
+
+
+def search_document(found: SearchFindings) -> dict[str, Any]:
+    """All that was found, and ``cell``: the text for a cell file."""
+    return {
+        "ports": [asdict(port) for port in found.ports],
+        "gauges": [asdict(one) for one in found.gauges],
+        "buses": [asdict(bus) for bus in found.buses],
+        "controller": None if found.controller is None else asdict(found.controller),
+        "cell": "\n".join(cell_lines(found)),
+    }
+
+
+def search_lines(found: SearchFindings) -> Iterator[str]:
+    """What was found, in words."""
+    if not found.ports:
+        yield "No serial port: plug a gauge's cable or adapter in, or name a port."
+    for port, on_it in zip(found.ports, found.gauges, strict=True):
+        yield from _port_lines(port, on_it, found.buses)
+    if any(_is_silent(on_it, found.buses) for on_it in found.gauges):
+        others = ", ".join(sorted(UNTRIED - {"stream"}))
+        yield f"Not tried where nothing answers: {others}, which the cell file describes (docs/drivers.md)."
+    if not found.buses:
+        yield "No CAN adapter: plug it in, or name a bus with --can."
+    for bus in found.buses:
+        yield from _bus_lines(bus)
+    if found.controller is None:
+        yield "No controller: LinuxCNC answers if linuxcncrsh is its display (--controller)."
+    else:
+        yield f"Controller at {found.controller.host}:{found.controller.port}: {found.controller.greeting}"
+
+
+def cell_lines(found: SearchFindings) -> Iterator[str]:
+    """The sections of a cell file for what was found; the axes are guesses, as nothing tells them."""
+    for axis, gauge in zip(AXES, found_gauges(found), strict=False):
+        yield from _gauge_section(axis, gauge)
+    if bank := found_bank(found):
+        yield from _encoder_section(*bank)
+    elif (bus := unknown_encoders(found)) is not None:
+        yield from _described_encoder_section(bus)
+    if found.controller is not None:
+        address = {"host": found.controller.host, "port": found.controller.port}
+        yield from ("[controller]", *_keys({"protocol": "linuxcncrsh", **address}), "")
+
+
+def _port_lines(
+    port: SerialPortFound, on_it: PortFindings, buses: tuple[BusFindings, ...]
+) -> Iterator[str]:
+    name = port.port if port.port == port.device else f"{port.port} (now {port.device})"
+    adapter = f", {port.adapter}" if port.adapter else ""
+    if on_it.problem:
+        yield f"{name}{adapter}: {on_it.problem}"
+    elif _is_can_adapter(on_it, buses):
+        yield f"{name}{adapter}: a CAN adapter"
+    elif on_it.heard:
+        yield (
+            f"{name}{adapter}: what comes is in no protocol that is tried: {on_it.heard}. Its baud rate or "
+            "parity may be another: try them with serial and its protocol in a cell file (docs/drivers.md)"
+        )
+    elif not on_it.gauges:
+        yield f"{name}{adapter}: nothing answers; is the gauge on, and is its cable a duplex one?"
+    for gauge in on_it.gauges:
+        where = "" if gauge.channel is None else f", channel {gauge.channel}"
+        what = f"{gauge.description}, shows {gauge.shown}" if gauge.shown else gauge.problem
+        rate = "" if gauge.baudrate is None else f" at {gauge.baudrate} baud"
+        yield f"{name}{adapter}{where}: {gauge.protocol}{rate}: {what}"
+
+
+def _is_can_adapter(on_it: PortFindings, buses: tuple[BusFindings, ...]) -> bool:
+    return any(bus.bus.get("channel") == on_it.port for bus in buses)
+
+
+def _is_silent(on_it: PortFindings, buses: tuple[BusFindings, ...]) -> bool:
+    return not on_it.gauges and not on_it.problem and not _is_can_adapter(on_it, buses)
+
+
+def _bus_lines(bus: BusFindings) -> Iterator[str]:
+    name = " ".join(str(bus.bus[key]) for key in ("interface", "channel", "bitrate") if key in bus.bus)
+    if bus.problem:
+        yield f"CAN {name}: {bus.problem}"
+    elif bus.frames and not bus.nodes:
+        yield f"CAN {name}: no CANopen node answers, but there are frames"
+    elif not bus.nodes:
+        yield f"CAN {name}: no node answers; check supply and termination, or try another --bitrate"
+    for node in bus.nodes:
+        yield f"CAN {name}, node {node.node}: {_node_words(node)}"
+    yield from _overheard_lines(name, bus.frames)
+
+
+def _overheard_lines(name: str, frames: tuple[FoundFrame, ...]) -> Iterator[str]:
+    for frame in frames[:FRAMES_TOLD]:
+        yield f"CAN {name}, frame {_number(frame)}: {_frame_words(frame)}"
+    if len(frames) > FRAMES_TOLD:
+        yield f"CAN {name}: frames with {len(frames) - FRAMES_TOLD} further identifiers"
+    if frames:
+        yield (
+            f"CAN {name}: no CANopen node that answers sends these frames. If they are of encoders, name "
+            'the DBC file of their maker, with protocol = "dbc" (docs/drivers.md)'
+        )
+
+
+def _node_words(node: FoundNode) -> str:
+    words = [node.description]
+    if node.step is not None:
+        words.append(
+            f"{node.step} counts a turn" if node.unit is JointUnit.DEG else f"{node.step} nm a count"
+        )
+    if node.serial_number is not None:
+        words.append(f"serial number {node.serial_number}")
+    return ", ".join(words)
+
+
+def _number(frame: FoundFrame) -> str:
+    """As candump has it: 11 bits in three digits, 29 in eight."""
+    return f"{frame.identifier:0{8 if frame.is_extended else 3}X}"
+
+
+def _frame_words(frame: FoundFrame) -> str:
+    data = "its data change" if frame.changes else "its data stay the same"
+    return f"{frame.length} bytes, {frame.per_second:.0f} a second, {data}"
+
+
+def _gauge_section(axis: str, gauge: FoundGauge) -> Iterator[str]:
+    yield "[[gauges]]"
+    yield from _keys({"name": axis})
+    yield f'axis = "{axis}"  # the base axis along which its plunger moves: press it, and correct this'
+    yield "sign = 1    # -1 if it shows less when the ball moves along that axis"
+    yield from _keys({"protocol": gauge.protocol, "port": gauge.port, **gauge_keys(gauge)})
+    yield ""
+
+
+def _encoder_section(bus: BusFindings, encoders: tuple[FoundNode, ...]) -> Iterator[str]:
+    shown = ", ".join(_keys(bus.bus))
+    nodes = [node.node for node in encoders]
+    needed = "" if len(nodes) == LEGS else ": six are needed"
+    yield from ("[encoders]", *_keys({"protocol": "cia406"}))
+    yield f"bus = {{ {shown} }}"
+    yield f"nodes = {nodes}  # of legs 1 to 6{needed}"
+    yield from _keys(encoder_keys(encoders))
+    yield ""
+
+
+def _described_encoder_section(bus: BusFindings) -> Iterator[str]:
+    """Encoders that only a DBC file describes: which of the frames are theirs, nothing tells."""
+    frames = [_number(frame) for frame in bus.frames[:FRAMES_TOLD]]
+    yield from ("[encoders]", *_keys({"protocol": "dbc"}))
+    yield f"bus = {{ {', '.join(_keys(bus.bus))} }}"
+    yield "measuring_step_nm = 1000  # no coarser than the steps in the DBC file"
+    yield ""
+    yield "[encoders.dbc]"
+    yield 'file = "encoders.dbc"  # of their maker'
+    yield f"# Message.Signal of legs 1 to 6, from the messages among {', '.join(frames)}:"
+    yield from _keys({"signals": [f"ENC{leg}.Position" for leg in range(1, LEGS + 1)]})
+    yield ""
+
+
+def _keys(values: Mapping[str, Any]) -> Iterator[str]:
+    """Lines of a TOML file."""
+    for name, value in values.items():
+        yield f"{name} = {tomlkit.item(value).as_string()}"

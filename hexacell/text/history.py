@@ -1,0 +1,108 @@
+"""Text for the runs of a cell so far: a line a run, two of them compared, and the drift over all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hexacell.results.run_comparison import ParameterDifference, ParameterTrend, RunComparison
+from hexacell.services.history.history import PastRun
+from hexacell.text.layout import wrapped
+
+NO_RUNS = "This cell has no runs yet."
+NO_DRIFT = "A drift needs three calibrations of the cell."
+TREND_DAYS = 30.0
+LONGEST_RUN_NAME = 22
+
+
+def history_text(runs: Sequence[PastRun]) -> str:
+    """A line a run of at most 80 columns, in their order; the error is that at the task poses, +- U."""
+    if not runs:
+        return NO_RUNS
+    return "\n".join([history_head(), *(history_line(run) for run in runs)])
+
+
+def history_head() -> str:
+    """What is in which column of :func:`history_line`."""
+    return _columns("run", "mode", "verdict", "error, mm", "")
+
+
+def history_line(run: PastRun) -> str:
+    """One run: its name, mode, verdict, error and what became of it."""
+    verdict = "-" if run.summary.verdict is None else run.summary.verdict.value
+    return _columns(
+        run.name[:LONGEST_RUN_NAME], run.summary.mode or "-", verdict, error_text(run), standing(run)
+    )
+
+
+def error_text(run: PastRun) -> str:
+    """The largest position error at the task poses, +- its expanded uncertainty, mm; - if there is none."""
+    if run.summary.accuracy is None:
+        return "-"
+    return f"{run.summary.accuracy.position.value:.3f} +- {run.summary.accuracy.position.expanded:.3f}"
+
+
+def standing(run: PastRun) -> str:
+    """What became of a run, in a few words."""
+    if not run.summary.mode:
+        return "unreadable"
+    if not run.summary.has_begun:
+        return "not begun"
+    if run.is_in_controller:
+        return "in controller" if run.summary.is_over else "unverified!"
+    if not run.summary.is_over:
+        return "not over"
+    if run.summary.has_proposal:
+        return "proposal"
+    return "replaced" if run.summary.has_written else ""
+
+
+def comparison_text(before: PastRun, after: PastRun, compared: RunComparison) -> str:
+    """The verdict on the change in words, then every free parameter."""
+    head = f"{'':5}{'before':>15}{'after':>15}{'change':>11}{'sigma':>9}"
+    return "\n".join(
+        [
+            wrapped(f"{before.name} -> {after.name}: {comparison_sentence(compared)}"),
+            head,
+            *(_difference_line(one) for one in compared.parameters),
+            wrapped(
+                f"In the frame convention {compared.frame}: where a point that it fixes moved, others "
+                "show it. Sigma is the noise of both runs."
+            ),
+        ]
+    )
+
+
+def comparison_sentence(compared: RunComparison) -> str:
+    """Whether the machine changed, and what changed most."""
+    if not compared.is_changed:
+        return "nothing changed by more than the noise of the records explains."
+    ratio = f"the machine changed: {compared.test.ratio:.1f} times what the noise explains"
+    if not compared.significant:
+        return f"{ratio}, by several parameters together."
+    most = compared.significant[0]
+    return f"{ratio}; most of all {most.name}, by {most.change:+.3f} {most.unit} (sigma {most.sigma:.3f})."
+
+
+def drift_text(found: Sequence[ParameterTrend]) -> str:
+    """A line a parameter: first and last value, change in 30 days, and whether it walks."""
+    if not found:
+        return NO_DRIFT
+    walking = [one.name for one in found if one.is_walking]
+    verdict = f"Walking: {', '.join(walking)}." if walking else "No parameter walks."
+    head = f"{'':5}{'first':>15}{'last':>15}{'in 30 days':>14}{'sigma':>10}"
+    return "\n".join([wrapped(verdict), head, *map(_trend_line, found)])
+
+
+def _columns(name: str, mode: str, verdict: str, error: str, what: str) -> str:
+    return f"{name:23}{mode:9}{verdict:17}{error:17}{what}".rstrip()
+
+
+def _difference_line(one: ParameterDifference) -> str:
+    mark = "  changed" if one.is_significant else ""
+    return f"{one.name:5}{one.before:15.4f}{one.after:15.4f}{one.change:+11.4f}{one.sigma:9.4f}{mark}"
+
+
+def _trend_line(one: ParameterTrend) -> str:
+    change, sigma = TREND_DAYS * one.per_day, TREND_DAYS * one.sigma_per_day
+    mark = "  walking" if one.is_walking else ""
+    return f"{one.name:5}{one.values[0]:15.4f}{one.values[-1]:15.4f}{change:+14.4f}{sigma:10.4f}{mark}"

@@ -1,0 +1,197 @@
+"""Text for an identification: the findings first, then accuracy, parameters and checks of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from hexacell.identification.diagnostics.model_tests import contradicted_points
+from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
+from hexacell.identification.identified_zeros import IdentifiedZeros
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import GeometricParameter, JointUnit, ParameterUnit
+from hexacell.noise.repeatability import Repeatability
+from hexacell.noise.variance_components import NoiseLevel, NoiseLevels
+from hexacell.text.design_statement import design_sentence
+from hexacell.text.layout import wrapped
+from hexacell.text.measured_noise import measured_noise_text
+from hexacell.text.uncertainty import budget_table
+from hexacell.verdict.assessment import Assessment
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.findings import findings, noise_sentence, pair_sentences, residual_sentence
+
+
+def identification_report(assessed: Assessment) -> str:
+    """The whole report that ``hexacell fit`` prints."""
+    found = assessed.found
+    parts = (
+        "\n".join(wrapped(sentence) for sentence in findings(assessed)),
+        verdict_line(assessed),
+        accuracy_table(assessed),
+        budget_table(assessed.budget),
+        "" if assessed.design is None else wrapped(design_sentence(assessed.design)),
+        _data_and_termination(found),
+        _identified(assessed),
+        parameter_table(assessed.zeros or found, assessed.drawing),
+        residual_line(found),
+        points_line(assessed),
+        noise_table(assessed.noise),
+        "" if assessed.measured_noise is None else measured_noise_text(assessed.measured_noise),
+        repeatability_lines(assessed.repeatability),
+        correlation_lines(pair_sentences(assessed), len(assessed.correlated)),
+    )
+    return "\n\n".join(part for part in parts if part)
+
+
+def verdict_line(assessed: Assessment) -> str:
+    """That records of the identification alone give no verdict on the robot, and what U it would have."""
+    sentence = f"Verdict: {Verdict.NOT_EVALUATED}, as no held-out records test this model."
+    budget = assessed.budget
+    if budget is None or assessed.refused:
+        return wrapped(sentence)
+    return wrapped(f"{sentence} U at the task poses is {budget.expanded_mm:.3f} mm.")
+
+
+def points_line(assessed: Assessment) -> str:
+    """Whether the records of each point agree with what the others predict."""
+    if not assessed.points:
+        return "Each point by the others: not evaluated, they do not determine the geometry."
+    wrong = [str(one.point) for one in contradicted_points(assessed.points)]
+    agreeing = f"{len(assessed.points) - len(wrong)} of {len(assessed.points)} agree"
+    left = f", not point {', '.join(wrong)}" if wrong else ""
+    return f"Each point by the others: {agreeing}{left}."
+
+
+def accuracy_table(assessed: Assessment) -> str:
+    """Predicted errors at the task poses with the controller's geometry and with the identified one."""
+    accuracy = assessed.accuracy
+    if accuracy is None:
+        return ""
+    what = "task poses" if assessed.task_named else "poses across the workspace"
+    title = f"Predicted error at {len(accuracy.poses)} {what}"
+    return "\n".join(
+        [
+            f"{title:44}{'position, mm':>17}{'angle, deg':>18}",
+            f"{'':44}{'rms':>8}{'largest':>9}{'rms':>9}{'largest':>9}",
+            _error_row("geometry the controller has now", accuracy.before),
+            _error_row("identified geometry (one sigma)", accuracy.after),
+        ]
+    )
+
+
+def _error_row(name: str, errors: PoseErrors) -> str:
+    return (
+        f"  {name:42}{errors.position_rms_mm:8.3f}{errors.position_largest_mm:9.3f}"
+        f"{errors.orientation_rms_deg:9.4f}{errors.orientation_largest_deg:9.4f}"
+    )
+
+
+def _data_and_termination(found: Identification) -> str:
+    return wrapped(
+        f"{len(found.free)} parameters from {found.records} records at {found.points} points; the "
+        f"solver ended because {found.termination.value} ({found.solution.iterations} iterations)."
+    )
+
+
+def _identified(assessed: Assessment) -> str:
+    """Which parameters are identified, where not all are."""
+    if assessed.zeros is None:
+        return ""
+    zeros, free = assessed.zeros.columns.shape[1], len(assessed.found.free)
+    return wrapped(
+        f"Identified: zeros only, {zeros} of {free}. All else is as the controller has it, and its "
+        "tolerances are its uncertainty."
+    )
+
+
+def parameter_table(found: Identification | IdentifiedZeros, drawing: Geometry) -> str:
+    """One line a parameter, mm or mrad; those that the frame convention fixes are left out."""
+    undetermined, parameters = set(found.undetermined), found.geometry.parameters
+    held = set() if isinstance(found, Identification) else set(parameters.names) - set(found.names)
+    values = np.array([drawing.vector, found.geometry.vector, found.sigma]) / parameters.like_a_mm
+    names = [_with_unit(parameter) for parameter in parameters.parameters]
+    width = max(4, *map(len, names))
+    lines = [
+        f"{name:{width}}{old:10.3f}{new:12.3f}{new - old:+9.3f}{sigma:8.3f}  "
+        + _word(name.split(",")[0], undetermined, held, _significance(new - old, sigma))
+        for name, (old, new, sigma) in zip(names, values.T, strict=True)
+        if sigma > 0.0
+    ]
+    header = f"{'mm':{width}}{'drawing':>10}{'identified':>12}{'change':>9}{'sigma':>8}"
+    return "\n".join([header, *lines])
+
+
+def _word(name: str, undetermined: Collection[str], held: Collection[str], otherwise: str) -> str:
+    if name in held:
+        return "not identified"
+    return "not determined by these data" if name in undetermined else otherwise
+
+
+def _with_unit(parameter: GeometricParameter) -> str:
+    """``S3x``; ``rail2a, mrad``."""
+    unit = parameter.kind.unit
+    return parameter.name if unit is ParameterUnit.MM else f"{parameter.name}, {unit.shown}"
+
+
+def _significance(change: float, sigma: float) -> str:
+    times = abs(change) / sigma
+    return f"moved {times:.1f} sigma" if times < 99.95 else f"moved {times:.0f} sigma"
+
+
+def residual_line(found: Identification) -> str:
+    """The residuals and the chi-square test."""
+    goodness = found.goodness
+    probability = goodness.probability
+    shown = f"{probability:.2g}" if probability >= 1e-4 else "below 0.0001"
+    return wrapped(
+        f"Residual {found.residual_rms_mm:.4f} mm rms; chi-square {goodness.chi2:.1f}, expected "
+        f"{goodness.expected:.1f} (probability {shown}). {residual_sentence(goodness)}"
+    )
+
+
+def noise_table(noise: NoiseLevels | None) -> str:
+    """Stated noise beside its estimate from the residuals."""
+    if noise is None:
+        return ""
+    if not noise.are_separable:
+        return wrapped(noise_sentence(noise))
+    rows = (("encoders", noise.encoder), ("gauges", noise.gauge))
+    lines = [f"  {name:10}{level.stated:9.4f}  {_noise_estimate(level)}" for name, level in rows]
+    unit = noise.joint_unit
+    head = "Noise, mm" if unit is JointUnit.MM else f"Noise, {unit}, mm"
+    return "\n".join([f"{head:12}{'stated':>9}  estimated from the residuals", *lines])
+
+
+def _noise_estimate(level: NoiseLevel) -> str:
+    if not level.is_resolved:
+        return f"below {level.at_most:.4f}: too small to be separated from the other"
+    return f"{level.estimated:.4f} +- {level.standard_error:.4f}"
+
+
+def repeatability_lines(scatter: Repeatability | None) -> str:
+    """The scatter of repeated visits to a pose."""
+    if scatter is None:
+        return "Repeatability: not evaluated, no pose was measured twice."
+    x, y, z = scatter.per_axis_mm
+    return wrapped(
+        f"Repeatability: on returning to {_counted(scatter.poses, 'pose')} the ball scatters by "
+        f"x {x:.4f}, y {y:.4f}, z {z:.4f} mm "
+        f"({_counted(scatter.degrees_of_freedom, 'degree')} of freedom)."
+    )
+
+
+def correlation_lines(sentences: Sequence[str], strong: int) -> str:
+    """The strongest correlations, and how many of the ``strong`` ones are not printed."""
+    if not strong:
+        return ""
+    lines = [wrapped(sentence, indent=2) for sentence in sentences]
+    more = strong - len(sentences)
+    if more:
+        lines.append(f"and {_counted(more, 'more pair')} beyond 0.9 (--json lists them)")
+    return "\n".join(lines)
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -1,0 +1,93 @@
+"""Text for a person at a plain terminal who asks during a run: where it is, and what the gauges show."""
+
+from __future__ import annotations
+
+import shlex
+
+from hexacell.campaign.decisions import Forecast
+from hexacell.run_process.messages import ControlChanged, RunDescribed
+from hexacell.run_process.snapshots import GaugeSnapshot, LiveSnapshot
+from hexacell.text.events import set_name
+from hexacell.text.layout import duration, wrapped
+from procedures.engine.command_loop import Status
+from procedures.run import events
+from procedures.run.state import RunState
+
+LETTERS = (
+    "Letters, each with Enter: p pause after this record, P at once, r resume,\n"
+    "u undo the last record, m measure this point again (m 3: its record 3),\n"
+    "g what the gauges show, s where the run is, a abort."
+)
+DETACHABLE_LETTERS = f"{LETTERS}\nq leave, and the run goes on; t take control from another terminal."
+
+
+def attached_resume_hint(run: RunDescribed) -> str:
+    """How to resume a run that ended early in a process of its own."""
+    command = "length" if run.mode == "length" else "run"
+    mode = ["--mode", run.mode] if run.mode in {"check", "quick"} else []
+    words = ["hexacell", command, str(run.cell_file), "--resume", str(run.folder), *mode]
+    return f"What was measured is kept. To continue:\n  {shlex.join(words)}"
+
+
+def control_text(changed: ControlChanged) -> str:
+    """Who gives the commands to a run now."""
+    if changed.is_in_control:
+        return "You are in control of this run."
+    return f"{changed.who or 'Nobody'} is in control of this run; type t to take over."
+
+
+def run_status_text(
+    doing: str | None,
+    state: RunState,
+    expected: int,
+    last: events.RecordTaken | None,
+    forecast: Forecast | None,
+    status: Status | None = None,
+) -> str:
+    """Where a run is: what it does, how far it is, its last record, its accuracy and the time left."""
+    now = " ".join(filter(None, (doing or "connecting", f"({status.value})" if status else "")))
+    lines = [
+        f"Now: {now}",
+        f"Done: {state.completed} of {max(expected, state.completed)} records and closings of points",
+        *([] if last is None else [f"Last record: {record_text(last)}"]),
+        *([] if forecast is None else [_forecast_text(forecast)]),
+    ]
+    return "\n".join(wrapped(line, indent=2) for line in lines)
+
+
+def record_text(record: events.RecordTaken) -> str:
+    """A record in a line: where, and how far the ball was from the point's reference."""
+    x, y, z = record.deviation_mm
+    where = f"{set_name(record.at)}, orientation {record.orientation}"
+    return f"{where}: x {x:+.3f}, y {y:+.3f}, z {z:+.3f} mm"
+
+
+def gauges_text(snapshot: LiveSnapshot) -> str:
+    """What the devices show now, a line each."""
+    lines = [_gauge_text(gauge) for gauge in snapshot.gauges]
+    if snapshot.encoders.positions is not None:
+        positions = " ".join(f"{position:.3f}" for position in snapshot.encoders.positions)
+        lines.append(f"encoders: {positions} {snapshot.encoders.unit}")
+    if snapshot.stop_reason:
+        lines.append(f"motion is forbidden: {snapshot.stop_reason}")
+    return "\n".join(wrapped(line, indent=2) for line in lines)
+
+
+def _gauge_text(gauge: GaugeSnapshot) -> str:
+    if gauge.problem:
+        return gauge.problem
+    if gauge.shown_mm is None or gauge.age_s is None:
+        return f"gauge {gauge.name}: not read yet"
+    noise = "" if gauge.noise_mm is None else f", noise {1000.0 * gauge.noise_mm:.1f} um"
+    shown = f"gauge {gauge.name}: {gauge.shown_mm:+.3f} {gauge.unit}, {gauge.age_s:.1f} s ago{noise}"
+    if gauge.middle_mm is None:
+        return shown
+    beside = gauge.shown_mm - gauge.middle_mm
+    return f"{shown}; {beside:+.2f} from mid travel ({gauge.travel_mm:g} {gauge.unit})"
+
+
+def _forecast_text(forecast: Forecast) -> str:
+    left = f", {duration(forecast.minutes)} left" if forecast.minutes > 0.0 else ""
+    return (
+        f"Predicted error at the task: {forecast.now_mm:.3f} mm now, {forecast.end_mm:.3f} at the end{left}"
+    )

@@ -1,0 +1,152 @@
+"""Text for the noise that a run measured at its start: what it is, what is wrong, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from hexacell.kinematics.parameters import JointUnit
+from hexacell.noise.approach_scatter import ScatterSource
+from hexacell.noise.averaging import worthwhile_windows
+from hexacell.noise.measured_noise import (
+    AveragingForecast,
+    InstrumentNoise,
+    MeasuredNoise,
+    RepeatedApproaches,
+)
+from hexacell.text.layout import duration, wrapped
+
+THOUSAND = 1e3
+WHOLE = 9.95
+"""From here on sizes are told in whole micrometres or millidegrees."""
+NOTEWORTHY_DRIFT = 1.0
+"""In units of the noise of a record: a smaller drift within seconds is not mentioned."""
+
+
+def measured_noise_text(measured: MeasuredNoise) -> str:
+    """What was measured, and what is wrong, a sentence a line."""
+    return _paragraphs([*_summary(measured), *_warnings(measured)])
+
+
+def measured_noise_lines(measured: MeasuredNoise) -> tuple[str, ...]:
+    """The same, each sentence as one line without indentation."""
+    return tuple(" ".join(line.split()) for line in [*_summary(measured), *_warnings(measured)])
+
+
+def noise_and_averaging_text(measured: MeasuredNoise) -> str:
+    """The same, and what means of more readings gain."""
+    return _paragraphs([*_summary(measured), *_warnings(measured), *_averaging(measured)])
+
+
+def _paragraphs(lines: Sequence[str]) -> str:
+    return "\n".join(wrapped(line, indent=2) for line in lines)
+
+
+def _summary(measured: MeasuredNoise) -> Iterator[str]:
+    yield f"noise                    {_of_each_kind(measured, 'record')} a record"
+    if measured.gauges[0].reading is not None:
+        yield f"  readings at rest: {_of_each_kind(measured, 'reading')}"
+    approaches = measured.approaches
+    if approaches is not None and approaches.source is None:
+        yield (
+            f"  {approaches.visits} visits of one pose agree with what is stated for a record: they "
+            f"scatter {approaches.ratio:.1f} times as much"
+        )
+
+
+def _of_each_kind(measured: MeasuredNoise, figure: str) -> str:
+    """A figure of gauges and encoders, um; of several alike the range."""
+    gauges, encoders = _range(measured.gauges, figure), _range(measured.encoders, figure)
+    unit = measured.encoders[0].unit
+    of_gauges = "" if unit is JointUnit.MM else f" {JointUnit.MM.thousandth}"
+    return f"gauges {gauges}{of_gauges}, encoders {encoders} {unit.thousandth}"
+
+
+def _range(instruments: Sequence[InstrumentNoise], figure: str) -> str:
+    values = sorted(getattr(one, figure) for one in instruments)
+    first, last = _number(values[0]), _number(values[-1])
+    return first if first == last else f"{first} to {last}"
+
+
+def _number(size: float) -> str:
+    """A size in thousandths of its unit, to two digits where it is below 10."""
+    shown = THOUSAND * size
+    return f"{shown:.2g}" if shown < WHOLE else f"{shown:.0f}"
+
+
+def _warnings(measured: MeasuredNoise) -> Iterator[str]:
+    for one in (*measured.gauges, *measured.encoders):
+        yield from _of_instrument(one)
+    if measured.approaches is not None and measured.approaches.source is not None:
+        yield _of_approaches(measured.approaches, measured.approaches.source)
+
+
+def _of_instrument(one: InstrumentNoise) -> Iterator[str]:
+    is_gauge, unit = one.name.startswith("gauge"), one.unit.thousandth
+    if one.is_noisier and one.reading is not None:
+        look = "a loose clamp, vibration or its cable" if is_gauge else "its cable, its head and vibration"
+        yield (
+            f"  {one.name}: its readings scatter by {_number(one.reading)} {unit} without moving, more "
+            f"than the {_number(one.stated)} {unit} stated for a record. The run counts with "
+            f"{_number(one.record)} {unit}. Look at {look}; if that is how it is, state it in [noise]"
+        )
+    if abs(one.drift) > NOTEWORTHY_DRIFT * one.stated:
+        look = "let it warm up, and look whether its stand creeps" if is_gauge else "see whether it slides"
+        yield f"  {one.name}: it drifted by {THOUSAND * one.drift:+.0f} {unit} within the series: {look}"
+    if one.outliers:
+        what = "a reading was" if one.outliers == 1 else f"{one.outliers} readings were"
+        yield f"  {one.name}: {what} false, and left out. Look at its cable and contacts"
+
+
+def _of_approaches(found: RepeatedApproaches, source: ScatterSource) -> str:
+    size = f"{_number(found.excess)} {found.unit.thousandth}"
+    if source is ScatterSource.JOINTS:
+        what = f"the joints stop {size} beside what their encoders show"
+        look = "Look for play in guides and joints, and for friction"
+    elif source is ScatterSource.ENCODERS or source.startswith("encoder"):
+        what = f"{source}: {size} beside where the joints are, though the ball is at its place"
+        look = "Look at reading heads, scales and cables"
+    else:
+        what = f"{source} shows {size} more or less at the same place"
+        look = "Look at its plunger, its plate and its clamp"
+    return (
+        f"  {found.visits} visits of one pose scatter {found.ratio:.1f} times as much as the stated noise "
+        f"explains: {what}. The run counts with that. {look}"
+    )
+
+
+def _averaging(measured: MeasuredNoise) -> Iterator[str]:
+    """What more readings a record would gain, or gain."""
+    if not measured.forecasts:
+        return
+    first, chosen = measured.forecasts[0], measured.windows
+    part = measured.encoders_part_mm
+    of_encoders = "" if part is None else f"the encoders contribute {part:.3f} of "
+    yield f"  {of_encoders}the {first.error_mm:.3f} mm expected at the task in the end (one sigma)"
+    by_windows = {one.windows: one for one in measured.forecasts}
+    possible = worthwhile_windows(measured.forecasts, max(by_windows))
+    if chosen > 1:
+        gain = _gain(by_windows[chosen])
+        yield f"  a record is the mean of {chosen} windows of readings, which gives {gain}"
+    if possible > chosen:
+        yield (
+            f"  {possible} windows of readings a record would give {_gain(by_windows[possible])}: "
+            f"averaged_windows = {possible} in [noise] allows it"
+        )
+
+
+def averaging_lines(
+    forecasts: Sequence[AveragingForecast], encoders_part_mm: float | None
+) -> Iterator[str]:
+    """Before a run: what the encoders contribute, and what means of more readings may gain."""
+    if len(forecasts) < 2 or encoders_part_mm is None:
+        return
+    first, fourfold = forecasts[0], forecasts[min(2, len(forecasts) - 1)]
+    yield (
+        f"The noise of the encoders makes about {encoders_part_mm:.3f} of {first.error_mm:.3f} mm (one "
+        f"sigma). As far as noise differs from reading to reading, which a run measures, "
+        f"{fourfold.windows} windows of readings a record give {_gain(fourfold)}."
+    )
+
+
+def _gain(one: AveragingForecast) -> str:
+    return f"{one.error_mm:.3f} mm for {duration(one.minutes)} more"

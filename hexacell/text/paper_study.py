@@ -1,0 +1,140 @@
+"""The paper's simulations as text and as a document, beside what the paper says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from math import isfinite
+from typing import Any
+
+from hexacell.study.paper_simulation import NOISE_MM
+from hexacell.study.paper_summary import (
+    FIGURES,
+    PAPER_EXACT_MM,
+    PAPER_NOISY_MM,
+    PAPER_TABLE_2_MM,
+    STEPS_TOLD,
+    MedianErrors,
+    PaperStudy,
+    PlannedSet,
+)
+from hexacell.text.layout import wrapped
+
+WHAT_THE_PAPER_SAYS = {
+    4: f"The paper: one point never; two or more without noise {PAPER_EXACT_MM:g} mm, after a limited "
+    f"number of steps; five with noise {PAPER_NOISY_MM:g} mm.",
+    5: "The paper: not with two or three points; errors fall with the number of points.",
+}
+OPEN = (
+    "The paper leaves open where its points are, which orientations it takes, what their angles mean and "
+    "when it stops. Here: P1 to P5 of its Table 3; each of three angles between plus and minus an "
+    "amplitude, about fixed axes; until a step is below 1e-6 mm."
+)
+NO_GAUGE = (
+    "No dial gauge shows such deviations. `hexacell demo` stays within 12.5 mm of travel: it turns the "
+    "platform as far as what is known so far allows."
+)
+HEAD = f"  {'points':<8} {'without noise: P, ours':<26} {'with noise: P, ours there, ours':<32} deviation"
+SWEEP_HEAD = f"  {'angles':<16} deg {'after steps':<20} {'P, ours there, ours':<24} deviation"
+
+
+def study_lines(study: PaperStudy) -> Iterator[str]:
+    """The whole of it, in lines of at most 80 columns."""
+    yield wrapped(OPEN)
+    for figure, sets in study.figures.items():
+        yield ""
+        first = sets[0]
+        yield wrapped(
+            f"Figure {figure}: largest error of a parameter, mm; {FIGURES[figure]} orientations at each "
+            f"point, +-{first.amplitude_deg:g} deg; medians of {first.noisy.trials} draws. P is the "
+            "paper's estimator, in brackets in how many draws it comes to an end; then ours of the same "
+            "draws, and of all. The deviation is what gauges would have to show."
+        )
+        yield HEAD
+        for one in sets:
+            both = f"{_accuracy(one.exact):<26} {_in_full(one.noisy):<32}"
+            yield f"  {one.points:<8} {both} {_deviation(one)}"
+        yield wrapped(WHAT_THE_PAPER_SAYS[figure])
+    yield from _table_2(study)
+    yield from _sweep(study)
+    yield ""
+    yield wrapped(NO_GAUGE)
+
+
+def _table_2(study: PaperStudy) -> Iterator[str]:
+    yield ""
+    yield wrapped("Table 2: 5 points, 11 orientations, noise of 0.01 mm; largest errors by kinds, mm.")
+    yield "  parameters   in the paper   paper's estimator   ours"
+    for kind, (paper, ours) in study.table_2.items():
+        yield f"  {kind:<12} {PAPER_TABLE_2_MM[kind]:<14.3f} {_number(paper):<19} {_number(ours)}"
+
+
+def _sweep(study: PaperStudy) -> Iterator[str]:
+    yield ""
+    steps = ", ".join(map(str, STEPS_TOLD))
+    yield wrapped(
+        "Other orientations: 5 points, 11 orientations, with noise; largest error of a parameter, mm. "
+        f"After {steps} steps of the paper's estimator, at its end, and ours as above."
+    )
+    yield SWEEP_HEAD
+    for one in study.sweep:
+        after = " ".join(f"{_number(error):<6}" for error in one.noisy.after_steps_mm)
+        angles = f"{one.angles:<16} {one.amplitude_deg:<3g}"
+        yield f"  {angles} {after} {_in_full(one.noisy):<24} {_deviation(one)}"
+
+
+def study_document(study: PaperStudy) -> dict[str, Any]:
+    """All figures as a JSON document; what is not finite is null."""
+    return {
+        "noise_mm": NOISE_MM,
+        "paper": {
+            "exact_mm": PAPER_EXACT_MM,
+            "noisy_mm": PAPER_NOISY_MM,
+            "table_2_mm": PAPER_TABLE_2_MM,
+        },
+        "figures": {str(figure): [_set(one) for one in sets] for figure, sets in study.figures.items()},
+        "sweep": [_set(one) for one in study.sweep],
+        "table_2": {
+            kind: {"paper_mm": _finite(paper), "ours_mm": _finite(ours)}
+            for kind, (paper, ours) in study.table_2.items()
+        },
+    }
+
+
+def _set(one: PlannedSet) -> dict[str, Any]:
+    return asdict(one) | {"exact": _document(one.exact), "noisy": _document(one.noisy)}
+
+
+def _document(one: MedianErrors) -> dict[str, Any]:
+    after = {
+        str(steps): _finite(error) for steps, error in zip(STEPS_TOLD, one.after_steps_mm, strict=True)
+    }
+    medians = {name: _finite(getattr(one, name)) for name in ("paper_mm", "ours_there_mm", "ours_mm")}
+    return asdict(one) | medians | {"after_steps_mm": after}
+
+
+def _finite(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def _accuracy(one: MedianErrors) -> str:
+    """Of both estimators: ``1.51 (12), 0.48``."""
+    ours = "refused" if one.refused == one.trials else _number(one.ours_mm)
+    paper = f"{_number(one.paper_mm)} ({one.settled})" if one.settled else "none"
+    return f"{paper}, {ours}"
+
+
+def _in_full(one: MedianErrors) -> str:
+    """Likewise with ours of the same draws between: ``1.51 (12), 0.48, 0.52``."""
+    paper, _, ours = _accuracy(one).rpartition(", ")
+    return f"{paper}, {_number(one.ours_there_mm)}, {ours}" if one.settled else f"{paper}, {ours}"
+
+
+def _number(value: float) -> str:
+    if not isfinite(value):
+        return "-"
+    return f"{value:.0e}" if value < 1e-3 else f"{value:.2f}" if value < 100.0 else f"{value:.0f}"
+
+
+def _deviation(one: PlannedSet) -> str:
+    return f"{one.deviation_mm:.0f} mm"

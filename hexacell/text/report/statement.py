@@ -1,0 +1,206 @@
+"""The first page of a report: the statement of conformity, its scope and rule, as found and as left.
+
+In the order and words of ISO/IEC 17025:2017, 7.8, where they apply.
+"""
+
+from __future__ import annotations
+
+from hexacell.results.written_geometry import TaskDisplacement
+from hexacell.services.history.history import judged_accuracy
+from hexacell.services.history.reported_run import ReportedRun
+from hexacell.text.length import not_checked, scale_lines
+from hexacell.text.report.blocks import Block, Chapter, Facts, Paragraph, Table, Tone
+from hexacell.text.teaching import teaching_sentence
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.model_evidence import ModelTest
+from hexacell.verdict.verification import JudgedError, VerifiedAccuracy
+from procedures.run.steps import Phase
+
+NO_VERDICT = "NOT EVALUATED"
+
+MEANINGS = {
+    Verdict.PASS: "The error and the guard band together are within the limit.",
+    Verdict.CONDITIONAL_PASS: "The error is within the limit, but not by the guard band.",
+    Verdict.CONDITIONAL_FAIL: "The error is above the limit, but not by the guard band.",
+    Verdict.FAIL: "The error is above the limit, also with the guard band taken off.",
+    Verdict.NOT_EVALUATED: "The records do not decide it.",
+}
+
+TONES = {Verdict.PASS: Tone.GOOD, Verdict.FAIL: Tone.BAD}
+"""Of all others: open."""
+
+MODES = {
+    "optimise": "calibration: measured, identified, written to the controller, verified",
+    "quick": "quick level: carried on from the last result, written to the controller, verified",
+    "check": "check: measured; nothing was changed",
+    "length": "check of the length scale; nothing was changed",
+}
+
+
+MODELS = {
+    "optimise": "Held-out poses, which took no part, test the model.",
+    "quick": "The last accepted result takes part, with what may have drifted; held-out poses test it.",
+    "check": "What was known from the last accepted result, or from the drawing, takes part.",
+    "length": "The ball in two seats at a certified distance tells the scale of the encoders.",
+}
+"""What distinguishes the method of each kind of work."""
+
+
+def verdict_of(run: ReportedRun) -> Verdict | None:
+    """The verdict; none where the run ended before there was one."""
+    return None if run.state.judged is None else run.state.judged.verdict
+
+
+def statement_chapter(run: ReportedRun) -> Chapter:
+    """What may be said of the robot, and what not."""
+    verdict, accuracy = verdict_of(run), judged_accuracy(run.state.judged)
+    blocks: list[Block] = [
+        Paragraph(_meaning(run, verdict), is_strong=True),
+        *_error_table(accuracy),
+        *_reasons(run),
+        Paragraph(scope_sentences(accuracy)),
+        Paragraph(decision_rule(accuracy)),
+    ]
+    return Chapter("Statement of conformity", tuple(blocks))
+
+
+def found_and_left_chapter(run: ReportedRun) -> Chapter:
+    """As found and as left, and what must be taught anew."""
+    state = run.state
+    moved = None if state.proposed is None else state.proposed.displacement
+    rows = [row for row in (_mean_row(run), _error_row(run)) if row is not None]
+    table = (Table(("", "as found", "as left"), tuple(rows)),) if rows else ()
+    return Chapter("As found and as left", (*table, Paragraph(_left(run)), *_teaching(run, moved)))
+
+
+def method_chapter(run: ReportedRun) -> Chapter:
+    """How it was done, by what, for whom."""
+    report, started = run.settings.report, run.started
+    stated = (
+        ("Laboratory", report.laboratory),
+        ("Customer", report.customer),
+        ("Place", report.place),
+        ("Robot", report.machine),
+        ("Serial number", report.serial_number),
+    )
+    facts = (
+        *((name, value or "not stated in the cell file") for name, value in stated),
+        ("Cell", f"{run.settings.name}, {run.settings.robot.mechanism}"),
+        ("Controller's config", started.config),
+        ("Kind of work", MODES[started.mode]),
+        ("Begun, ended (UTC)", f"{run.began:%Y-%m-%d %H:%M}, {run.ended:%Y-%m-%d %H:%M}"),
+        ("Software", started.software),
+    )
+    return Chapter("Subject and method", (Facts(facts), Paragraph(method_sentences(run))))
+
+
+def method_sentences(run: ReportedRun) -> str:
+    """How the geometry follows from what is measured."""
+    return (
+        "A ball on the platform is held between three dial gauges. At each point they are zeroed, the same "
+        "point is commanded in other orientations, and what the gauges and the encoders of the joints then "
+        "show is recorded. From the records the geometry follows by weighted least squares, with its "
+        f"covariance (after Abtahi, Pendar, Alasty and Vossoughi, 2010). {MODELS[run.started.mode]}"
+    )
+
+
+def _meaning(run: ReportedRun, verdict: Verdict | None) -> str:
+    if verdict is None:
+        return "The run ended before anything could be said of the robot."
+    if run.state.judged is not None and run.state.judged.length is not None:
+        return f"Of the length scale alone: {MEANINGS[verdict]}"
+    return MEANINGS[verdict]
+
+
+def _error_table(accuracy: VerifiedAccuracy | None) -> tuple[Block, ...]:
+    if accuracy is None:
+        return ()
+    columns = (f"Largest error at {accuracy.poses} task poses", "error", "U (k = 2)", "limit", "verdict")
+    rows = (
+        _row("position, mm", accuracy.position),
+        _row("orientation, deg", accuracy.orientation),
+    )
+    return (Table(columns, rows),)
+
+
+def _row(name: str, error: JudgedError) -> tuple[str, ...]:
+    return name, f"{error.value:.3f}", f"{error.expanded:.3f}", f"{error.limit:g}", str(error.verdict)
+
+
+def _reasons(run: ReportedRun) -> tuple[Block, ...]:
+    """The tests of the model, or what a check or a length check says instead."""
+    judged = run.state.judged
+    if judged is None:
+        reason = "it is not over" if run.state.ended is None else run.state.ended.line
+        return (Paragraph(f"How it ended: {reason}."),)
+    if judged.verification is not None and judged.verification.tests:
+        return (
+            Table(("Test of the model", "result"), tuple(map(_test_row, judged.verification.tests)), None),
+        )
+    return (Paragraph(judged.line),)
+
+
+def _test_row(test: ModelTest) -> tuple[str, str]:
+    return test.name, f"{'holds' if test.passed else 'FAILS'}: {test.sentence}"
+
+
+def scope_sentences(accuracy: VerifiedAccuracy | None) -> str:
+    """What the statement holds for."""
+    if accuracy is None:
+        return "Nothing is stated of errors at the task."
+    where = "the task poses of the cell file" if accuracy.task_named else "poses across the workspace"
+    scale = " ".join(scale_lines(accuracy.length, accuracy.scale_of)) or not_checked(accuracy.scale_of)
+    return (
+        f"This holds at {where}, at the time and under the conditions below, after the best choice of "
+        f"frames that can be taught. {scale}"
+    )
+
+
+def decision_rule(accuracy: VerifiedAccuracy | None) -> str:
+    """By which errors and their uncertainty become a verdict."""
+    factor = 1.0 if accuracy is None else accuracy.position.guard_band_factor
+    band = "U" if factor == 1.0 else f"{factor:g} U"
+    return (
+        f"Decision rule: pass if error + {band} is at most the limit, fail if error - {band} is above it, "
+        "conditional in between (guard band as in ILAC-G8). U is the expanded uncertainty of the largest "
+        f"error of all task poses, which holds in 95 of 100 cases (k = {COVERAGE_FACTOR:g})."
+    )
+
+
+def _mean_row(run: ReportedRun) -> tuple[str, ...] | None:
+    judged = run.state.judged
+    verified = None if judged is None else judged.verification
+    if verified is None or verified.before_mm is None:
+        return None
+    after = "-" if verified.after_mm is None else f"{verified.after_mm:.3f}"
+    poses = len(run.state.held_out(Phase.AFTER))
+    return f"mean deviation of the ball at {poses} held-out poses, mm", f"{verified.before_mm:.3f}", after
+
+
+def _error_row(run: ReportedRun) -> tuple[str, ...] | None:
+    identified, accuracy = run.state.identified, judged_accuracy(run.state.judged)
+    if identified is None or identified.improvement is None:
+        return None
+    after = "-" if accuracy is None else f"{accuracy.position.value:.3f}"
+    return "largest position error at the task poses, mm", f"{identified.improvement.now_mm:.3f}", after
+
+
+def _left(run: ReportedRun) -> str:
+    state = run.state
+    if state.started is not None and state.started.mode not in {"quick", "optimise"}:
+        return "Nothing was changed: the robot is left as it was found."
+    if state.rolled_back:
+        return "The config of before was put back: the robot is left as it was found."
+    if state.committed is None:
+        return "Nothing was written: the robot is left as it was found."
+    kept = f"; kept by {state.accepted.by}" if state.accepted is not None and state.accepted.by else ""
+    return (
+        f"The new geometry is in the controller's config, approved by {state.committed.approved_by}{kept}."
+    )
+
+
+def _teaching(run: ReportedRun, moved: TaskDisplacement | None) -> tuple[Block, ...]:
+    if moved is None or run.state.committed is None or run.state.rolled_back:
+        return ()
+    return (Paragraph(teaching_sentence(moved)),)

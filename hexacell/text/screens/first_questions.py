@@ -1,0 +1,61 @@
+"""The questions that lead to a first cell file, in the words of who stands at the machine."""
+
+from __future__ import annotations
+
+from hexacell.services.devices.first_cell import CellDraft
+from hexacell.text.screens.views import FirstQuestionView
+
+QUESTIONS = {
+    "name": ("What is this cell called?", "A short name, as it is to stand on screens and in reports."),
+    "config": (
+        "In which file does the controller keep its geometry?",
+        "Relative to the cell file. It must hold the drawing's numbers: S, B, l and branch in [geometry].",
+    ),
+    "tolerance": (
+        "How far may a joint or a leg's length be from the drawing, mm?",
+        "What the builder promises, to either side. Better too much than too little.",
+    ),
+    "host": ("What is the controller's network name or address?", "127.0.0.1 if it is this computer."),
+    "port": ("On which TCP port does it listen?", "linuxcncrsh listens on 5007."),
+    "sliders": (
+        "From where to where may the sliders go, mm?",
+        "Two numbers: the smallest and the largest position of any slider.",
+    ),
+    "protocol": (
+        "What does the {axis} gauge speak?",
+        "sylvac, mux10 (Mitutoyo's multiplexer), cdi (CDI, Starrett), or one of docs/drivers.md.",
+    ),
+    "port of gauge": ("Where is the {axis} gauge connected?", "A device, such as /dev/ttyUSB0, or a URL."),
+    "sign": (
+        "Does the {axis} gauge show more when the ball moves along +{axis}?",
+        "yes if it is on the +{axis} side of the ball and counts up when pushed in. A small move tries it.",
+    ),
+    "bus": (
+        "Where is the CAN bus of the encoders?",
+        "Interface, channel and bit/s, such as: socketcan can0 500000, or: slcan /dev/ttyACM0 500000.",
+    ),
+    "nodes": ("Which nodes are the encoders of legs 1 to 6?", "Six numbers, in the order of the legs."),
+    "plates": (
+        "How far may the ball go from the middle of the gauges' plates, mm?",
+        "Half of their width, less what the ball needs.",
+    ),
+    "points": (
+        "Where is the middle of the workspace, and how far may the ball go from it, mm?",
+        "Four numbers: x y z of the middle, and the distance. The points to measure follow from that.",
+    ),
+}
+
+
+def first_question(draft: CellDraft, number: int, problem: str) -> FirstQuestionView:
+    """One question, counted from 0; what was answered before is its answer at first."""
+    answers = draft.answers()
+    asked = answers[number]
+    kind, _, axis = asked.name.partition(" ")
+    text, hint = QUESTIONS["port of gauge" if kind == "port" and axis else kind]
+    return FirstQuestionView(
+        progress=f"Question {number + 1} of {len(answers)}",
+        text=text.format(axis=axis),
+        hint=hint.format(axis=axis),
+        answer=draft.given.get(asked.name, asked.default),
+        problem=problem,
+    )

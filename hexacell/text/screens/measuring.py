@@ -1,0 +1,265 @@
+"""Text for a run that is being measured: guidance, records with residuals, and the predicted accuracy."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from itertools import pairwise
+from statistics import median
+
+from hexacell.cell.model import CellSettings
+from hexacell.run_process.messages import HostFailed
+from hexacell.text.events import activity, pose_name, set_name
+from hexacell.text.layout import duration
+from hexacell.text.screens.live import live_view
+from hexacell.text.screens.run_picture import RunPicture
+from hexacell.text.screens.views import Guidance, MeasureView, PlotView, Series
+from procedures.engine.command_loop import Status
+from procedures.run import events
+from procedures.run.state import RunState
+from procedures.run.steps import Compute, Expectation, Locate, Move, Phase, Place, SetKey, StepOfSet
+
+NO_RUN = Guidance(
+    now="no run is being measured here",
+    following="look at 2 Preflight, and start a run from there",
+    remaining="-",
+    stopping="nothing moves now",
+)
+RECORDS_HEADER = f"{'point/pose':12}{'x':>8}{'y':>8}{'z':>8}{'residual':>9}{'sigma':>6}"
+"""Of the list of records; the residual is the largest of x, y and z, and how many sigma that is."""
+
+PACE_RECORDS = 8
+"""The time that is left follows from the pace of so many records."""
+
+
+def measure_view(picture: RunPicture, settings: CellSettings | None, now_s: float) -> MeasureView:
+    """The screen of a run that is being measured."""
+    at = picture.at
+    zero = None if at is None else picture.state.zero_shown(at)
+    mounting_mm = 1.0 if settings is None else settings.stations.mounting_mm
+    target = None if settings is None else settings.identification.target_mm
+    return MeasureView(
+        guidance=guidance(picture, settings),
+        live=live_view(picture.live, now_s - picture.live_at_s, zero, mounting_mm),
+        records_title="Records: deviation and residual, mm",
+        records_header=RECORDS_HEADER,
+        records=record_lines(picture),
+        accuracy=accuracy_plot(picture, target),
+    )
+
+
+def guidance(picture: RunPicture, settings: CellSettings | None) -> Guidance:
+    """What happens now, what is next, how long, and how to stop."""
+    if picture.described is None:
+        return NO_RUN
+    return Guidance(
+        now=_now(picture),
+        following=_following(picture, settings),
+        remaining=_remaining(picture),
+        stopping=_stopping(picture),
+    )
+
+
+def _now(picture: RunPicture) -> str:
+    state, refusal = picture.state, picture.refusal
+    if refusal is not None:
+        return f"{refusal.command} was refused: {refusal.reason}"
+    if state.ended is not None:
+        return state.ended.line
+    if picture.status is Status.ENDED:
+        return f"ended early: {_reason(picture)}"
+    if picture.question is not None:
+        return (
+            "a question waits for you" if picture.may_command else "a question waits for who is in control"
+        )
+    if picture.status is Status.PAUSED:
+        return "paused: the robot stands still"
+    pausing = ", then it pauses" if picture.status is Status.PAUSING else ""
+    return f"{_doing(picture)}{pausing}"
+
+
+def _reason(picture: RunPicture) -> str:
+    match picture.setback:
+        case events.Interrupted(reason=reason):
+            return reason
+        case HostFailed(problem=problem):
+            return problem
+        case _:
+            return "its process is gone"
+
+
+def _doing(picture: RunPicture) -> str:
+    step = picture.step
+    if step is None:
+        return "choosing the next pose"
+    if isinstance(step, Locate):
+        return "asking the controller where the robot is"
+    if isinstance(step, Move):
+        return f"moving to {_pose_name(step)}"
+    if isinstance(step, StepOfSet):
+        said = activity(events.StepBegun(step=step))
+        return said or f"{set_name(step.at)}: {STEP_WORDS.get(step.kind, step.kind)}"
+    return activity(events.StepBegun(step=step)) or step.kind
+
+
+STEP_WORDS = {
+    "place": "the gauges are to be placed",
+    "sample": "reading, once the gauges have settled",
+    "revisit": "reading the reference again, after an interruption",
+    "close": "reading the reference again, for the drift",
+}
+
+
+def _pose_name(step: Move) -> str:
+    if step.orientation == 0:
+        return f"a waypoint on the way to {set_name(step.at)}"
+    if step.orientation == 1:
+        return f"the reference of {set_name(step.at)}"
+    return pose_name(step.at, step.orientation)
+
+
+def _following(picture: RunPicture, settings: CellSettings | None) -> str:
+    at, step = picture.at, picture.step
+    if picture.state.ended is not None:
+        return "look at 4 Review; 5 History has all runs"
+    if picture.status is Status.ENDED:
+        return "2 Preflight resumes it with r; what was measured is kept"
+    if picture.status is Status.PAUSED:
+        return "it goes on where it was when you press p"
+    if isinstance(step, Compute) or at is None:
+        return _after_computing(step)
+    if isinstance(step, Place):
+        return "the reference is read, then the gauges are tried by small moves"
+    return _after_set(picture.state, at, settings)
+
+
+def _after_computing(step: object) -> str:
+    kind = step.kind if isinstance(step, Compute) else ""
+    words = {
+        "identify": "the held-out poses are measured with the old geometry",
+        "propose": "the change is shown in 4 Review and waits for approval",
+        "commit": "the held-out poses are measured with the new geometry",
+        "judge": "the verdict is shown in 4 Review",
+    }
+    return words.get(kind, "the next pose")
+
+
+def _after_set(state: RunState, at: SetKey, settings: CellSettings | None) -> str:
+    if settings is None:
+        return "the next pose"
+    is_identifying = at.phase is Phase.IDENTIFY
+    plan = settings.identification if is_identifying else settings.verification
+    points, taken = len(plan.points), len(state.set(at).samples)
+    left = max(0, plan.orientations - taken)
+    if left > 1:
+        return f"{left} more records here, then the reference again"
+    if at.point < points:
+        by_hand = settings.stations.placement == "by-hand"
+        place = "put the gauges around the ball at" if by_hand else "go on at"
+        return f"the reference again, then {place} point {at.point + 1} of {points}"
+    return "identifying the geometry" if is_identifying else "the next part of the run"
+
+
+def _remaining(picture: RunPicture) -> str:
+    done = completed_readings(picture.state)
+    planned = picture.described.expected_records if picture.described else 0
+    if picture.state.ended is not None:
+        return f"done: {done} readings"
+    if planned <= 0:
+        return f"{done} readings so far"
+    left = max(0, planned - done)
+    pace = _minutes_per_record(picture.record_times)
+    if pace is None:
+        return f"at most {left} of {planned} readings are left"
+    return f"about {duration(left * pace)}: at most {left} of {planned} readings are left"
+
+
+def completed_readings(state: RunState) -> int:
+    """Records and closings of sets, of which a run is made."""
+    return sum(len(measured.samples) + measured.closed for measured in state.sets.values())
+
+
+def _minutes_per_record(times: tuple[datetime, ...]) -> float | None:
+    recent = times[-PACE_RECORDS - 1 :]
+    gaps = [(later - earlier).total_seconds() / 60.0 for earlier, later in pairwise(recent)]
+    return median(gaps) if gaps else None
+
+
+def _stopping(picture: RunPicture) -> str:
+    described, control = picture.described, picture.control
+    if described is not None and described.is_recorded:
+        return "a recorded run: nothing moves; space plays, arrows step"
+    if picture.state.ended is not None or picture.status is Status.ENDED:
+        return "the run is over; nothing moves"
+    if control is not None and not control.is_in_control:
+        who = control.who or "nobody"
+        return f"you only watch: {who} is in control; c takes over"
+    if picture.status is Status.PAUSED:
+        return "p goes on, a ends the run; all records are kept"
+    return "p pauses after this record, P at once; a stops and ends; records are kept"
+
+
+def record_lines(picture: RunPicture) -> tuple[str, ...]:
+    """A line for each record, in the order in which they were taken."""
+    samples = [sample for measured in picture.state.sets.values() for sample in measured.samples]
+    return tuple(_record_line(sample, picture) for sample in samples)
+
+
+def _record_line(sample: events.RecordTaken, picture: RunPicture) -> str:
+    name = f"{_short_name(sample.at)}/{sample.orientation}"
+    values = "".join(f"{value:+8.3f}" for value in sample.deviation_mm)
+    expected = picture.expected.get((sample.at, sample.orientation))
+    return f"{name:12}{values}{_residual(sample, expected)}"
+
+
+def _short_name(at: SetKey) -> str:
+    words = {
+        Phase.IDENTIFY: "{}",
+        Phase.BEFORE: "before {}",
+        Phase.AFTER: "after {}",
+        Phase.CONFIRM: "confirm {}",
+        Phase.LENGTH: "length {}",
+    }
+    return words[at.phase].format(at.point)
+
+
+def _residual(sample: events.RecordTaken, expected: Expectation | None) -> str:
+    """The largest difference from what was predicted, and how many sigma that is."""
+    if sample.orientation == 1:
+        return f"{'reference':>15}"
+    if expected is None:
+        return f"{'-':>9}{'-':>6}"
+    pairs = zip(sample.deviation_mm, expected.deviation_mm, expected.sigma_mm, strict=True)
+    found = [(measured - predicted, sigma) for measured, predicted, sigma in pairs]
+    residual, sigma = max(found, key=lambda pair: abs(pair[0]))
+    return f"{residual:+9.3f}{abs(residual) / sigma if sigma else 0.0:6.1f}"
+
+
+def accuracy_plot(picture: RunPicture, target_mm: float | None) -> PlotView:
+    """The predicted error at the worst task pose against the records, and what is still expected."""
+    known = [(float(records), forecast.now_mm) for records, forecast in picture.forecasts]
+    series = [Series("so far", "o", *_columns(known))]
+    if picture.forecasts and picture.state.identified is None:
+        records, last = picture.forecasts[-1]
+        coming = [(float(records + last.records), last.end_mm)] if last.records else []
+        series.append(Series("at the end", "x", *_columns(coming)))
+    return PlotView(
+        title=_accuracy_title(picture),
+        x_label="records",
+        y_label="mm",
+        series=tuple(series),
+        level=target_mm,
+        level_name="" if target_mm is None else f"target {target_mm:g} mm",
+        is_logarithmic=True,
+        note="Predicted from the second point on, once the records determine something.",
+    )
+
+
+def _accuracy_title(picture: RunPicture) -> str:
+    if not picture.forecasts:
+        return "Accuracy, as predicted"
+    last = picture.forecasts[-1][1]
+    return f"Accuracy {last.now_mm:.3f}->{last.end_mm:.3f} mm"
+
+
+def _columns(pairs: list[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    return tuple(x for x, _ in pairs), tuple(y for _, y in pairs)

@@ -1,0 +1,148 @@
+"""Text for the questions of a run, with the answers that they take."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hexacell.run_process.snapshots import LiveSnapshot
+from hexacell.text.screens.views import Choice, QuestionView, Urgency
+from hexacell.text.teaching import teaching_sentence
+from hexacell.verdict.acceptance import AcceptanceGate
+from procedures.run.questions import (
+    NO,
+    PLACED,
+    YES,
+    GaugePlacement,
+    PendingChange,
+    Question,
+    StepFailure,
+    UnreadyController,
+    WrittenResult,
+)
+
+PERSON = "a person at the screen"
+"""Who approves a change, as the journal has it."""
+
+RECOVERIES = {
+    "retry": "try the same again",
+    "measure-again": "go back to the reference and take this record again",
+    "redo-set": "discard this point and measure it again",
+    "abort": "end the run; it can be resumed",
+}
+
+
+def question_view(question: Question, live: LiveSnapshot | None) -> QuestionView:
+    """A question with what is to be known for it."""
+    match question.subject:
+        case GaugePlacement() as place:
+            return _placement(place, live)
+        case PendingChange() as change:
+            return _approval(question, change)
+        case WrittenResult() as result:
+            return _keeping(question, result)
+        case StepFailure(problem=problem):
+            return _recovery(question, problem)
+        case UnreadyController() as controller:
+            return _startup(controller)
+
+
+def _placement(place: GaugePlacement, live: LiveSnapshot | None) -> QuestionView:
+    where = f"The robot holds the ball at {place.pose}."
+    if place.seat is None:
+        title = f"Put the gauges around the ball at {place.station}"
+        how = "Put them around the ball, then bring each plunger to the middle of its travel:"
+    else:
+        title = f"Mount the gauges in seat {place.seat} of the fixture ({place.station})"
+        how = "Zero them." if place.point == 1 else "Do not zero them, and leave the fixture where it is."
+    sides = _sides(live)
+    paragraphs = tuple(text for text in (where, sides, how) if text)
+    return QuestionView(
+        title=title,
+        paragraphs=paragraphs,
+        instruction="Press Enter when all gauges say ok.",
+        choices=(Choice("enter", "they are in place: measure", PLACED, is_consent=True),),
+        shows_gauges=True,
+    )
+
+
+def _sides(live: LiveSnapshot | None) -> str:
+    """Which way each plunger points."""
+    if live is None:
+        return ""
+    places = [
+        f"the {one.name} gauge on its {'+' if one.sign > 0 else '-'}{one.axis} side" for one in live.gauges
+    ]
+    return f"All plungers point to the ball: {', '.join(places)}."
+
+
+def _approval(question: Question, change: PendingChange) -> QuestionView:
+    gates = "\n".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}" for gate in change.gates)
+    taught = "" if change.displacement is None else teaching_sentence(change.displacement)
+    paragraphs = [gates, _improvement(change), taught, f"The change:\n{change.diff.rstrip()}"]
+    view = _consenting(question, "write it", "Write the new geometry into the controller's config?")
+    shown = tuple(text for text in paragraphs if text)
+    return replace(view, paragraphs=shown, refusal=approval_refusal(change.gates))
+
+
+def _improvement(change: PendingChange) -> str:
+    expected = change.improvement
+    if expected is None:
+        return ""
+    return (
+        f"Largest position error at the task poses: {expected.now_mm:.3g} mm with the config of now, "
+        f"0 +- {expected.expanded_mm:.2g} mm with this one."
+    )
+
+
+def approval_refusal(gates: tuple[AcceptanceGate, ...]) -> str:
+    """Why nobody can approve; empty where a person may."""
+    failed = [gate.sentence for gate in gates if not gate.passed and not gate.needs_person]
+    return f"It cannot be approved. {' '.join(failed)}" if failed else ""
+
+
+def _consenting(
+    question: Question, what: str, title: str, otherwise: str = "leave the config as it is"
+) -> QuestionView:
+    """A question of consent: by one key, or by the cell's name where it is grave."""
+    decline = Choice("n", f"no, {otherwise}", None)
+    if question.consent == "yes":
+        consent = Choice("y", f"yes, {what}", PERSON, is_consent=True)
+        return QuestionView(title, (), "Press y or n; page up and page down scroll.", (consent, decline))
+    instruction = (
+        f"Type the cell's name, {question.consent}, and Enter to take the responsibility. "
+        "Tab, then n declines; page up and page down scroll."
+    )
+    return QuestionView(title, (), instruction, (decline,), typed=question.consent, consent=PERSON)
+
+
+def _keeping(question: Question, result: WrittenResult) -> QuestionView:
+    taught = "" if result.displacement is None else teaching_sentence(result.displacement)
+    stands = "The new geometry is in the controller's config. Without your word the old one is put back."
+    title = "The result did not pass. Keep it all the same?"
+    view = _consenting(question, "keep it", title, "put the old config back")
+    shown = tuple(text for text in (f"{result.line}.", taught, stands) if text)
+    return replace(view, paragraphs=shown, urgency=Urgency.ALARM)
+
+
+def _recovery(question: Question, problem: str) -> QuestionView:
+    choices = [
+        Choice(str(number), f"{choice}: {RECOVERIES.get(choice, 'do that')}", choice)
+        for number, choice in enumerate(question.choices, start=1)
+    ]
+    return QuestionView(
+        title="The robot stands still: this went wrong",
+        paragraphs=(problem,),
+        instruction="Mend it, then press a number:",
+        choices=tuple(choices),
+        shows_gauges=True,
+        urgency=Urgency.ALARM,
+    )
+
+
+def _startup(controller: UnreadyController) -> QuestionView:
+    return QuestionView(
+        title="The controller is not ready",
+        paragraphs=(f"{controller.problem}.", controller.request),
+        instruction="Press y or n.",
+        choices=(Choice("y", "yes", YES, is_consent=True), Choice("n", "no", NO)),
+    )

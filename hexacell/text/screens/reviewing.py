@@ -1,0 +1,147 @@
+"""Text for a result: verdict and scope first, then everything behind them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexacell.cell.model import CellSettings
+from hexacell.text.events import event_text
+from hexacell.text.screens.measuring import accuracy_plot
+from hexacell.text.screens.parameters import PARAMETER_COLUMNS, parameter_lines
+from hexacell.text.screens.questions import approval_refusal
+from hexacell.text.screens.run_picture import RunPicture
+from hexacell.text.screens.views import PlotView, ReviewView, Series, Urgency
+from hexacell.verdict.acceptance import DeviationStatistics
+from hexacell.verdict.decision import Verdict
+from procedures.run.questions import PendingChange, QuestionKind
+from procedures.run.state import RunState
+from procedures.run.steps import Phase
+
+VERDICT_WORDS = {
+    Verdict.PASS: "PASS: error and uncertainty together are within the limit.",
+    Verdict.CONDITIONAL_PASS: "CONDITIONAL PASS: the error is within the limit, but not by the guard band.",
+    Verdict.NOT_EVALUATED: "NOT EVALUATED: the records do not decide it.",
+    Verdict.CONDITIONAL_FAIL: "CONDITIONAL FAIL: the error is above the limit, but not by the guard band.",
+    Verdict.FAIL: "FAIL: the error is above the limit.",
+}
+
+
+def review_view(picture: RunPicture, settings: CellSettings | None, change: str = "") -> ReviewView:
+    """The screen of a result; ``change`` is the text change of the config, if it is known."""
+    state = picture.state
+    verdict, urgency = _verdict(state)
+    return ReviewView(
+        verdict=verdict,
+        scope=_scope(state),
+        approval=_approval(picture),
+        parameters_header=PARAMETER_COLUMNS,
+        parameters=parameter_lines(state, settings),
+        comparison=_comparison(state),
+        plots=(deviation_plot(state), residual_plot(picture), accuracy_plot(picture, None)),
+        change=tuple((_diff(picture) or change or "There is no change yet.").splitlines()),
+        urgency=urgency,
+    )
+
+
+def _verdict(state: RunState) -> tuple[str, Urgency]:
+    judged = state.judged
+    if judged is None:
+        return "No verdict yet: it is given once the held-out poses are measured.", Urgency.CALM
+    is_good = judged.verdict is Verdict.PASS
+    urgency = Urgency.CALM if is_good else Urgency.ATTENTION
+    if judged.verdict is Verdict.FAIL:
+        urgency = Urgency.ALARM
+    return VERDICT_WORDS[judged.verdict], urgency
+
+
+def _scope(state: RunState) -> tuple[str, ...]:
+    """What the verdict holds for; the verdict itself is said above."""
+    if state.judged is None:
+        return ("The length scale was not checked.",) if state.identified else ()
+    lines = (event_text(state.judged, state) or "").splitlines()
+    kept = [line.removeprefix("  ") for line in lines if not line.startswith("verdict: ")]
+    return tuple(kept or [state.judged.line])
+
+
+def _approval(picture: RunPicture) -> str:
+    state, question = picture.state, picture.question
+    if question is not None and isinstance(question.subject, PendingChange):
+        refusal = approval_refusal(question.subject.gates)
+        return refusal or "Waiting for you: w shows the change, to approve or to decline it."
+    if question is not None and question.kind is QuestionKind.KEEP_RESULT:
+        return "Waiting for you: w asks whether the result is kept."
+    if state.rolled_back:
+        return "The old config was put back."
+    if state.committed is not None:
+        return f"Written to the controller, approved by {state.committed.approved_by}."
+    if state.proposed is not None:
+        failed = [gate.sentence for gate in state.proposed.gates if not gate.passed]
+        return f"Not approved. {' '.join(failed)}".strip()
+    return f"Approving is not possible yet: {_missing(state)}."
+
+
+def _missing(state: RunState) -> str:
+    if state.started is not None and state.started.mode not in {"quick", "optimise"}:
+        return "this run changes nothing"
+    if state.identified is None:
+        return "the geometry is not identified"
+    return "the held-out poses with the old geometry are still to be measured"
+
+
+def _diff(picture: RunPicture) -> str:
+    question = picture.question
+    if question is not None and isinstance(question.subject, PendingChange):
+        return question.subject.diff
+    return ""
+
+
+def _comparison(state: RunState) -> tuple[str, ...]:
+    """Mean and largest distance of the ball from its reference, with the old and the new geometry."""
+    rows = []
+    for name, phase in (("before", Phase.BEFORE), ("after", Phase.AFTER)):
+        deviations = state.held_out(phase)
+        found = DeviationStatistics.of(deviations)
+        if found is None:
+            rows.append(f"{name:8}not measured yet")
+            continue
+        largest = float(np.linalg.norm(deviations, axis=-1).max())
+        rows.append(f"{name:8}mean {found.mean_mm:7.3f}   largest {largest:7.3f} mm   {found.poses} poses")
+    return tuple(rows)
+
+
+def deviation_plot(state: RunState) -> PlotView:
+    """The ball's distance from its reference at each held-out pose, as figures 8 and 9 of the paper."""
+    series = []
+    for name, marker, phase in (("before", "o", Phase.BEFORE), ("after", "x", Phase.AFTER)):
+        sizes = [float(np.linalg.norm(one)) for one in state.held_out(phase)]
+        numbers = tuple(float(number) for number in range(1, len(sizes) + 1))
+        series.append(Series(name, marker, numbers, tuple(max(size, 1e-4) for size in sizes)))
+    return PlotView(
+        title="Deviation per held-out pose, mm",
+        x_label="held-out pose",
+        y_label="mm",
+        series=tuple(series),
+        is_logarithmic=True,
+        note="No held-out pose is measured yet.",
+    )
+
+
+def residual_plot(picture: RunPicture) -> PlotView:
+    """Each record less what was predicted before it, in standard deviations of that; the largest axis."""
+    found = []
+    for number, sample in enumerate(picture.state.samples(Phase.IDENTIFY), start=1):
+        expected = picture.expected.get((sample.at, sample.orientation))
+        if expected is None or sample.orientation == 1:
+            continue
+        pairs = zip(sample.deviation_mm, expected.deviation_mm, expected.sigma_mm, strict=True)
+        scaled = [(measured - predicted) / sigma for measured, predicted, sigma in pairs if sigma > 0.0]
+        found.append((float(number), max(scaled, key=abs, default=0.0)))
+    numbers, residuals = tuple(one for one, _ in found), tuple(two for _, two in found)
+    return PlotView(
+        title="Residual per record, sigma",
+        x_label="record",
+        y_label="sigma",
+        series=(Series("largest of x, y, z", "o", numbers, residuals),),
+        level=0.0,
+        note="No record beside a reference is taken yet.",
+    )

@@ -1,0 +1,142 @@
+"""What a screen knows of a run: a fold over the messages of its host, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+
+from hexacell.campaign.decisions import Forecast
+from hexacell.run_process.messages import (
+    ControlChanged,
+    CursorMoved,
+    EventRecorded,
+    HostFailed,
+    HostMessage,
+    QuestionClosed,
+    QuestionOpened,
+    RunDescribed,
+    StatusChanged,
+)
+from hexacell.run_process.snapshots import LiveSnapshot
+from procedures.engine.command_loop import Status
+from procedures.run import events
+from procedures.run.questions import Question
+from procedures.run.state import RunState, apply
+from procedures.run.steps import Expectation, Move, Phase, SetKey, Step
+
+Setback = events.Tripped | events.Failed | events.Interrupted | HostFailed
+"""What a fault is shown from."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunPicture:
+    """A run as a screen sees it.
+
+    Attributes:
+        live: what the devices showed last, and ``live_at_s`` when that came, by the screen's clock.
+        step: the step that was begun last; none between steps.
+        expected: what the gauges were to show, by set and orientation.
+        forecasts: predicted errors, each with the number of records for the identification before it.
+        setback: the latest fault, until a step is begun after it; ``setbacks`` how many there were.
+        refusal: the command that was refused last, until the next event.
+        record_times: when records were taken, for the time that is left.
+    """
+
+    described: RunDescribed | None = None
+    state: RunState = field(default_factory=RunState)
+    status: Status = Status.IDLE
+    question: Question | None = None
+    live: LiveSnapshot | None = None
+    live_at_s: float = 0.0
+    control: ControlChanged | None = None
+    cursor: CursorMoved | None = None
+    step: Step | None = None
+    last: events.Event | None = None
+    expected: Mapping[tuple[SetKey, int], Expectation] = field(default_factory=dict)
+    forecasts: tuple[tuple[int, Forecast], ...] = ()
+    setback: Setback | None = None
+    setbacks: int = 0
+    refusal: events.CommandRejected | None = None
+    record_times: tuple[datetime, ...] = ()
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether this is a recorded run, which is watched again."""
+        return self.described is not None and self.described.is_recorded
+
+    @property
+    def may_command(self) -> bool:
+        """Whether commands of this screen are taken."""
+        return not self.is_recorded and (self.control is None or self.control.is_in_control)
+
+    @property
+    def at(self) -> SetKey | None:
+        """The set that is being measured."""
+        step_at = getattr(self.step, "at", None)
+        if step_at is not None:
+            return SetKey.model_validate(step_at)
+        return self.state.at_pose[0] if self.state.at_pose else None
+
+
+def picture_after(  # noqa: PLR0911 - a case a message
+    picture: RunPicture, message: HostMessage, now_s: float
+) -> RunPicture:
+    """The picture after one more message, which came at ``now_s`` by the screen's clock."""
+    match message:
+        case RunDescribed():
+            return RunPicture(described=message, control=picture.control)
+        case EventRecorded():
+            return _with_event(picture, message)
+        case StatusChanged(status=status):
+            return replace(picture, status=status)
+        case QuestionOpened(question=question):
+            return replace(picture, question=question)
+        case QuestionClosed():
+            return replace(picture, question=None)
+        case LiveSnapshot():
+            return replace(picture, live=message, live_at_s=now_s)
+        case ControlChanged():
+            return replace(picture, control=message)
+        case CursorMoved():
+            return replace(picture, cursor=message)
+        case HostFailed():
+            return _with_failure(picture, message)
+
+
+def _with_event(picture: RunPicture, message: EventRecorded) -> RunPicture:
+    event = message.event
+    picture = replace(picture, state=apply(picture.state, event), last=event, refusal=None)
+    match event:
+        case events.StepBegun(step=step):
+            return _with_step(picture, step)
+        case events.RecordTaken():
+            return replace(picture, record_times=(*picture.record_times, message.at), step=None)
+        case events.CommandRejected():
+            return replace(picture, refusal=event)
+        case events.Tripped() | events.Failed() | events.Interrupted():
+            return replace(_with_setback(picture, event), step=None)
+        case _:
+            return picture
+
+
+def _with_step(picture: RunPicture, step: Step) -> RunPicture:
+    picture = replace(picture, step=step, setback=None)
+    if not isinstance(step, Move) or step.expected is None:
+        return picture
+    expected = {**picture.expected, (step.at, step.orientation): step.expected}
+    picture = replace(picture, expected=expected)
+    if step.expected.forecast is None:
+        return picture
+    records = len(picture.state.samples(Phase.IDENTIFY))
+    return replace(picture, forecasts=(*picture.forecasts, (records, step.expected.forecast)))
+
+
+def _with_failure(picture: RunPicture, failed: HostFailed) -> RunPicture:
+    """What the journal has said of the end of a run is not said again."""
+    was_told = isinstance(picture.setback, events.Interrupted) and failed.exit_code is not None
+    return picture if was_told else _with_setback(picture, failed)
+
+
+def _with_setback(picture: RunPicture, setback: Setback) -> RunPicture:
+    return replace(picture, setback=setback, setbacks=picture.setbacks + 1)

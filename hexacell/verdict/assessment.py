@@ -1,0 +1,187 @@
+"""The assessment of an identification: can it be trusted, and how accurate is the robot with it?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import chain, repeat
+
+import numpy as np
+
+from hexacell.campaign.feasibility import UNDETERMINED_SHARE
+from hexacell.campaign.task_accuracy import Task
+from hexacell.cell.model import CellSettings
+from hexacell.design.decorrelation import DecorrelatingPose, decorrelating_poses
+from hexacell.design.design_efficiency import DesignEfficiency, design_efficiency
+from hexacell.errors import LimitError
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.diagnostics.correlations import CorrelatedPair, strongly_correlated
+from hexacell.identification.diagnostics.model_tests import PointPrediction, leave_one_point_out
+from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
+from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
+from hexacell.identification.identified_zeros import IdentifiedZeros
+from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareVerdict
+from hexacell.identification.solver.measurement_model import record_covariance
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.records import MeasurementSet
+from hexacell.noise.measured_noise import MeasuredNoise
+from hexacell.noise.repeatability import Repeatability, repeatability
+from hexacell.noise.variance_components import NoiseLevels, noise_levels
+from hexacell.results.result import ExpectedImprovement
+from hexacell.robot.model import Robot
+from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.uncertainty.possible_causes import PossibleCause, possible_causes
+
+SEPARATED_PAIRS = 5
+"""How many of the strongest correlations a measurement is searched for."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Assessment:
+    """An identification beside the drawing, its checks against the data, and the accuracy they predict.
+
+    Attributes:
+        noise: noise levels estimated from the residuals; none without redundancy.
+        repeatability: none where no pose was visited twice.
+        record_noise_mm: scatter of a deviation by the stated noise (root mean square distance), to
+            compare the repeatability with.
+        correlated: strongly correlated pairs of parameters, the strongest first; with the first
+            ``SEPARATED_PAIRS`` the record that would separate them, commanded in the controller's frames.
+        task: poses at which the accuracy is predicted, in the controller's frames.
+        task_named: whether the cell file names them; else they span the workspace.
+        budget: what is not known of the errors at the reachable ones of these poses; none as above.
+        accuracy: at these poses; none where the robot can reach none of them. Where the residuals
+            are larger than the stated noise, the predicted error is as well.
+        points: each point's records predicted by the others, where those determine the geometry.
+        measured_noise: at the start of the run that took the records; none where that is not known.
+        possible_causes: of residuals that are too large, the largest share first.
+        zeros: where these alone are identified; ``found`` is the estimate of all, which tests the data.
+        design: the information of the records beside the best design's; none where it is no result, or
+            where zeros alone are identified.
+    """
+
+    found: Identification
+    drawing: Geometry
+    noise: NoiseLevels | None
+    repeatability: Repeatability | None
+    record_noise_mm: float
+    correlated: tuple[tuple[CorrelatedPair, DecorrelatingPose | None], ...]
+    task: tuple[Pose, ...]
+    task_named: bool
+    accuracy: Accuracy | None
+    budget: UncertaintyBudget | None = None
+    tolerance_violations: tuple[ToleranceViolation, ...] = ()
+    possible_causes: tuple[PossibleCause, ...] = ()
+    measured_noise: MeasuredNoise | None = None
+    points: tuple[PointPrediction, ...] = ()
+    zeros: IdentifiedZeros | None = None
+    design: DesignEfficiency | None = None
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Of the identified parameters those that the data hardly determine."""
+        return (self.zeros or self.found).undetermined
+
+    @property
+    def refused(self) -> bool:
+        """Whether the geometry must not be used, regardless of the other checks."""
+        contradicted = self.found.goodness.ratio > CONTRADICTED_RATIO and not self.does_not_repeat
+        return contradicted or bool(self.tolerance_violations)
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the solver converged, nothing refuses the geometry, and the data determine most of it."""
+        return self.found.converged and not self.refused and not self.determines_too_little
+
+    @property
+    def determines_too_little(self) -> bool:
+        """Whether so many parameters are as uncertain as drawn that the geometry is hardly a result."""
+        free = self.found.problem.mechanism.convention.free_names()
+        unknown = set(self.undetermined) & set(free)
+        identified = free if self.zeros is None else self.zeros.names
+        return len(unknown) > UNDETERMINED_SHARE * len(identified)
+
+    @property
+    def improvement(self) -> ExpectedImprovement | None:
+        """What the identified geometry is good for; none where the robot can reach no task pose."""
+        if self.accuracy is None or self.budget is None:
+            return None
+        return ExpectedImprovement(
+            now_mm=self.accuracy.before.position_largest_mm, expanded_mm=self.budget.expanded_mm
+        )
+
+    @property
+    def does_not_repeat(self) -> bool:
+        """Whether the machine's scatter exceeds the error that a calibration would remove."""
+        if self.repeatability is None or self.accuracy is None:
+            return False
+        return self.repeatability.dominates(self.accuracy.removable_mm)
+
+
+def assess(
+    settings: CellSettings,
+    robot: Robot,
+    measurements: MeasurementSet,
+    found: Identification,
+    measured_noise: MeasuredNoise | None = None,
+) -> Assessment:
+    """Check an identification of some measurements, and predict the accuracy with it.
+
+    ``measured_noise`` is what settings and robot contain already.
+    """
+    left_out = {record for record, _ in found.left_out}
+    belief, zeros = robot.belief(found), robot.identified_zeros(found)
+    if zeros is not None:
+        belief = replace(belief, covariance=zeros.free_covariance)
+    task = Task.of(settings, robot, belief)
+    accuracy = predicted_accuracy(belief, task=task.poses, workspace=task.workspace)
+    return Assessment(
+        found=found,
+        drawing=robot.mechanism.normalize_frames(robot.drawing)[0],
+        noise=noise_levels(found),
+        repeatability=repeatability(measurements, left_out),
+        record_noise_mm=_record_noise_mm(found),
+        correlated=_correlated(robot, found),
+        task=tuple(robot.to_command(task.poses.pose(row)) for row in range(len(task.poses))),
+        task_named=bool(settings.task.poses),
+        accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
+        budget=task.budget(found, belief, robot.effects, robot.known_effects, zeros=zeros),
+        tolerance_violations=robot.tolerance_violations(found.estimate),
+        possible_causes=possible_causes(found) if _is_doubtful(found) else (),
+        measured_noise=measured_noise,
+        points=leave_one_point_out(found) if found.converged else (),
+        zeros=zeros,
+        design=_design(task, belief, found) if found.converged and zeros is None else None,
+    )
+
+
+def _design(task: Task, belief: RobotBelief, found: Identification) -> DesignEfficiency | None:
+    """None where the records of a point do not determine where its gauges were zeroed."""
+    error = task.error(belief)
+    predictions = None if error is None else error.jacobian.reshape(-1, len(belief.free))
+    try:
+        return design_efficiency(belief, found, predictions)
+    except LimitError:
+        return None
+
+
+def _is_doubtful(found: Identification) -> bool:
+    """Whether the residuals are too large, and small enough to be explained to first order."""
+    goodness = found.goodness
+    is_near = found.converged and goodness.ratio <= CONTRADICTED_RATIO
+    return is_near and goodness.agreement is ChiSquareVerdict.TOO_LARGE
+
+
+def _record_noise_mm(found: Identification) -> float:
+    covariance = record_covariance(found.prediction.by_joints, found.problem.noise)
+    return float(np.sqrt(np.mean(np.trace(covariance, axis1=-2, axis2=-1))))
+
+
+def _correlated(
+    robot: Robot, found: Identification
+) -> tuple[tuple[CorrelatedPair, DecorrelatingPose | None], ...]:
+    pairs = strongly_correlated(found)
+    poses = decorrelating_poses(robot.belief(found), found, pairs[:SEPARATED_PAIRS])
+    in_commands = [pose and replace(pose, command=robot.to_command(pose.command)) for pose in poses]
+    return tuple(zip(pairs, chain(in_commands, repeat(None)), strict=False))

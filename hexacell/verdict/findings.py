@@ -1,0 +1,240 @@
+"""The meaning of an identification and its assessment, in sentences for people; the most serious first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hexacell.identification.diagnostics.model_tests import PointPrediction, contradicted_points
+from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
+from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
+from hexacell.kinematics.mechanism import FrameConvention
+from hexacell.kinematics.parameters import JointUnit
+from hexacell.noise.variance_components import NoiseLevel, NoiseLevels
+from hexacell.verdict.assessment import SEPARATED_PAIRS, Assessment
+
+POOR_REPEATABILITY = 2.0
+"""Scatter of repeated poses over that of the stated noise from which it is a finding."""
+
+NEGLIGIBLE_MM = 0.001
+"""No smaller error is printed: it is that of the numbers in a config."""
+
+NAMED_PARAMETERS = 4
+"""More undetermined parameters than these are counted, not named."""
+
+
+def findings(assessed: Assessment) -> tuple[str, ...]:
+    """The verdict, the accuracy, and everything else to know before the result is used."""
+    sentences = (
+        _verdict(assessed),
+        _possible_causes(assessed),
+        _accuracy(assessed),
+        _poor_repeatability(assessed),
+        _noise(assessed),
+        _unreachable(assessed),
+        *map(str, assessed.found.data_faults),
+    )
+    return tuple(sentence for sentence in sentences if sentence)
+
+
+def pair_sentences(assessed: Assessment) -> tuple[str, ...]:
+    """For the strongest correlations: the pair, and the measurement that would separate it."""
+    convention = assessed.found.problem.mechanism.convention
+    sentences = []
+    for pair, pose in assessed.correlated[:SEPARATED_PAIRS]:
+        first, second = (convention.display_name(name) for name in (pair.first, pair.second))
+        fact = f"{first} and {second} cannot be separated from these poses"
+        remedy = (
+            "no single tilt at these points would separate them"
+            if pose is None
+            else f"{'turn' if pose.axis == 'z' else 'tilt'} {pose.degrees:+.0f} deg about {pose.axis} "
+            f"at point {pose.point}"
+        )
+        sentences.append(f"{fact} ({pair.correlation:+.2f}): {remedy}")
+    return tuple(sentences)
+
+
+def residual_sentence(test: ChiSquareTest) -> str:
+    """The finding of the chi-square test."""
+    match test.agreement:
+        case ChiSquareVerdict.NOT_EVALUATED:
+            return "There are no more records than unknowns: the residuals prove nothing."
+        case ChiSquareVerdict.AGREES:
+            return "The residuals agree with the stated noise."
+        case ChiSquareVerdict.TOO_LARGE:
+            return (
+                f"The residuals are {test.ratio:.1f} times the stated noise: the machine does not "
+                "repeat, a gauge has moved, or the noise is stated too small."
+            )
+        case ChiSquareVerdict.TOO_SMALL:
+            return (
+                f"The residuals are only {test.ratio:.2f} times the stated noise: it is stated too "
+                "large, and every sigma with it."
+            )
+
+
+def noise_sentence(levels: NoiseLevels) -> str:
+    """The noise levels that the residuals show."""
+    if not levels.are_separable:
+        return "The noise of the encoders and of the gauges cannot be separated with these records."
+    encoders = _noise_level("encoders", levels.encoder, levels.joint_unit)
+    gauges = _noise_level("gauges", levels.gauge, JointUnit.MM)
+    return f"Noise by the residuals: {encoders}; {gauges}."
+
+
+def _noise_level(kind: str, level: NoiseLevel, unit: JointUnit) -> str:
+    if not level.is_resolved:
+        return f"{kind} below {level.at_most:.4f} {unit} (stated {level.stated:g})"
+    return f"{kind} {level.estimated:.4f} +- {level.standard_error:.4f} {unit} (stated {level.stated:g})"
+
+
+def _verdict(assessed: Assessment) -> str:
+    found = assessed.found
+    if not found.converged:
+        return f"No result: the solver ended because {found.termination.value}."
+    if assessed.tolerance_violations:
+        return _beyond_tolerance(assessed.tolerance_violations, found.problem.mechanism.convention)
+    if assessed.does_not_repeat:
+        return _no_gain(assessed)
+    if assessed.refused:
+        return _contradicted(found.goodness)
+    if assessed.undetermined:
+        return _incomplete(assessed)
+    return _point_verdict(assessed) or _residual_verdict(found.goodness)
+
+
+def _incomplete(assessed: Assessment) -> str:
+    what = f"{_undetermined(assessed)} not determined by these data"
+    if not assessed.determines_too_little:
+        return f"Incomplete: {what}."
+    return f"Not usable: {what}. Measure at more points, and in more orientations with larger tilts."
+
+
+def _point_verdict(assessed: Assessment) -> str:
+    """That records which agree with the noise together contradict each other by points."""
+    contradicted = contradicted_points(assessed.points)
+    if not contradicted or assessed.found.goodness.agreement is ChiSquareVerdict.TOO_LARGE:
+        return ""
+    return f"Doubtful: {_contradicted_by_others(contradicted)}"
+
+
+def _contradicted_by_others(points: Sequence[PointPrediction]) -> str:
+    worst = max(points, key=lambda one: one.test.ratio)
+    return (
+        f"the records of point {worst.point} are {worst.test.ratio:.1f} times as far as the stated noise "
+        "explains from what the other points predict, so the model does not hold."
+    )
+
+
+def _beyond_tolerance(violations: Sequence[ToleranceViolation], convention: FrameConvention) -> str:
+    names = ", ".join(
+        f"{convention.display_name(one.name)} is {one.change:+.2f} {one.unit} from the drawing "
+        f"(tolerance {one.tolerance:g}, sigma {one.sigma:.2g})"
+        for one in violations
+    )
+    others = " or ".join(violations[0].instead)
+    instead = f"; {others} out of its tolerance would explain the records as well" if others else ""
+    return (
+        f"Refused: {names}{instead}. A good residual is no proof: measure that on the machine, and correct "
+        "the drawing or its tolerance in the cell file, or find the other cause."
+    )
+
+
+def _contradicted(goodness: ChiSquareTest) -> str:
+    return (
+        f"Refused: the residuals are {goodness.ratio:.0f} times the stated noise, and no single mistake "
+        "explains them. Check that the drawing, the controller's config and the branch are this machine's, "
+        "and that the ball and the gauges are clamped."
+    )
+
+
+def _residual_verdict(goodness: ChiSquareTest) -> str:
+    match goodness.agreement:
+        case ChiSquareVerdict.TOO_LARGE:
+            scale = f"Every parameter's sigma is in fact {goodness.ratio:.1f} times as large."
+            return f"Doubtful: {_lower(residual_sentence(goodness))} {scale}"
+        case ChiSquareVerdict.NOT_EVALUATED:
+            return f"Not proven: {_lower(residual_sentence(goodness))}"
+        case ChiSquareVerdict.TOO_SMALL:
+            return f"Good: the records determine every parameter. {residual_sentence(goodness)}"
+        case ChiSquareVerdict.AGREES:
+            return "Good: the records determine every parameter, and agree with the stated noise."
+
+
+def _possible_causes(assessed: Assessment) -> str:
+    """What may be, where the residuals are too large and nothing that was left out explains it."""
+    if causes := ", ".join(f"{cause.name} {100 * cause.share:.0f} %" for cause in assessed.possible_causes):
+        return (
+            "The model does not fit, and no cause is proven. What may be, by the share of the excess that "
+            f"it would explain: {causes}."
+        )
+    if assessed.refused or assessed.found.goodness.agreement is not ChiSquareVerdict.TOO_LARGE:
+        return ""
+    return (
+        "The model does not fit, and no cause is proven: neither encoders, guides, load, temperature "
+        "nor gauges would explain a tenth of the excess."
+    )
+
+
+def _undetermined(assessed: Assessment) -> str:
+    convention = assessed.found.problem.mechanism.convention
+    free = convention.free_names()
+    names = [convention.display_name(name) for name in assessed.undetermined if name in free]
+    if len(names) > NAMED_PARAMETERS:
+        return f"{len(names)} of {len(free)} parameters are"
+    return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'}"
+
+
+def _accuracy(assessed: Assessment) -> str:
+    accuracy = assessed.accuracy
+    if accuracy is None:
+        return "The robot can reach none of the task poses: no accuracy can be stated."
+    where = "task poses" if assessed.task_named else "poses across the workspace"
+    before, after = accuracy.before.position_rms_mm, accuracy.after.position_rms_mm
+    now = f"{before:.3g}" if before >= NEGLIGIBLE_MM else f"below {NEGLIGIBLE_MM:g}"
+    return (
+        f"At {len(accuracy.poses)} {where} the position error is now {now} mm (rms), and {after:.2g} mm "
+        "with the identified geometry (one sigma)."
+    )
+
+
+def _no_gain(assessed: Assessment) -> str:
+    scatter, accuracy = assessed.repeatability, assessed.accuracy
+    if scatter is None or accuracy is None:
+        return ""
+    return (
+        f"Recalibrating will not help: the machine repeats only to within {scatter.distance_mm:.3f} mm, "
+        f"and a better geometry would remove {accuracy.removable_mm:.3f} mm."
+    )
+
+
+def _poor_repeatability(assessed: Assessment) -> str:
+    scatter, noise_mm = assessed.repeatability, assessed.record_noise_mm
+    if scatter is None or assessed.does_not_repeat or not scatter.dominates(POOR_REPEATABILITY * noise_mm):
+        return ""
+    return (
+        f"On returning to a pose the ball is {scatter.distance_mm:.3f} mm off, "
+        f"{scatter.distance_mm / noise_mm:.1f} times what the stated noise explains: look for play, "
+        "slipping gauges or thermal drift."
+    )
+
+
+def _noise(assessed: Assessment) -> str:
+    """The noise levels, where the residuals contradict the stated ones."""
+    if assessed.noise is None or assessed.found.goodness.agreement in {
+        ChiSquareVerdict.AGREES,
+        ChiSquareVerdict.NOT_EVALUATED,
+    }:
+        return ""
+    return noise_sentence(assessed.noise)
+
+
+def _unreachable(assessed: Assessment) -> str:
+    if assessed.accuracy is None or assessed.accuracy.reachable.all():
+        return ""
+    numbered = enumerate(assessed.accuracy.reachable, start=1)
+    unreachable = ", ".join(str(number) for number, is_reachable in numbered if not is_reachable)
+    return f"Task poses that the robot cannot reach are left out: {unreachable}."
+
+
+def _lower(sentence: str) -> str:
+    return sentence[0].lower() + sentence[1:]

@@ -1,0 +1,310 @@
+"""The verification of a result: is the model right, how accurate is the robot, and what is decided?
+
+Three things that are kept apart. *Evidence*: tests of the model, each at a probability of 0.1 % to fail
+although the model is right. *Accuracy*: the error that the written geometry makes at the task poses,
+by an estimate that contains the held-out records as well, with its expanded uncertainty. *Decision*: the
+verdict on that error under the limit, which needs the evidence. See ``docs/method.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from hexacell.campaign.task_accuracy import Task
+from hexacell.cell.fields import Frozen, SixNumbers
+from hexacell.cell.model import CellSettings
+from hexacell.identification.diagnostics.model_tests import update
+from hexacell.identification.identified_zeros import ParameterChoice
+from hexacell.identification.problem.problem import Noise
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.parameters import JointUnit
+from hexacell.measurements.records import MeasurementSet
+from hexacell.results.length_result import LengthMeasurements, LengthResult, length_check
+from hexacell.results.result import IdentificationResult
+from hexacell.robot.model import Robot
+from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.uncertainty.length_check import LengthCheck
+from hexacell.uncertainty.length_errors import JudgedGeometry
+from hexacell.uncertainty.statement import LargestError
+from hexacell.verdict.acceptance import DeviationStatistics, is_worse
+from hexacell.verdict.decision import Verdict, decide, worst_verdict
+from hexacell.verdict.model_evidence import (
+    ZEROS_DOUBTED,
+    ModelTest,
+    confirmed,
+    doubts_zeros,
+    fails_narrowly,
+    model_tests,
+    with_zeros_doubted,
+)
+
+
+class JudgedError(Frozen):
+    """The largest error over the task poses, its expanded uncertainty and limit, mm or deg; the verdict.
+
+    The guard band of the decision is ``guard_band_factor`` times the expanded uncertainty.
+    """
+
+    value: float
+    expanded: float
+    limit: float
+    verdict: Verdict
+    guard_band_factor: float = 1.0
+
+    @classmethod
+    def of(cls, error: LargestError, limit: float, guard_band_factor: float) -> JudgedError:
+        """The decision on an error."""
+        return cls(
+            value=error.value,
+            expanded=error.expanded,
+            limit=limit,
+            verdict=decide(error, limit, guard_band_factor),
+            guard_band_factor=guard_band_factor,
+        )
+
+    @property
+    def guard_band(self) -> str:
+        """As a multiple of U, for people; empty where it is U, or the limit is passed."""
+        factor = self.guard_band_factor
+        return "" if factor == 1.0 or self.verdict is Verdict.PASS else f"{factor:g} U"
+
+    @property
+    def rule(self) -> str:
+        """The limit, and the guard band where it is told."""
+        guard_band = f", guard band {self.guard_band}" if self.guard_band else ""
+        return f"limit {self.limit:g}{guard_band}"
+
+
+class VerifiedAccuracy(Frozen):
+    """The error of the written geometry at the task poses.
+
+    Attributes:
+        poses: their number, and whether the cell file names them; else they span the workspace.
+        worst: the pose with the largest position error, in the controller's frames.
+        length: what a length check found; none if there was none.
+        scale_of: what says how long a millimetre is: the encoders, or the drawing where these read angles.
+    """
+
+    position: JudgedError
+    orientation: JudgedError
+    poses: int
+    task_named: bool
+    worst: SixNumbers
+    length: LengthResult | None = None
+    scale_of: Literal["encoders", "drawing"] = "encoders"
+
+    @staticmethod
+    def scale_with(mechanism: Mechanism) -> Literal["encoders", "drawing"]:
+        """What says so of a mechanism."""
+        return "encoders" if mechanism.words.joint_unit is JointUnit.MM else "drawing"
+
+
+class Verification(Frozen):
+    """Evidence, accuracy and decision.
+
+    Attributes:
+        accuracy: none where the robot can take none of the task poses, or no estimate was found.
+        before_mm, after_mm: mean deviation at the held-out poses that were measured before and after.
+        is_worse: whether the deviations after are significantly larger.
+    """
+
+    verdict: Verdict
+    tests: tuple[ModelTest, ...] = ()
+    accuracy: VerifiedAccuracy | None = None
+    before_mm: float | None = None
+    after_mm: float | None = None
+    is_worse: bool = False
+
+    @property
+    def is_offered(self) -> bool:
+        """Whether a person may keep the result: it did not pass, but it is not worse than before."""
+        return self.verdict is not Verdict.PASS and self.after_mm is not None and not self.is_worse
+
+    @property
+    def needs_confirmation(self) -> bool:
+        """Whether only confirming records can tell if the model is wrong, or chance made a test fail."""
+        return fails_narrowly(self.tests) and self.accuracy is not None and not self.is_worse
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldOut:
+    """What was measured at the held-out poses.
+
+    Attributes:
+        records: of both phases, for the identification; no point has the number of another.
+        before: deviations (n, 3), mm, with the old geometry.
+        after: with the new one, at the same poses.
+        left_travel: whether the ball left the gauges' travel with the new geometry.
+        length: what was measured with the new geometry in two seats; none without a length check.
+        confirming: records at points of their own, that were measured because a test failed narrowly; none
+            otherwise.
+    """
+
+    records: MeasurementSet
+    before: Sequence[tuple[float, float, float]]
+    after: Sequence[tuple[float, float, float]]
+    left_travel: bool = False
+    length: LengthMeasurements | None = None
+    confirming: MeasurementSet | None = None
+
+
+def verify(settings: CellSettings, robot: Robot, found: Identification, held_out: HeldOut) -> Verification:
+    """Verify an identified geometry that commands ``robot`` now, in the frames in which it was written.
+
+    Raises:
+        IdentifiabilityError: no geometry fits any held-out record, or those of the length check are of
+            other poses.
+    """
+    before, after = DeviationStatistics.of(held_out.before), DeviationStatistics.of(held_out.after)
+    if held_out.left_travel:
+        return Verification(verdict=Verdict.FAIL, before_mm=before and before.mean_mm, is_worse=True)
+    if before is None or after is None:
+        return Verification(verdict=Verdict.NOT_EVALUATED)
+    updated = update(found, robot.problem(held_out.records))
+    tests = model_tests(found, updated)
+    if held_out.confirming is not None:
+        updated = update(updated, robot.problem(held_out.confirming))
+        tests = confirmed(tests, updated, np.isin(updated.problem.labels[:, 0], held_out.confirming.points))
+    if settings.encoders.are_of_controller and settings.controller.joints_include_zeros:
+        tests = with_zeros_doubted(tests)
+    accuracy = verified_accuracy(settings, robot, found, updated, held_out.length)
+    tests = (*tests, *_length_test(accuracy))
+    worse = is_worse(before, after, _noise_in_mm(robot, updated))
+    return Verification(
+        verdict=_verdict(tests, accuracy, worse=worse),
+        tests=tests,
+        accuracy=accuracy,
+        before_mm=before.mean_mm,
+        after_mm=after.mean_mm,
+        is_worse=worse,
+    )
+
+
+def outcome_line(
+    result: IdentificationResult, parameters: int, verified: Verification, unknowns: int | None = None
+) -> str:
+    """The outcome of a calibration in one line: what was used, before and after, the error, the verdict.
+
+    ``unknowns``: how many of the parameters are identified, if not all.
+    """
+    what = f"{parameters} parameters"
+    if result.identifies is not ParameterChoice.ALL:
+        what = f"zeros only, {unknowns} of {what}"
+    parts = [f"{what}, {result.records} records at {result.points} points"]
+    if verified.before_mm is not None and verified.after_mm is not None:
+        means = f"{verified.before_mm:.2f} -> {verified.after_mm:.3f} mm"
+        parts.append(f"mean deviation at held-out poses {means}")
+    return outcome_of(parts, verified.accuracy, verified.verdict, reason_of(verified))
+
+
+def outcome_of(
+    parts: Sequence[str], accuracy: VerifiedAccuracy | None, verdict: Verdict, reason: str
+) -> str:
+    """An outcome in one line: some parts, the error that decides, the verdict, and its reason if any."""
+    stated = [] if accuracy is None else [_stated(accuracy)]
+    because = f" ({reason})" if reason else ""
+    return f"{'; '.join([*parts, *stated])}: {verdict}{because}"
+
+
+def _stated(accuracy: VerifiedAccuracy) -> str:
+    """The error that decides, position where both do alike."""
+    position, orientation = accuracy.position, accuracy.orientation
+    if worst_verdict([position.verdict, orientation.verdict]) is position.verdict:
+        name, error, unit = "position", position, "mm"
+    else:
+        name, error, unit = "orientation", orientation, "deg"
+    return f"{name} error at the task poses {error.value:.3f} +- {error.expanded:.3f} {unit} ({error.rule})"
+
+
+def reason_of(verified: Verification) -> str:
+    """Why a verdict is not that of the stated error."""
+    failed = [test.sentence for test in verified.tests if not test.passed]
+    if verified.is_worse:
+        doubt = f"; {ZEROS_DOUBTED.rstrip('.')}" if doubts_zeros(verified.tests) else ""
+        return f"worse than before{doubt}"
+    if verified.verdict is Verdict.NOT_EVALUATED and failed:
+        return failed[0].rstrip(".")
+    if verified.verdict is Verdict.NOT_EVALUATED and verified.accuracy is not None:
+        return "U is above the limit"
+    return ""
+
+
+def verified_accuracy(
+    settings: CellSettings,
+    robot: Robot,
+    found: Identification,
+    updated: Identification,
+    measured: LengthMeasurements | None = None,
+) -> VerifiedAccuracy | None:
+    """The error that the geometry of ``found`` makes at the task poses, by the updated estimate."""
+    belief = robot.belief(updated)
+    task = Task.of(settings, robot, belief).reachable(belief)
+    budget = task.budget(updated, belief, robot.effects, robot.known_effects)
+    if budget is None:
+        return None
+    check = measured and _length_check(settings, robot, updated, budget, measured)
+    length = check and LengthResult.of(check, settings.uncertainty.common_scale_um_m)
+    if check and length and length.replaces_stated:
+        budget = (
+            task.budget(updated, belief, robot.effects, robot.known_effects, check.observation) or budget
+        )
+    # With zeros alone, what is written is not what the records tell of all parameters.
+    written = found.free if robot.identifies is ParameterChoice.ALL else robot.free_parameters
+    errors = budget.errors_of(written - updated.free)
+    limits = settings.acceptance
+    factor = limits.guard_band_factor
+    return VerifiedAccuracy(
+        position=JudgedError.of(errors.position, limits.position_mm, factor),
+        orientation=JudgedError.of(errors.orientation, limits.orientation_deg, factor),
+        poses=len(task.poses),
+        task_named=bool(settings.task.poses),
+        worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
+        length=length,
+        scale_of=VerifiedAccuracy.scale_with(robot.mechanism),
+    )
+
+
+def _noise_in_mm(robot: Robot, updated: Identification) -> Noise:
+    """The noise of a record, that of encoders of angles as what it does to the ball."""
+    if robot.mechanism.words.joint_unit is JointUnit.MM:
+        return robot.noise
+    covariances = robot.noise.encoder_covariance(updated.prediction.by_joints)
+    of_ball = float(np.sqrt(np.mean(np.trace(covariances, axis1=1, axis2=2)) / 3.0))
+    return replace(robot.noise, encoder=of_ball)
+
+
+def _length_check(
+    settings: CellSettings,
+    robot: Robot,
+    updated: Identification,
+    budget: UncertaintyBudget,
+    measured: LengthMeasurements,
+) -> LengthCheck:
+    """By the best estimate of the geometry, whose errors the budget has."""
+    covariance = updated.free_covariance * updated.goodness.noise_factor**2
+    judged = JudgedGeometry(covariance, budget.parameter_columns)
+    return length_check(settings, robot, updated.geometry, judged, measured, robot.effects)
+
+
+def _length_test(accuracy: VerifiedAccuracy | None) -> tuple[ModelTest, ...]:
+    """Whether the records of a length check agree with each other; none without one."""
+    length = accuracy and accuracy.length
+    if not length:
+        return ()
+    agree = "The records of the length check agree with each other."
+    sentence = agree if length.is_consistent else f"The length check says nothing: {length.reason}."
+    return (ModelTest(name="length check", passed=length.is_consistent, sentence=sentence),)
+
+
+def _verdict(tests: Sequence[ModelTest], accuracy: VerifiedAccuracy | None, *, worse: bool) -> Verdict:
+    if worse:
+        return Verdict.FAIL
+    if accuracy is None:
+        return Verdict.NOT_EVALUATED
+    evidence = Verdict.PASS if all(test.passed for test in tests) else Verdict.NOT_EVALUATED
+    return worst_verdict([evidence, accuracy.position.verdict, accuracy.orientation.verdict])

@@ -1,0 +1,175 @@
+"""The configs of bundled cells, as an owner may have changed them: written behind a link, and undone."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hexacell.cell.loader import load_cell
+from hexacell.config.change import propose
+from hexacell.config.contents import fingerprint
+from hexacell.config.layout import ConfigLayout
+from hexacell.config.write_back import commit, rollback
+from hexacell.errors import FileError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.robot.model import config_layout
+from tests.several_config_files import LAYOUT, write_config
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+CELLS = {
+    "ini": CONFIGS / "linuxcnc-hexapod" / "cell.toml",
+    "included": CONFIGS / "linuxcnc-hexaglide" / "cell.toml",
+    "toml": CONFIGS / "simulated-hexaglide.toml",
+}
+HAL_AND_INI = "hal and ini"
+NOBODY = 65534
+REMARKS = ("", "# of the owner: S1X = 5.0", "# µm, ä", "#   [HEXAPOD]", "\t")
+INI_LINES = ("#INCLUDE other.inc", "; a remark", "# setp genhexkins.base.0.x 1")
+
+
+@dataclass(frozen=True)
+class Real:
+    """A config that comes with the program; ``texts`` are those of its files."""
+
+    layout: ConfigLayout
+    texts: tuple[str, ...]
+
+    def of(self, *paths: Path) -> Geometry:
+        """The geometry in files."""
+        return self.layout.read(*paths).geometry
+
+
+@pytest.fixture(scope="module", params=[*CELLS, HAL_AND_INI])
+def real(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Real:
+    paths: tuple[Path, ...]
+    if request.param == HAL_AND_INI:
+        layout, paths = LAYOUT, write_config(tmp_path_factory.mktemp("drawn"))
+    else:
+        cell = load_cell(CELLS[request.param])
+        layout, paths = config_layout(cell.settings), cell.config_paths
+    return Real(layout, tuple(path.read_bytes().decode().replace("\r\n", "\n") for path in paths))
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """One of an ordinary user, whose rights this process then has, even if root runs it."""
+    made = Path(tempfile.mkdtemp())
+    is_root = os.geteuid() == 0
+    if is_root:
+        os.chown(made, NOBODY, NOBODY)
+        os.setegid(NOBODY)
+        os.seteuid(NOBODY)
+    yield made
+    if is_root:
+        os.seteuid(0)
+        os.setegid(0)
+    shutil.rmtree(made)
+
+
+def as_owned(text: str, line_end: str, added: list[tuple[int, str]]) -> bytes:
+    """The text with lines of its owner at some places, and other line ends."""
+    lines = text.split("\n")
+    for place, line in added:
+        lines.insert(place % len(lines), line)
+    return line_end.join(lines).encode()
+
+
+def written(folder: Path, contents: list[bytes]) -> tuple[Path, ...]:
+    """Links to files with these contents."""
+    links = tuple(folder / f"link-{number}" for number, _ in enumerate(contents))
+    for link, data in zip(links, contents, strict=True):
+        target = link.with_name(f"config-of-{link.name}")
+        target.write_bytes(data)
+        link.symlink_to(target.name)
+    return links
+
+
+def moved(geometry: Geometry, rows: list[int]) -> Geometry:
+    """Some of its numbers a millimetre and a bit larger."""
+    vector = geometry.vector.copy()
+    vector[rows] += 1.234567
+    return Geometry(geometry.parameters, vector)
+
+
+@settings(max_examples=40)
+@given(st.data())
+def test_a_change_is_written_in_its_lines_alone_and_undone_bit_for_bit(real: Real, data) -> None:
+    is_toml = real.layout.formats[0].name == "toml"
+    remarks = REMARKS if is_toml else REMARKS + INI_LINES
+    added = st.lists(st.tuples(st.integers(0, 1000), st.sampled_from(remarks)), max_size=4)
+    ends = st.sampled_from(["\n", "\r\n"])
+    before = [as_owned(text, data.draw(ends), data.draw(added)) for text in real.texts]
+    rows = data.draw(st.lists(st.integers(0, 41), min_size=1, max_size=4, unique=True))
+    with tempfile.TemporaryDirectory() as place:
+        links = written(Path(place), before)
+        start, geometry = fingerprint(*links), real.of(*links)
+        same = propose(links, real.layout, geometry, fingerprint_at_start=start)
+        assert list(same.after_contents) == before
+        change = propose(links, real.layout, moved(geometry, rows), fingerprint_at_start=start)
+        receipt = commit(change, Path(place) / "backup")
+        assert all(link.is_symlink() for link in links)
+        assert real.of(*links).vector == pytest.approx(moved(geometry, rows).vector, abs=1e-6)
+        after = [link.read_bytes().split(b"\n") for link in links]
+        lines = [old.split(b"\n") for old in before]
+        different = [
+            pair for new, old in zip(after, lines, strict=True) for pair in zip(new, old, strict=True)
+        ]
+        assert 1 <= sum(new != old for new, old in different) <= len(rows)
+        rollback(receipt)
+        assert [link.read_bytes() for link in links] == before
+        assert all(link.is_symlink() for link in links)
+
+
+def geometry_lines(real: Real) -> list[tuple[int, int]]:
+    """File and place of every line that a change of some number changes."""
+    found = []
+    with tempfile.TemporaryDirectory() as place:
+        geometry = real.of(*written(Path(place), [text.encode() for text in real.texts]))
+        new = real.layout.rewrite(real.texts, moved(geometry, list(range(42))))
+    for number, (one, other) in enumerate(zip(real.texts, new, strict=True)):
+        pairs = zip(one.split("\n"), other.split("\n"), strict=True)
+        found += [(number, place) for place, (old, changed) in enumerate(pairs) if old != changed]
+    return found
+
+
+def test_any_line_of_the_geometry_twice_is_refused_with_a_line(real: Real, tmp_path: Path) -> None:
+    for attempt, (number, place) in enumerate(geometry_lines(real)):
+        lines = real.texts[number].split("\n")
+        contents = [text.encode() for text in real.texts]
+        contents[number] = "\n".join([*lines[:place], lines[place], *lines[place:]]).encode()
+        (tmp_path / str(attempt)).mkdir()
+        with pytest.raises(FileError) as caught:
+            real.of(*written(tmp_path / str(attempt), contents))
+        assert caught.value.line is not None
+
+
+def test_what_is_not_utf8_is_refused_with_its_line_and_stays(real: Real, tmp_path: Path) -> None:
+    contents = [text.encode() for text in real.texts]
+    contents[-1] += "# Länge".encode("latin-1")
+    links = written(tmp_path, contents)
+    with pytest.raises(FileError, match="is not UTF-8 text") as caught:
+        real.of(*links)
+    assert caught.value.line == real.texts[-1].count("\n") + 1
+    assert [link.read_bytes() for link in links] == contents
+
+
+def test_a_file_that_its_owner_protects_is_left_alone(real: Real, folder: Path) -> None:
+    contents = [text.encode() for text in real.texts]
+    links = written(folder, contents)
+    geometry = real.of(*links)
+    change = propose(
+        links, real.layout, moved(geometry, list(np.arange(42))), fingerprint_at_start=fingerprint(*links)
+    )
+    links[-1].resolve().chmod(0o444)
+    with pytest.raises(FileError, match="cannot be written and is unchanged: permission denied"):
+        commit(change, folder / "backup")
+    assert [link.read_bytes() for link in links] == contents

@@ -1,0 +1,391 @@
+"""A write of several files leaves all of them new or all of them old, whatever fails, and when."""
+
+import errno
+import math
+import os
+from collections.abc import Callable, Iterator
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.config.change import ConfigChange, propose
+from hexacell.config.contents import Contents, fingerprint, read_contents
+from hexacell.config.pending_write import (
+    is_interrupted,
+    note_path,
+    note_write,
+    settle_interrupted_write,
+)
+from hexacell.config.receipt import AFTER, BEFORE, Receipt
+from hexacell.config.write_back import commit, restore, rollback
+from hexacell.errors import FileError, HexacellError, WriteBackUndone
+from hexacell.kinematics.geometry import Geometry
+from tests.several_config_files import LAYOUT, drawn_geometry, write_config
+
+Job = Callable[[Path], object]
+
+
+class PowerCut(BaseException):
+    """From here on this process does nothing any more."""
+
+
+class Bench:
+    """Two files, one of them behind a symbolic link, and a change of both."""
+
+    def __init__(self, folder: Path, faults: Any) -> None:
+        (folder / "machine").mkdir()
+        (folder / "real").mkdir()
+        hal, ini = write_config(folder / "real")
+        self.files = folder / "machine" / "hexapod.hal", folder / "machine" / "hexapod.ini"
+        hal.rename(self.files[0])
+        self.files[1].symlink_to(ini)
+        self.change = self.changed_by(1.25)
+        self.before, self.after = self.change.before_contents, self.change.after_contents
+        self._runs = (folder / f"run-{number}" for number in count())
+        self._faults = faults
+
+    def changed_by(self, shift_mm: float) -> ConfigChange:
+        geometry = Geometry(drawn_geometry().parameters, drawn_geometry().vector + shift_mm)
+        start = fingerprint(*self.files)
+        return propose(self.files, LAYOUT, geometry, fingerprint_at_start=start)
+
+    @property
+    def found(self) -> Contents:
+        return read_contents(self.files)
+
+    def reset(self, _: Path) -> None:
+        note_path(self.files).unlink(missing_ok=True)
+        for path, data in zip(self.files, self.before, strict=True):
+            path.write_bytes(data)
+
+    def commit(self, run: Path) -> Receipt:
+        return commit(self.change, run)
+
+    def commit_afresh(self, run: Path) -> None:
+        self.reset(run)
+        self.commit(run)
+
+    def next_run(self) -> Path:
+        return next(self._runs)
+
+    def attempts(
+        self, prepare: Job, job: Job, **how: Any
+    ) -> Iterator[tuple[str, Path, BaseException | None]]:
+        """For each call to the file system that fails: which it is, the run, and what the job raised."""
+        run = self.next_run()
+        prepare(run)
+        with self._faults().active() as counter:
+            job(run)
+        assert {"open", "fsync", "replace", "unlink", "access"} <= set(counter.calls)
+        for at, name in enumerate(counter.calls):
+            run = self.next_run()
+            prepare(run)
+            raised = None
+            with self._faults(at=at, **how).active():
+                try:
+                    job(run)
+                except (FileError, WriteBackUndone, PowerCut) as error:
+                    raised = error
+            assert self.files[1].is_symlink()
+            yield f"call {at}, {name}", run, raised
+
+
+@pytest.fixture
+def bench(tmp_path: Path, faults: Any) -> Bench:
+    return Bench(tmp_path, faults)
+
+
+def mixed(bench: Bench) -> bool:
+    return bench.found not in {bench.before, bench.after}
+
+
+def test_both_are_written_and_undone_bit_for_bit(bench: Bench, tmp_path: Path) -> None:
+    receipt = bench.commit(tmp_path / "run")
+    assert bench.found == bench.after
+    assert all(old != new for old, new in zip(bench.before, bench.after, strict=True))
+    geometry = LAYOUT.read(*bench.files).geometry
+    assert geometry.vector == pytest.approx(drawn_geometry().vector + 1.25, abs=1e-6)
+    assert receipt.backup() == bench.before
+    assert [path.name for path in receipt.kept(BEFORE)] == ["config-before", "config-before-2"]
+    assert read_contents(receipt.kept(AFTER)) == bench.after
+    assert sorted(path.name for path in bench.files[0].parent.iterdir()) == ["hexapod.hal", "hexapod.ini"]
+    rollback(Receipt.of(tmp_path / "run"))
+    assert bench.found == bench.before
+    rollback(receipt)
+    assert bench.found == bench.before
+
+
+def test_the_change_shows_each_file_by_its_name_and_survives_its_own(bench: Bench, tmp_path: Path) -> None:
+    bench.change.save(tmp_path / "proposal.json")
+    assert ConfigChange.load(tmp_path / "proposal.json") == bench.change
+    hal, ini = bench.change.diff.split("--- hexapod.ini\n")
+    assert hal.startswith("--- hexapod.hal\n+++ hexapod.hal\n")
+    assert "+setp genhexkins.base.0.x -474.25  # leg 1" in hal
+    assert ini.startswith("+++ hexapod.ini\n")
+    assert "+HOME_OFFSET = 601.25" in ini
+
+
+@pytest.mark.parametrize("key", ["text_before", "text_after"])
+def test_an_edited_change_of_the_second_file_is_refused(bench: Bench, tmp_path: Path, key: str) -> None:
+    path = tmp_path / "proposal.json"
+    text = getattr(bench.change.further[0], key)
+    further = (bench.change.further[0].model_copy(update={key: f"{text} "}),)
+    bench.change.model_copy(update={"further": further}).save(path)
+    with pytest.raises(FileError, match="does not have the checksum stated"):
+        ConfigChange.load(path)
+
+
+def test_the_same_geometry_writes_nothing(bench: Bench, tmp_path: Path) -> None:
+    inodes = [path.stat().st_ino for path in bench.files]
+    commit(bench.changed_by(0.0), tmp_path / "run")
+    assert [path.stat().st_ino for path in bench.files] == inodes
+
+
+def test_a_change_of_one_file_leaves_the_other_alone(bench: Bench, tmp_path: Path) -> None:
+    vector = drawn_geometry().vector.copy()
+    vector[-6:] += 0.5
+    geometry = Geometry(drawn_geometry().parameters, vector)
+    change = propose(bench.files, LAYOUT, geometry, fingerprint_at_start=fingerprint(*bench.files))
+    inode = bench.files[0].stat().st_ino
+    assert change.diff.count("--- ") == 1
+    receipt = commit(change, tmp_path / "run")
+    assert bench.files[0].stat().st_ino == inode
+    assert bench.found == change.after_contents
+    rollback(receipt)
+    assert bench.found == bench.before
+
+
+def test_any_single_failure_of_a_commit_leaves_the_old_config(bench: Bench) -> None:
+    undone = 0
+    for name, _, raised in bench.attempts(bench.reset, bench.commit):
+        assert bench.found == (bench.after if raised is None else bench.before), name
+        settle_interrupted_write(bench.files)  # a note may be left of what is undone
+        assert bench.found == (bench.after if raised is None else bench.before), name
+        undone += isinstance(raised, WriteBackUndone)
+    assert undone >= 8
+
+
+@pytest.mark.parametrize("width", [2, 5, math.inf])
+def test_consecutive_failures_leave_what_the_message_says_or_what_is_undone_next(
+    bench: Bench, width: float
+) -> None:
+    halves = 0
+    for name, run, raised in bench.attempts(bench.reset, bench.commit, width=width):
+        if raised is None:
+            assert bench.found == bench.after, name
+        elif "may hold the new geometry" in str(raised):
+            halves += mixed(bench)
+            assert f"{run / 'config-before'} and {run / 'config-before-2'}" in str(raised), name
+        else:
+            assert bench.found == bench.before, name
+        settle_interrupted_write(bench.files)
+        assert not mixed(bench), name
+    assert halves or math.isfinite(width)
+
+
+@pytest.mark.sample("commit")
+@pytest.mark.parametrize("job", ["commit", "rollback"])
+def test_a_power_cut_at_any_moment_is_settled(bench: Bench, job: str) -> None:
+    doing, prepare = {
+        "commit": (bench.commit, bench.reset),
+        "rollback": (lambda run: rollback(Receipt.of(run)), bench.commit_afresh),
+    }[job]
+    ends: dict[str, int] = {"mixed": 0, "before": 0, "after": 0}
+    for name, run, raised in bench.attempts(prepare, doing, width=math.inf, error=PowerCut):
+        assert isinstance(raised, PowerCut), name
+        if was_mixed := mixed(bench):
+            assert is_interrupted(bench.files), name
+        settled = settle_interrupted_write(bench.files)
+        assert not mixed(bench), name
+        assert not is_interrupted(bench.files), name
+        if was_mixed:
+            assert settled is not None, name
+            assert (settled.restored, settled.is_complete) == (("hexapod.hal",), False), name
+        ends["mixed"] += was_mixed
+        ends["before" if bench.found == bench.before else "after"] += 1
+        doing(run)  # whatever was left, it can be done again
+        assert bench.found == (bench.after if job == "commit" else bench.before), name
+    assert all(ends.values()), ends
+
+
+def test_what_is_settled_can_itself_be_cut_off(bench: Bench) -> None:
+    def half(run: Path) -> None:
+        bench.reset(run)
+        note_write(bench.files, bench.before, bench.after)
+        bench.files[0].write_bytes(bench.after[0])
+
+    for name, _, _ in bench.attempts(
+        half, lambda _: settle_interrupted_write(bench.files), width=math.inf, error=PowerCut
+    ):
+        settle_interrupted_write(bench.files)
+        assert bench.found == bench.before, name
+
+
+def test_a_write_that_was_complete_stays(bench: Bench, tmp_path: Path) -> None:
+    receipt = bench.commit(tmp_path / "run")
+    note_write(bench.files, bench.before, bench.after)
+    settled = settle_interrupted_write(bench.files)
+    assert settled is not None
+    assert settled.is_complete
+    assert bench.found == bench.after
+    assert not is_interrupted(bench.files)
+    rollback(receipt)
+
+
+def test_another_order_of_the_files_finds_the_note(bench: Bench) -> None:
+    note_write(bench.files, bench.before, bench.after)
+    bench.files[0].write_bytes(bench.after[0])
+    settled = settle_interrupted_write(bench.files[::-1])
+    assert settled is not None
+    assert settled.restored == ("hexapod.hal",)
+    assert bench.found == bench.before
+
+
+def test_an_edit_after_the_kill_is_not_lost(bench: Bench) -> None:
+    note_write(bench.files, bench.before, bench.after)
+    bench.files[0].write_bytes(bench.after[0])
+    bench.files[1].write_bytes(b"[MINE]\n")
+    with pytest.raises(FileError, match="was interrupted, and this file was edited since") as caught:
+        settle_interrupted_write(bench.files)
+    assert caught.value.subject == str(bench.files[1])
+    assert str(note_path(bench.files)) in str(caught.value)
+    assert bench.found == (bench.after[0], b"[MINE]\n")
+
+
+def test_a_note_writes_no_file_that_is_not_the_cell_s(bench: Bench, tmp_path: Path) -> None:
+    precious = tmp_path / "precious"
+    precious.write_bytes(b"new")
+    note_write((*bench.files, precious), (*bench.before, b"old"), (*bench.after, b"new"))
+    note_path((*bench.files, precious)).rename(note_path(bench.files))
+    with pytest.raises(FileError, match="which are not the files that this cell file names"):
+        settle_interrupted_write(bench.files)
+    assert precious.read_bytes() == b"new"
+
+
+@pytest.mark.parametrize("text", [b"", b"{}", b"[]", b'{"version": 1, "files": 3}'])
+def test_a_damaged_note_is_told(bench: Bench, text: bytes) -> None:
+    note_path(bench.files).write_bytes(text)
+    with pytest.raises(FileError, match="this is not a note of a write"):
+        settle_interrupted_write(bench.files)
+
+
+def test_a_link_in_the_note_s_place_leads_nowhere(bench: Bench, tmp_path: Path) -> None:
+    precious = tmp_path / "precious"
+    precious.write_bytes(b"precious")
+    note_path(bench.files).symlink_to(precious)
+    with pytest.raises(FileError, match="is a link"):
+        bench.commit(tmp_path / "run")
+    assert (precious.read_bytes(), bench.found) == (b"precious", bench.before)
+
+
+def test_the_note_is_no_more_readable_than_the_files(bench: Bench) -> None:
+    bench.files[1].chmod(0o600)
+    note_write(bench.files, bench.before, bench.after)
+    assert note_path(bench.files).stat().st_mode & 0o077 == 0
+
+
+def test_a_second_file_that_cannot_be_written_stops_it_before_the_first(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = os.access
+
+    def access(path: Any, mode: int, **options: Any) -> bool:
+        return real(path, mode, **options) and Path(path) != bench.files[1].resolve()
+
+    monkeypatch.setattr(os, "access", access)
+    monkeypatch.setattr(os, "supports_effective_ids", set())
+    inode = bench.files[0].stat().st_ino
+    with pytest.raises(FileError, match=r"hexapod\.ini: cannot be written and is unchanged: permission"):
+        bench.commit(tmp_path / "run")
+    assert bench.found == bench.before
+    assert bench.files[0].stat().st_ino == inode
+    assert not is_interrupted(bench.files)
+
+
+def test_a_second_file_whose_disk_is_full_takes_the_first_one_back(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = os.replace
+
+    def replace(source: Any, target: Any) -> None:
+        if Path(target) == bench.files[1].resolve():
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        real(source, target)
+
+    monkeypatch.setattr(os, "replace", replace)
+    with pytest.raises(WriteBackUndone, match=r"was undone, the config is unchanged .*the disk is full"):
+        bench.commit(tmp_path / "run")
+    assert bench.found == bench.before
+    assert not is_interrupted(bench.files)
+    receipt = Receipt.of(tmp_path / "run")
+    with pytest.raises(FileError, match="disk is full"):
+        restore(bench.files, bench.after, expected=bench.before)
+    assert bench.found == bench.before
+    rollback(receipt)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_file_that_was_edited_since_is_named(bench: Bench, tmp_path: Path, number: int) -> None:
+    path = bench.files[number]
+    edited = bench.before[number] + b"# mine\n"
+    path.write_bytes(edited)
+    with pytest.raises(FileError, match="changed since the run began") as caught:
+        bench.commit(tmp_path / "run")
+    assert caught.value.subject == str(path)
+    assert path.read_bytes() == edited
+    bench.reset(tmp_path)
+    receipt = bench.commit(tmp_path / "run")
+    path.write_bytes(edited)
+    with pytest.raises(FileError, match="changed since it was written") as caught:
+        rollback(receipt)
+    assert caught.value.subject == str(path)
+    assert str(receipt.kept(BEFORE)[number]) in str(caught.value)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_file_that_is_not_there_is_named(bench: Bench, tmp_path: Path, number: int) -> None:
+    bench.files[number].unlink()
+    for job in (lambda: bench.commit(tmp_path / "run"), lambda: LAYOUT.read(*bench.files)):
+        with pytest.raises(HexacellError, match=rf"{bench.files[number].name}: cannot be read"):
+            job()
+    other = 1 - number
+    assert bench.files[other].read_bytes() == bench.before[other]
+
+
+def test_a_change_by_another_program_between_the_two_is_kept(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first file is replaced; before the second one is, somebody saves it in an editor."""
+    real, target = os.replace, bench.files[1].resolve()
+
+    def replace(source: Any, to: Any) -> None:
+        real(source, to)
+        if Path(to) == bench.files[0]:
+            target.write_bytes(b"[MINE]\n")
+
+    monkeypatch.setattr(os, "replace", replace)
+    with pytest.raises(WriteBackUndone, match="changed by somebody else"):
+        bench.commit(tmp_path / "run")
+    assert bench.found == (bench.before[0], b"[MINE]\n")
+
+
+def test_a_lost_copy_of_one_file_is_a_damaged_backup(bench: Bench, tmp_path: Path) -> None:
+    receipt = bench.commit(tmp_path / "run")
+    receipt.kept(BEFORE)[1].write_bytes(b"another")
+    with pytest.raises(FileError, match="the backup is damaged"):
+        rollback(receipt)
+    assert bench.found == bench.after
+
+
+def test_random_contents_of_any_bytes_are_put_back(bench: Bench) -> None:
+    random = np.random.default_rng(16)
+    for _ in range(20):
+        before, after = (tuple(random.bytes(int(random.integers(0, 200))) for _ in "12") for _ in "12")
+        for path, data in zip(bench.files, (after[0], before[1]), strict=True):
+            path.write_bytes(data)
+        note_write(bench.files, before, after)
+        settle_interrupted_write(bench.files)
+        assert bench.found == before

@@ -1,0 +1,39 @@
+"""Poses across the workspace."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.design.candidates import workspace_poses
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.problem.problem import Noise
+from hexacell.limits.limits import Limits
+
+LIMITS = Limits(5.0, np.radians(45.0), -800.0, 800.0, 0.05)
+
+
+@pytest.fixture
+def belief(paper, hexaglide):
+    free = hexaglide.convention.free_parameters(paper.nominal)
+    return RobotBelief(
+        hexaglide, paper.nominal, paper.branch, free, np.eye(len(free)), Noise(0.01, 0.01), LIMITS
+    )
+
+
+def test_level_and_tilted_at_every_point(belief, paper):
+    poses = workspace_poses(belief, paper.points[:1])
+    assert len(poses) == 7
+    assert np.unique(np.round(np.degrees(poses.tilts()), 6)).tolist() == [0.0, 15.0]
+    assert np.allclose(poses.positions, paper.points[0])
+
+
+def test_tilts_keep_a_smaller_limit(belief, paper):
+    narrow = replace(belief, limits=replace(LIMITS, tilt=np.radians(8.0)))
+    assert np.degrees(workspace_poses(narrow, paper.points[:2]).tilts()).max() == pytest.approx(8.0)
+
+
+def test_poses_out_of_reach_are_left_out(belief):
+    assert len(workspace_poses(belief, np.array([[0.0, 2000.0, 500.0]]))) == 0

@@ -1,0 +1,105 @@
+"""The record that separates two correlated parameters, compared with its effect once it is measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.design.decorrelation import decorrelating_poses
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.diagnostics.correlations import strongly_correlated
+from hexacell.identification.estimator import identify
+from hexacell.limits.limits import Limits
+from hexacell.measurements.records import MeasurementSet, Record
+
+LIMITS = Limits(5.0, np.radians(45.0), -800.0, 800.0, 0.05)
+SEED = 2
+DEGREES = 30.0
+
+
+@pytest.fixture(scope="module")
+def measured(visit):
+    """Without noise, so that one more record does not change the estimate."""
+    return visit(seed=SEED, degrees=DEGREES).measured()
+
+
+@pytest.fixture(scope="module")
+def found(measured, make_problem):
+    return identify(make_problem(measured))
+
+
+@pytest.fixture(scope="module")
+def belief(found, paper, hexaglide):
+    return RobotBelief(
+        hexaglide,
+        paper.nominal,
+        paper.branch,
+        found.free,
+        found.free_covariance,
+        found.problem.noise,
+        LIMITS,
+    )
+
+
+def correlation_of(found, pair):
+    everything = strongly_correlated(found, above=-1.0)
+    return next(
+        other.correlation
+        for other in everything
+        if (other.first, other.second) == (pair.first, pair.second)
+    )
+
+
+def test_the_record_changes_the_correlation_as_predicted(
+    found, belief, measured, visit, reach, paper, make_problem
+):
+    pairs = strongly_correlated(found)[:6]
+    tried = [
+        (pair, part)
+        for pair, part in zip(pairs, decorrelating_poses(belief, found, pairs), strict=True)
+        if part
+    ]
+    assert len(tried) >= 2
+    exact = visit(seed=SEED, degrees=DEGREES)
+    for pair, part in tried:
+        joints, pose = reach(paper.actual, paper.nominal, part.command)
+        reference = exact.balls[exact.labels.index((part.point, 1))]
+        record = Record(part.point, 99, part.command, tuple(joints), tuple(pose[:3] - reference))
+        more = identify(make_problem(MeasurementSet((*measured.records, record))))
+        assert more.records == 56
+        assert correlation_of(more, pair) == pytest.approx(part.correlation, abs=2e-5)
+        assert 1.0 - abs(correlation_of(more, pair)) > 1.05 * (1.0 - abs(pair.correlation))
+
+
+def test_the_ball_stays_within_the_travel(found, belief, visit, reach, paper):
+    exact = visit(seed=SEED, degrees=DEGREES)
+    pairs = strongly_correlated(found)[:6]
+    for part in filter(None, decorrelating_poses(belief, found, pairs)):
+        _, pose = reach(paper.actual, paper.nominal, part.command)
+        reference = exact.balls[exact.labels.index((part.point, 1))]
+        assert np.abs(pose[:3] - reference).max() < 1.0
+
+
+def test_limits_are_kept(found, belief):
+    narrow = replace(belief, limits=replace(LIMITS, tilt=np.radians(15.0)))
+    pairs = strongly_correlated(found)[:6]
+    parts = [part for part in decorrelating_poses(narrow, found, pairs) if part]
+    assert all(abs(part.degrees) < 15.0 for part in parts if part.axis != "z")
+
+
+def test_with_almost_no_travel_there_is_no_record(found, belief):
+    blind = replace(belief, limits=replace(LIMITS, gauge_travel_mm=1e-6))
+    pairs = strongly_correlated(found)[:3]
+    assert decorrelating_poses(blind, found, pairs) == (None, None, None)
+
+
+def test_where_no_pose_is_in_reach_there_is_no_record(found, belief):
+    stuck = replace(belief, limits=replace(LIMITS, joint_min=0.0, joint_max=1.0))
+    pairs = strongly_correlated(found)[:1]
+    assert decorrelating_poses(stuck, found, pairs) == (None,)
+
+
+def test_without_pairs_there_are_no_records(found, belief):
+    assert decorrelating_poses(belief, found, ()) == ()

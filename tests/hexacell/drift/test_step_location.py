@@ -1,0 +1,63 @@
+"""A located step against a search that knows nothing of it, and against least squares with the step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import ruptures
+
+from hexacell.drift.carried_posterior import CarriedPosterior
+from hexacell.drift.run_evidence import RunEvidence
+from hexacell.drift.step_location import step_gains
+from tests.hexacell.drift.synthetic_runs import CAUSES, LinearRobot
+
+DIFFUSE = CarriedPosterior.diffuse(6, 0)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_time_is_that_of_least_squares(seed) -> None:
+    """One parameter, seen alike by every run: the likeliest step is the best split into two means."""
+    random = np.random.default_rng(seed)
+    values = random.standard_normal(40)
+    values[int(random.integers(5, 35)) :] += 1.0
+    runs = [RunEvidence(np.ones((1, 1)), np.array([value])) for value in values]
+    gains = step_gains(CarriedPosterior.diffuse(1, 0), runs, np.ones((1, 1)))
+    split, _ = ruptures.Dynp(model="l2", min_size=1, jump=1).fit(values).predict(n_bkps=1)
+    assert gains.likeliest == (split, 0)
+    before, after = values[:split], values[split:]
+    assert gains.changes[split, 0] == pytest.approx(after.mean() - before.mean(), rel=1e-3)
+    assert gains.sigmas[split, 0] == pytest.approx(np.sqrt(1 / len(before) + 1 / len(after)), rel=1e-3)
+
+
+def test_size_and_sigma_are_those_of_a_fit_with_the_step() -> None:
+    robot = LinearRobot(1)
+    runs = list(robot.runs(9))
+    robot.state[2] += 1.5
+    runs += robot.nights(7)
+    gains = step_gains(DIFFUSE, runs, CAUSES.by_state)
+    normal, weighted = np.zeros((7, 7)), np.zeros(7)
+    normal[:6, :6] += DIFFUSE.evidence.information
+    for place, run in enumerate(runs):
+        to_state = np.column_stack([np.eye(6), CAUSES.by_state[2] if place >= 10 else np.zeros(6)])
+        normal += to_state.T @ run.information @ to_state
+        weighted += to_state.T @ run.weighted
+    covariance = np.linalg.inv(normal)
+    assert gains.changes[10, 2] == pytest.approx((covariance @ weighted)[6], rel=1e-6)
+    assert gains.sigmas[10, 2] == pytest.approx(np.sqrt(covariance[6, 6]), rel=1e-6)
+
+
+def test_a_large_step_leaves_no_doubt_of_its_time() -> None:
+    robot = LinearRobot(2)
+    runs = list(robot.runs(9))
+    robot.state[4] += 8.0
+    runs += robot.nights(3)
+    gains = step_gains(DIFFUSE, runs, CAUSES.by_state)
+    assert gains.likeliest == (10, 4)
+    assert gains.likely_runs(4) == (10, 10)
+    assert gains.changes[10, 4] == pytest.approx(8.0, abs=4 * gains.sigmas[10, 4])
+
+
+def test_a_step_before_the_first_run_is_not_seen() -> None:
+    gains = step_gains(DIFFUSE, list(LinearRobot().runs(5)), CAUSES.by_state)
+    assert not gains.gains[0].any()
+    assert np.isinf(gains.sigmas[0]).all()

@@ -1,0 +1,94 @@
+"""A narrow failure of a test of the model, confirmed by new records or not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.identification.diagnostics.model_tests import update
+from hexacell.identification.estimator import identify
+from hexacell.measurements.records import MeasurementSet
+from hexacell.robot.model import robot_of
+from hexacell.verdict.model_evidence import (
+    BEYOND_CHANCE,
+    CONFIRMING_PROBABILITY,
+    ModelTest,
+    confirmed,
+    fails_narrowly,
+    model_tests,
+)
+
+NOISE_MM = 0.01
+NOISIER_MM = 0.014
+"""So much noise is found, but not beyond chance."""
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_of(load_cell(bundled_config("simulated-hexaglide")))
+
+
+@pytest.fixture(scope="module")
+def found(robot, visit):
+    return identify(robot.problem(visit(seed=2).measured(NOISE_MM, 1)))
+
+
+@pytest.fixture
+def measure(visit):
+    """Records of three held-out points with some noise, numbered after others."""
+
+    def measured(noise_mm, after, seed):
+        exact = visit(points=3, orientations=8, seed=seed).measured(noise_mm, seed)
+        return MeasurementSet(
+            tuple(replace(record, point=record.point + after) for record in exact.records)
+        )
+
+    return measured
+
+
+def evidence(robot, found, held_out, further):
+    first = update(found, robot.problem(held_out))
+    tests = model_tests(found, first)
+    both = update(first, robot.problem(further))
+    return tests, confirmed(tests, both, np.isin(both.problem.labels[:, 0], further.points))
+
+
+def test_records_of_the_stated_noise_do_not_confirm_a_failure(robot, found, measure):
+    tests, after = evidence(robot, found, measure(NOISIER_MM, 5, 8), measure(NOISE_MM, 8, 11))
+    assert fails_narrowly(tests)
+    assert all(test.passed for test in after)
+    (failed,) = [test for test in tests if not test.passed]
+    (taken,) = [test for test in after if test.name == failed.name]
+    assert taken.sentence == f"{failed.sentence[:-1]}; new records do not confirm that."
+    assert taken.probability == failed.probability
+
+
+def test_as_noisy_records_confirm_it(robot, found, measure):
+    tests, after = evidence(robot, found, measure(NOISIER_MM, 5, 8), measure(NOISIER_MM, 8, 11))
+    assert fails_narrowly(tests)
+    assert [test.passed for test in after] == [*(test.passed for test in tests), False]
+    assert after[-1].probability is not None
+    assert after[-1].probability < CONFIRMING_PROBABILITY
+
+
+def test_what_is_beyond_chance_is_no_narrow_failure(robot, found, measure):
+    first = update(found, robot.problem(measure(3.0 * NOISE_MM, 5, 7)))
+    tests = model_tests(found, first)
+    (failed,) = [test for test in tests if not test.passed]
+    assert failed.probability is not None
+    assert failed.probability < BEYOND_CHANCE
+    assert not fails_narrowly(tests)
+
+
+def test_tests_that_hold_or_of_old_runs_do_not_fail_narrowly():
+    holds = ModelTest(name="a", passed=True, sentence="A.", probability=0.5)
+    old = ModelTest(name="b", passed=False, sentence="B.")
+    narrow = ModelTest(name="c", passed=False, sentence="C.", probability=1e-4)
+    assert not fails_narrowly([holds])
+    assert not fails_narrowly([holds, old])
+    assert not fails_narrowly([narrow, old])
+    assert fails_narrowly([holds, narrow])

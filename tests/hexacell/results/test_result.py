@@ -1,0 +1,102 @@
+"""An identification as a JSON document."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from hexacell.identification.estimator import identify
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
+from hexacell.results.result import IdentificationResult
+
+# docs/interface.md, the document of fit --json; termination is an addition.
+KEYS = {
+    "converged", "iterations", "records", "points", "residual_rms_mm", "chi2", "dof", "geometry",
+    "sigma",
+    "parameters", "covariance", "undetermined", "outliers", "frame", "termination",
+    "expected_chi2",
+    "identifies",
+}  # fmt: skip
+
+
+def document_of(found):
+    """As a reader gets it: through JSON, in which NaN and infinity have no place."""
+    document = IdentificationResult.of(found).document(found.geometry.parameters)
+    return json.loads(json.dumps(document, allow_nan=False))
+
+
+@pytest.fixture(scope="module")
+def document(identified):
+    return document_of(identified)
+
+
+def test_the_document_has_the_keys_of_the_interface(document):
+    assert document.keys() == KEYS
+    assert document["frame"] == "paper"
+    assert document["records"] == 55
+    assert document["points"] == 5
+    assert document["dof"] == 115
+    assert document["expected_chi2"] is None
+    assert document["converged"] is True
+    assert document["undetermined"] == []
+    assert document["outliers"] == []
+    assert isinstance(document["iterations"], int)
+
+
+def test_the_residuals_are_of_the_noise(document):
+    assert 0.005 < document["residual_rms_mm"] < 0.05
+    assert 60.0 < document["chi2"] < 180.0
+
+
+@pytest.mark.parametrize("part", ["geometry", "sigma"])
+def test_geometry_and_sigma_have_one_shape(document, part):
+    assert document[part].keys() == {"S", "B", "l"}
+    assert np.shape(document[part]["S"]) == (6, 3)
+    assert np.shape(document[part]["B"]) == (6, 3)
+    assert np.shape(document[part]["l"]) == (6,)
+
+
+def test_the_covariance_is_in_the_order_of_the_geometry(document):
+    covariance = np.array(document["covariance"])
+    assert covariance.shape == (42, 42)
+    np.testing.assert_array_equal(covariance, covariance.T)
+    sigma = document["sigma"]
+    in_order = [*np.ravel(sigma["S"]), *np.ravel(sigma["B"]), *sigma["l"]]
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), in_order, rtol=1e-12)
+    fixed = [row for row in range(42) if not covariance[row].any()]
+    assert [HEXAGLIDE_PARAMETERS.names[row] for row in fixed] == ["S2x", "S2y", "S2z", "S3z"]
+
+
+def test_the_geometry_is_the_identified_one(document, identified, paper):
+    assert document["geometry"] == identified.geometry.document()
+    assert document["geometry"]["S"][3] == identified.geometry["S"][3].tolist()
+    assert np.abs(np.array(document["geometry"]["l"]) - paper.actual["l"]).max() < 1.0
+
+
+def test_outliers_and_undetermined_parameters_are_named(visit, make_problem):
+    measured = visit(degrees=4.0, seed=1).measured(0.01, seed=1)
+    records = list(measured.records)
+    bad = records[17]
+    shifted = (bad.deviation[0] + 1.0, *bad.deviation[1:])
+    records[17] = type(bad)(bad.point, bad.orientation, bad.pose, bad.joints, shifted)
+    document = document_of(identify(make_problem(type(measured)(tuple(records)))))
+    (outlier,) = document["outliers"]
+    assert (outlier["point"], outlier["orientation"]) == (2, 7)
+    assert (outlier["kind"], outlier["gauges"]) == ("gross error", ["x"])
+    assert outlier["off_mm"] == pytest.approx([1.0, 0.0, 0.0], abs=0.2)
+    assert document["records"] == 54
+    assert "S4z" in document["undetermined"]
+    assert set(document["undetermined"]) <= set(HEXAGLIDE_PARAMETERS.names)
+
+
+def test_a_record_without_a_pose_gives_valid_json(noisy, make_problem):
+    records = list(noisy.records)
+    bad = records[20]
+    apart = tuple(np.add(bad.joints, [-300, -300, -300, 300, 300, 300]).tolist())
+    records[20] = type(bad)(bad.point, bad.orientation, bad.pose, apart, bad.deviation)
+    document = document_of(identify(make_problem(type(noisy)(tuple(records)))))
+    (outlier,) = document["outliers"]
+    assert (outlier["point"], outlier["orientation"]) == (bad.point, bad.orientation)
+    assert outlier["off_mm"] is None

@@ -1,0 +1,276 @@
+"""A run in a host: told whole, paused when its terminal is gone, ended when nobody comes back."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hexacell.cell.loader import Cell
+from hexacell.errors import ExitCode
+from hexacell.run_process.client import connect_to_run
+from hexacell.run_process.host import RemoteOperator, RunHost
+from hexacell.run_process.messages import (
+    EventRecorded,
+    HostFailed,
+    HostMessage,
+    QuestionClosed,
+    QuestionOpened,
+    RunDescribed,
+    StatusChanged,
+)
+from hexacell.run_process.run_socket import listening_socket
+from hexacell.run_process.snapshots import LiveSnapshot
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.run.calibration_run import RunRequest
+from procedures.calibration.workflow import Mode
+from procedures.engine.command_loop import Status
+from procedures.journal.journal import read_entries, read_journal
+from procedures.run import events
+from procedures.run.commands import Answer, CommandQueue, Pause, Resume
+from procedures.run.questions import QuestionKind
+from tests.hexacell.run_process.conftest import Client
+from tests.hexacell.services.conftest import maker
+from tests.small_cell import few_candidates
+from tests.waiting import until
+
+
+@pytest.fixture(autouse=True)
+def quick_choices() -> Iterator[None]:
+    with few_candidates():
+        yield
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Cell:
+    return maker(tmp_path)(stations__placement="by-hand")
+
+
+class HostedRun:
+    """A host in this process, and its clients."""
+
+    def __init__(self, cell: Cell, path: Path, away_s: float | None, resume: bool) -> None:
+        self.folder = RunFolder(runs_folder(cell) / "run")
+        self.cell = cell
+        request = RunRequest(cell, self.folder, Mode.OPTIMISE, RemoteOperator(), resume=resume)
+        self.host = RunHost(request, CommandQueue(), away_s=away_s)
+        self._path = path
+        self._clients: list[Client] = []
+        self.serving: asyncio.Future[ExitCode] = asyncio.get_running_loop().create_future()
+
+    async def client(self) -> Client:
+        connection = await connect_to_run(self._path)
+        assert connection is not None
+        self._clients.append(Client(connection))
+        return self._clients[-1]
+
+    @property
+    def history(self) -> tuple[events.Event, ...]:
+        return read_journal(self.folder.journal)
+
+    def close(self) -> None:
+        for client in self._clients:
+            client.connection._writer.close()
+
+
+Hosted = Callable[..., AbstractAsyncContextManager[HostedRun]]
+
+
+@pytest.fixture
+def hosted(path: Path, cell: Cell) -> Hosted:
+    @asynccontextmanager
+    async def run(away_s: float | None = None, *, resume: bool = False) -> AsyncIterator[HostedRun]:
+        hosted = HostedRun(cell, path, away_s, resume)
+        with listening_socket(path) as listener:
+            hosted.serving = asyncio.ensure_future(hosted.host.serve(listener))
+            try:
+                yield hosted
+                await hosted.serving
+            finally:
+                hosted.serving.cancel()
+                await asyncio.wait([hosted.serving])
+                hosted.close()
+
+    return run
+
+
+def asks(kind: QuestionKind) -> Callable[[HostMessage], bool]:
+    return lambda one: isinstance(one, QuestionOpened) and one.question.kind is kind
+
+
+def is_status(status: Status) -> Callable[[HostMessage], bool]:
+    return lambda one: one == StatusChanged(status=status)
+
+
+def told_of(kind: type[Any]) -> Callable[[HostMessage], bool]:
+    return lambda one: isinstance(one, EventRecorded) and isinstance(one.event, kind)
+
+
+def history_told(client: Client) -> list[events.Event]:
+    return [one.event for one in client.told if isinstance(one, EventRecorded)]
+
+
+async def answer_all(client: Client) -> None:
+    """Put gauges in place and approve everything, to the end of the run."""
+    answers = {QuestionKind.PLACE_GAUGES: "placed", QuestionKind.CHOOSE_RECOVERY: "abort"}
+    async for message in client._messages:
+        client.told.append(message)
+        if isinstance(message, QuestionOpened):
+            await client.connection.give(Answer(answers.get(message.question.kind, "a tester")))
+
+
+async def place(client: Client) -> None:
+    await client.until(asks(QuestionKind.PLACE_GAUGES))
+    await client.connection.give(Answer("placed"))
+
+
+async def test_a_whole_run_is_told_and_commanded_over_the_socket(hosted) -> None:
+    async with hosted() as run:
+        client = await run.client()
+        await answer_all(client)
+        assert await run.serving is ExitCode.DONE
+    described = client.told[0]
+    assert isinstance(described, RunDescribed)
+    assert (described.folder, described.is_recorded) == (run.folder.path, False)
+    assert history_told(client) == list(run.history)
+    assert [one.sequence for one in client.told if isinstance(one, EventRecorded)] == [
+        entry.number for entry in read_entries(run.folder.journal)
+    ]
+    assert client.told.count(QuestionClosed()) == sum(isinstance(m, QuestionOpened) for m in client.told)
+    assert StatusChanged(status=Status.ENDED) in client.told
+
+
+async def test_gauges_are_shown_while_they_are_placed(hosted) -> None:
+    async with hosted() as run:
+        client = await run.client()
+        await client.until(asks(QuestionKind.PLACE_GAUGES))
+        shown = await client.until(
+            lambda one: isinstance(one, LiveSnapshot) and all(g.noise_mm is not None for g in one.gauges)
+        )
+        assert [(one.name, one.axis, one.unit, one.problem) for one in shown.gauges] == [
+            (axis, axis, "mm", "") for axis in "xyz"
+        ]
+        assert all(0.0 <= one.age_s < 60.0 and one.noise_mm < 0.01 for one in shown.gauges)
+        assert len(shown.encoders.positions) == 6
+        assert (shown.controller.estop, shown.controller.enabled) == (False, True)
+        await client.connection.leave(keep_running=False)
+        assert await run.serving is ExitCode.INTERRUPTED
+
+
+async def test_a_second_client_is_told_the_same_and_the_open_question(hosted) -> None:
+    async with hosted() as run:
+        first = await run.client()
+        await first.until(asks(QuestionKind.PLACE_GAUGES))
+        second = await run.client()
+        await second.until(asks(QuestionKind.PLACE_GAUGES))
+        assert history_told(second) == history_told(first) == list(run.history)
+        assert StatusChanged(status=Status.AWAITING_OPERATOR) in second.told
+        await second.connection.take_control()
+        await second.connection.give(Answer("placed"))
+        await first.until(told_of(events.GaugesPlaced))
+        await second.connection.leave(keep_running=False)
+        await first.until_over()
+    assert isinstance(run.history[-1], events.Interrupted)
+
+
+async def test_where_the_terminal_is_gone_the_record_is_finished_and_the_run_pauses(hosted) -> None:
+    async with hosted() as run:
+        lost = await run.client()
+        await place(lost)
+        await lost.until(told_of(events.GaugesPlaced))
+        await lost.until(lambda one: isinstance(one, EventRecorded) and "sample" in str(one.event))
+        lost.hang_up()
+        await until(lambda: not run.host._audience.is_controlled)
+        back = await run.client()
+        await back.until(is_status(Status.PAUSED))
+        steps = [event for event in history_told(back) if not isinstance(event, events.StepBegun)]
+        assert isinstance(steps[-1], events.Paused)
+        assert not steps[-1].at_once
+        assert isinstance(steps[-2], events.RecordTaken | events.Located)
+        await back.connection.give(Resume())
+        await back.until(told_of(events.Resumed))
+        await back.until(told_of(events.RecordTaken))
+        await back.connection.leave(keep_running=False)
+
+
+async def test_who_leaves_it_running_finds_it_running(hosted) -> None:
+    async with hosted() as run:
+        client = await run.client()
+        await place(client)
+        await client.until(told_of(events.RecordTaken))
+        known = len(history_told(client))
+        await client.connection.leave(keep_running=True)
+        await until(lambda: not run.host._audience.is_controlled)
+        back = await run.client()
+        await back.until_control(
+            is_in_control=True
+        )  # told after the history, which may be of the whole set
+        if not any(isinstance(event, events.RecordTaken) for event in history_told(back)[known:]):
+            await back.until(told_of(events.RecordTaken))
+        await back.connection.leave(keep_running=False)
+    assert not any(isinstance(event, events.Paused) for event in run.history)
+
+
+async def test_where_nobody_comes_back_it_ends_and_is_resumed(hosted) -> None:
+    async with hosted(away_s=0.0) as run:
+        lost = await run.client()
+        await place(lost)
+        await lost.until(told_of(events.RecordTaken))
+        lost.hang_up()
+        assert await run.serving is ExitCode.INTERRUPTED
+    before = run.history
+    assert before[-1] == events.Interrupted(reason="nobody was connected for 0 minutes", exit_code=130)
+    assert any(isinstance(event, events.Paused) for event in before)
+    async with hosted(resume=True) as resumed:
+        client = await resumed.client()
+        await client.until(
+            lambda one: told_of(events.RecordTaken)(one) and len(history_told(client)) > len(before)
+        )
+        assert history_told(client)[: len(before)] == list(before)
+        await client.connection.leave(keep_running=False)
+
+
+async def test_a_pause_is_not_ended_while_somebody_is_there(hosted) -> None:
+    async with hosted(away_s=0.0) as run:
+        client = await run.client()
+        await place(client)
+        await client.until(told_of(events.RecordTaken))
+        await client.connection.give(Pause())
+        await client.until(is_status(Status.PAUSED))
+        for _ in range(100):
+            await asyncio.sleep(0)
+        await client.connection.give(Resume())
+        await client.until(told_of(events.Resumed))
+        await client.connection.leave(keep_running=False)
+
+
+async def test_leaving_stops_motion_at_once(hosted) -> None:
+    async with hosted() as run:
+        client = await run.client()
+        await place(client)
+        await client.until(told_of(events.RecordTaken))
+        await client.connection.leave(keep_running=False)
+        assert await run.serving is ExitCode.INTERRUPTED
+    assert run.history[-1] == events.Interrupted(reason="stopped by who left it", exit_code=130)
+
+
+async def test_a_run_that_cannot_begin_says_why(hosted, cell) -> None:
+    cell.config_path.write_text("nothing\n")
+    async with hosted() as run:
+        client = await run.client()
+        told = await client.until_over()
+        assert await run.serving is ExitCode.USAGE
+    assert isinstance(told[-1], HostFailed)
+    assert str(cell.config_path) in told[-1].problem
+    assert told[-1].exit_code == 2
+
+
+async def test_nothing_begins_before_somebody_is_there(hosted, monkeypatch) -> None:
+    monkeypatch.setattr("hexacell.run_process.host.FIRST_CLIENT_S", 0.0)
+    async with hosted() as run:
+        assert await run.serving is ExitCode.INTERRUPTED
+    assert not run.folder.path.exists()

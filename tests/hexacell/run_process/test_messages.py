@@ -1,0 +1,159 @@
+"""Messages on the wire: every kind of event, question and command arrives as it was sent."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+import pytest
+from hypothesis import HealthCheck, given, reject, settings
+from hypothesis import strategies as st
+from pydantic import TypeAdapter, ValidationError
+
+from hexacell.errors import UsageError
+from hexacell.run_process.messages import (
+    ClientMessage,
+    EventRecorded,
+    GiveCommand,
+    HostFailed,
+    HostMessage,
+    QuestionOpened,
+    RunDescribed,
+    client_message,
+    host_message,
+    message_line,
+)
+from procedures.run import events
+from procedures.run.commands import Command, Undo
+from procedures.run.questions import Question
+
+NOON = TypeAdapter(datetime).validate_json('"2026-11-20T12:00:00.123Z"')
+EVENTS: tuple[Any, ...] = get_args(get_args(events.Event)[0])
+COMMANDS: tuple[Any, ...] = get_args(Command)
+SUBJECTS: tuple[Any, ...] = get_args(get_type_hints(Question)["subject"])
+SAME_EACH_TIME = settings(
+    max_examples=12,
+    deadline=None,
+    database=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
+)
+
+
+@st.composite
+def valid(draw: st.DrawFn, kind: type[Any]) -> Any:
+    """An instance of a record; hypothesis knows nothing of what its validators refuse."""
+    try:
+        return draw(st.from_type(kind))
+    except ValidationError:
+        return reject()
+
+
+def told(message: HostMessage) -> str:
+    """A message as text: a number that is none is not equal to itself. ``fold`` says nothing in UTC."""
+    return repr(message).replace(", fold=1", "")
+
+
+def from_host(sent: HostMessage) -> HostMessage:
+    """What arrives of a message; it is one line."""
+    line = message_line(sent)
+    assert line.endswith(b"\n")
+    assert line.count(b"\n") == 1
+    return host_message(line)
+
+
+@pytest.mark.parametrize("kind", EVENTS, ids=lambda kind: kind.__name__)
+def test_every_event_arrives_as_it_was_sent(kind: Any) -> None:
+    @SAME_EACH_TIME
+    @given(valid(kind))
+    def arrives(event: Any) -> None:
+        sent = EventRecorded(sequence=3, at=NOON, event=event)
+        assert told(from_host(sent)) == told(sent)
+
+    arrives()
+
+
+@pytest.mark.parametrize("kind", COMMANDS, ids=lambda kind: kind.__name__)
+def test_every_command_arrives_as_it_was_given(kind: Any) -> None:
+    @SAME_EACH_TIME
+    @given(valid(kind))
+    def arrives(command: Any) -> None:
+        received = client_message(message_line(GiveCommand(command=command)))
+        assert isinstance(received, GiveCommand)
+        assert type(received.command) is kind
+        assert received.command == command
+
+    arrives()
+
+
+def test_every_question_arrives_as_it_was_asked() -> None:
+    subjects = set()
+
+    @settings(SAME_EACH_TIME, max_examples=200)
+    @given(valid(Question))
+    def arrives(question: Question) -> None:
+        sent = QuestionOpened(question=question)
+        subjects.add(type(question.subject))
+        assert told(from_host(sent)) == told(sent)
+
+    arrives()
+    assert subjects == set(SUBJECTS)
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        kind
+        for kind in get_args(get_args(HostMessage)[0])
+        if kind not in {RunDescribed, EventRecorded, QuestionOpened}
+    ],
+    ids=lambda kind: kind.__name__,
+)
+def test_every_other_message_arrives(kind: Any) -> None:
+    @SAME_EACH_TIME
+    @given(valid(kind))
+    def arrives(sent: Any) -> None:
+        assert told(from_host(sent)) == told(sent)
+
+    arrives()
+
+
+def test_every_kind_has_a_word_of_its_own() -> None:
+    for union in (HostMessage, ClientMessage):
+        words = [get_args(one.model_fields["kind"].annotation)[0] for one in get_args(get_args(union)[0])]
+        assert len(set(words)) == len(words)
+
+
+def test_a_text_with_line_ends_is_one_line() -> None:
+    sent = HostFailed(problem="one\ntwo\u2028three\r", action="", exit_code=3)
+    assert from_host(sent) == sent
+
+
+def test_a_description_arrives_with_its_paths() -> None:
+    sent = RunDescribed(cell="c", cell_file=Path("/a/cell.toml"), folder=Path("/a/run"), mode="check")
+    assert from_host(sent) == sent
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"",
+        b"{}\n",
+        b"not json\n",
+        b'{"kind":"command","command":{"name":"Explode"}}\n',
+        b'{"kind":"command","command":{"name":"Pause","at_once":"perhaps"}}\n',
+        b'{"kind":"command","command":"Pause"}\n',
+        b'{"kind":"leave"}\n',
+        b'{"kind":"leave","keep_running":true,"more":1}\n',
+        b'{"kind":"event"}\n',
+    ],
+)
+def test_what_is_no_message_is_refused(line: bytes) -> None:
+    with pytest.raises(UsageError, match="is not understood"):
+        client_message(line)
+
+
+def test_a_message_of_the_host_is_no_message_of_a_client() -> None:
+    with pytest.raises(UsageError, match="is not understood"):
+        host_message(message_line(GiveCommand(command=Undo())))

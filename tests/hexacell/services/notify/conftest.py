@@ -1,0 +1,15 @@
+"""Servers on loopback are reached at once, and again at once where they refuse."""
+
+from __future__ import annotations
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def no_proxy(monkeypatch):
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
+
+
+@pytest.fixture(autouse=True)
+def no_pauses(monkeypatch):
+    monkeypatch.setattr("hexacell.services.notify.delivery.PAUSES_S", (0.0, 0.0))

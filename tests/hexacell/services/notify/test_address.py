@@ -1,0 +1,72 @@
+"""Where the secrets of an address come from, and that none is shown."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hexacell.cell.notifications import NotificationSettings
+from hexacell.errors import FileError, UsageError
+from hexacell.services.notify.address import NoticeAddress, resolved_address, variable
+
+CHAT = "slack://hidden-a/hidden-b/hidden-c/#general?footer=hidden-d"
+
+
+def resolve(folder: Path, environment: dict[str, str] | None = None, **settings: Any) -> NoticeAddress:
+    return resolved_address(
+        NotificationSettings(name="night shift", **settings), "cell #1", folder, environment or {}
+    )
+
+
+def private_file(folder: Path, text: str, mode: int = 0o600) -> str:
+    path = folder / "notify.toml"
+    path.write_text(text)
+    path.chmod(mode)
+    return path.name
+
+
+def test_the_environment_comes_before_the_file_and_the_file_before_the_cell_file(tmp_path) -> None:
+    name = private_file(tmp_path, 'url = "https://file/x"\nuser = "file"\npassword = "file"\n')
+    found = resolve(tmp_path, url="https://cell/x", password_file=name)
+    assert (found.url, found.user, found.password) == ("https://file/x", "file", "file")
+    environment = {"HEXACELL_NOTIFY_NIGHT_SHIFT_PASSWORD": "environment"}
+    assert variable("night shift", "password") in environment
+    found = resolve(tmp_path, environment, url="https://cell/x", password_file=name)
+    assert (found.user, found.password) == ("file", "environment")
+    assert resolve(tmp_path, url="https://cell/x").url == "https://cell/x"
+
+
+def test_a_topic_is_made_of_the_cell_s_name(tmp_path) -> None:
+    assert resolve(tmp_path, url="mqtt://x").topic == "hexacell/cell -1"
+    assert resolve(tmp_path, url="mqtt://x", topic="hall/7/").topic == "hall/7"
+
+
+@pytest.mark.parametrize("mode", [0o604, 0o620, 0o666])
+def test_a_file_that_others_can_read_or_change_is_refused(tmp_path, mode) -> None:
+    name = private_file(tmp_path, 'password = "x"\n', mode)
+    with pytest.raises(FileError, match="chmod 600"):
+        resolve(tmp_path, url="https://x/", password_file=name)
+
+
+def test_a_mistake_in_the_file_does_not_show_it(tmp_path) -> None:
+    name = private_file(tmp_path, 'url = 5\npasword = "hidden"\n')
+    with pytest.raises(Exception, match=r"url|pasword") as raised:
+        resolve(tmp_path, password_file=name)
+    assert "hidden" not in str(raised.value)
+
+
+def test_nothing_to_send_to(tmp_path) -> None:
+    with pytest.raises(UsageError, match="HEXACELL_NOTIFY_NIGHT_SHIFT_URL"):
+        resolve(tmp_path)
+    with pytest.raises(UsageError, match="control characters"):
+        resolve(tmp_path, {"HEXACELL_NOTIFY_NIGHT_SHIFT_URL": "https://\n"})
+
+
+def test_no_part_of_a_secret_is_shown(tmp_path) -> None:
+    found = resolve(tmp_path, {"HEXACELL_NOTIFY_NIGHT_SHIFT_URL": CHAT})
+    assert "hidden" not in repr(found)
+    said = f"could not reach {CHAT}: hidden-b was refused; and hidden-d too"
+    assert "hidden" not in found.masked(said)
+    assert "was refused" in found.masked(said)

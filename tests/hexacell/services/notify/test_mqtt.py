@@ -1,0 +1,69 @@
+"""A broker keeps the last notice as the state of the cell."""
+
+from __future__ import annotations
+
+import pytest
+
+from hexacell.cell.notifications import Occasion
+from hexacell.services.notify.delivery import deliver
+from hexacell.services.notify.notice import Notice
+from hexacell.services.notify.undelivered import NoticeUndelivered
+from tests.hexacell.services.notify.local_servers import (
+    broker,
+    closed_port,
+    make_certificate,
+    silent_server,
+)
+from tests.hexacell.services.notify.notices import a_notice, an_address
+
+LOGIN = ("robot", "hidden-password")
+
+
+def at(port: int, **further):
+    return an_address(f"mqtt://127.0.0.1:{port}", **further)
+
+
+def test_the_last_notice_is_the_retained_state() -> None:
+    with broker() as server:
+        for number in (1, 2):
+            deliver(at(server.port), a_notice(number))
+    assert len(server.published) == 2
+    assert list(server.retained) == ["hexacell/cell 1/state"]
+    assert Notice.model_validate_json(server.retained["hexacell/cell 1/state"]) == a_notice(2)
+
+
+def test_a_test_leaves_the_state_alone() -> None:
+    with broker() as server:
+        deliver(at(server.port), a_notice(occasions=(Occasion.TEST,)))
+    ((topic, _, is_retained),) = server.published
+    assert (topic, is_retained) == ("hexacell/cell 1/test", False)
+
+
+@pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")  # of paho, after a failed handshake
+def test_login_and_tls(tmp_path) -> None:
+    certificate = make_certificate(tmp_path)
+    with broker(certificate, login=LOGIN) as server:
+        url = f"mqtts://127.0.0.1:{server.port}"
+        deliver(an_address(url, user=LOGIN[0], password=LOGIN[1], ca_file=certificate.path), a_notice())
+        with pytest.raises(NoticeUndelivered, match="certificate"):
+            deliver(an_address(url, user=LOGIN[0], password=LOGIN[1]), a_notice())
+    assert len(server.published) == 1
+
+
+def test_a_wrong_password_is_told_and_not_shown() -> None:
+    with broker(login=LOGIN) as server, pytest.raises(NoticeUndelivered, match="refuses") as raised:
+        deliver(at(server.port, user="robot", password="hidden-mistake"), a_notice())
+    assert "hidden" not in str(raised.value)
+    assert server.published == []
+
+
+def test_what_is_not_acknowledged_is_not_told() -> None:
+    with broker(acknowledges=False) as server, pytest.raises(NoticeUndelivered, match=r"acknowledge|taken"):
+        deliver(at(server.port), a_notice(), longest_s=0.5)
+
+
+def test_where_nobody_listens_or_answers() -> None:
+    with pytest.raises(NoticeUndelivered, match="refused"):
+        deliver(at(closed_port()), a_notice())
+    with silent_server() as port, pytest.raises(NoticeUndelivered, match=r"not (answer|taken)"):
+        deliver(at(port), a_notice(), longest_s=0.2)

@@ -1,0 +1,105 @@
+"""Runs that proposed a change of a config, as files, without a run."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.config.change import ConfigChange, propose
+from hexacell.config.contents import fingerprint
+from hexacell.kinematics.geometry import Geometry
+from hexacell.robot.model import config_layout, robot_of
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.verification import Verification
+from procedures.calibration.workflow import Calibration, Mode
+from procedures.journal.journal import Journal
+from procedures.run import events
+
+MET = AcceptanceGate(name="converged", passed=True, sentence="It converged.")
+
+
+def a_cell(folder: Path) -> Cell:
+    """A cell in a folder of its own, with comments in its config."""
+    source = load_cell(bundled_config("simulated-hexaglide"))
+    for path in (source.path, source.config_path):
+        shutil.copy(path, folder)
+    return load_cell(folder / source.path.name)
+
+
+@dataclass(frozen=True)
+class ProposedRun:
+    """A run on the disk, and the texts of its proposal."""
+
+    folder: RunFolder
+    change: ConfigChange
+
+    @property
+    def before(self) -> bytes:
+        return self.change.text_before.encode()
+
+    @property
+    def after(self) -> bytes:
+        return self.change.text_after.encode()
+
+
+def propose_run(
+    cell: Cell,
+    name: str = "2026-11-20T100000Z",
+    *,
+    shift_mm: float = 0.25,
+    gates: tuple[AcceptanceGate, ...] = (MET,),
+    verdict: Verdict | None = Verdict.PASS,
+    **verification: Any,
+) -> ProposedRun:
+    """A run that proposes every number of the config of now, shifted."""
+    folder = RunFolder(runs_folder(cell) / name)
+    folder.create(cell)
+    layout = config_layout(cell.settings)
+    found = layout.read(*cell.config_paths).geometry
+    after = Geometry(found.parameters, found.vector + shift_mm)
+    start = fingerprint(*cell.config_paths)
+    change = propose(cell.config_paths, layout, after, fingerprint_at_start=start)
+    change.save(folder.proposal)
+    with Journal(folder.journal) as journal:
+        for event in _history(cell, change, gates, verdict, verification):
+            journal.append(event)
+    return ProposedRun(folder, change)
+
+
+def _history(
+    cell: Cell,
+    change: ConfigChange,
+    gates: tuple[AcceptanceGate, ...],
+    verdict: Verdict | None,
+    verification: dict[str, Any],
+) -> list[events.Event]:
+    calibration = Calibration(cell.settings, robot_of(cell), Mode.OPTIMISE)
+    history: list[events.Event] = [
+        events.RunStarted(
+            software="hexacell 0",
+            cell=cell.settings.name,
+            cell_text=cell.text_without_secrets,
+            mode="optimise",
+            config=str(cell.config_path),
+            further_configs=tuple(map(str, cell.config_paths[1:])),
+            config_sha256=change.sha256_before,
+            controller=calibration.robot.controller.document(),
+            branch=calibration.robot.branch,
+            devices=(),
+        ),
+        events.Proposed(gates=gates, written=change.after),
+    ]
+    if verdict is not None:
+        judged = Verification(verdict=verdict, **({"before_mm": 1.0, "after_mm": 0.1} | verification))
+        line = f"0.1 mm: {verdict.value}"
+        history += [
+            events.ResultValidated(verdict=verdict, line=line, verification=judged),
+            events.RolledBack(),
+        ]
+    return [*history, events.Ended(exit_code=0, line="over")]

@@ -1,0 +1,124 @@
+"""Units and crontab lines: what they start is what was meant, whatever signs are in a path."""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hexacell.errors import UsageError
+from hexacell.services.schedule.crontab import crontab_line
+from hexacell.services.schedule.scheduled_run import ScheduledRun, time_of_day
+from hexacell.services.schedule.systemd_units import cell_of, service_text, timer_text
+
+PRINTABLE = st.text(
+    st.characters(categories=["L", "N", "P", "S", "Zs"], exclude_characters="/"), min_size=1, max_size=20
+).filter(str.isprintable)
+
+
+def scheduled(
+    cell: str = "/cells/my-robot/cell.toml", name: str = "my-robot", retries: int = 3
+) -> ScheduledRun:
+    path = Path(cell)
+    program = ("/usr/bin/python3", "-m", "hexacell")
+    return ScheduledRun(path, name, program, "check", 2, 30, 120, 15, retries, (path.parent,))
+
+
+def settings_of(unit: str) -> dict[str, str]:
+    return dict(line.split("=", 1) for line in unit.splitlines() if "=" in line)
+
+
+def words_of(line: str) -> list[str]:
+    """The words of a command line as systemd reads them: quoted, with escapes, %% and $$."""
+    words = shlex.split(line, posix=True)
+    return [word.replace("%%", "%").replace("$$", "$") for word in words]
+
+
+def test_a_night_is_a_check_once_and_what_may_pass_is_tried_again() -> None:
+    found = settings_of(service_text(scheduled(), "robot", ["dialout"], "mail@%n.service"))
+    assert found["Type"] == "oneshot"
+    assert words_of(found["ExecStart"])[3:] == [
+        "run", "/cells/my-robot/cell.toml", "--unattended", "--mode", "check",
+    ]  # fmt: skip
+    assert found["RestartPreventExitStatus"].split() == ["1", "2", "4", "6", "7", "70", "130", "SIGTERM"]
+    assert (found["StartLimitBurst"], found["StartLimitIntervalSec"]) == ("4", "540min")
+    assert (found["User"], found["SupplementaryGroups"]) == ("robot", "dialout")
+    assert (found["OnFailure"], found["NoNewPrivileges"]) == ("mail@%n.service", "yes")
+    assert found["ReadWritePaths"] == '"/cells/my-robot"'
+    timer = settings_of(timer_text(scheduled()))
+    assert (timer["OnCalendar"], timer["Persistent"]) == ("*-*-* 02:30:00", "yes")
+
+
+def test_metrics_are_written_after_each_run_whatever_came_of_it() -> None:
+    run = replace(scheduled(), metrics=Path("/metrics/a b.prom"))
+    found = settings_of(service_text(run, "robot", [], None))
+    assert words_of(found["ExecStopPost"])[3:] == [
+        "status", "/cells/my-robot/cell.toml", "--metrics", "/metrics/a b.prom",
+    ]  # fmt: skip
+    assert crontab_line(run).endswith("; " + shlex.join(run.words_afterwards))
+    assert "ExecStopPost" not in service_text(scheduled(), "robot", [], None)
+
+
+@pytest.mark.parametrize(
+    ("cell", "private"),
+    [("/cells/a/cell.toml", "yes"), ("/tmp/a/cell.toml", "no"), ("/tmpa/cell.toml", "yes")],
+)
+def test_a_cell_below_a_temporary_folder_is_not_hidden_from_its_run(cell, private) -> None:
+    assert settings_of(service_text(scheduled(cell), "robot", [], None))["PrivateTmp"] == private
+
+
+def test_the_service_of_a_user_asks_for_nothing_that_only_root_may() -> None:
+    found = settings_of(service_text(scheduled(retries=0), None, ["dialout"], None))
+    assert not {"User", "ProtectSystem", "CapabilityBoundingSet", "OnFailure", "Restart"} & set(found)
+
+
+@given(PRINTABLE, PRINTABLE)
+def test_any_path_is_one_argument(folder, file) -> None:
+    run = scheduled(f"/{folder}/{file}")
+    found = settings_of(service_text(run, "robot", [], None))
+    assert words_of(found["ExecStart"]) == list(run.words)
+    assert found["WorkingDirectory"].replace("%%", "%") == str(run.cell.parent)
+    assert cell_of(service_text(run, None, [], None)) == cell_of(timer_text(run)) == run.cell
+
+
+@given(PRINTABLE)
+def test_any_path_is_one_word_of_a_crontab(file) -> None:
+    run = scheduled(f"/cells/{file}")
+    schedule, command = crontab_line(run).split(" * * * ", 1)
+    assert schedule == "30 2"
+    assert "%" not in command.replace("\\%", "")
+    assert shlex.split(command.replace("\\%", "%").removesuffix(" </dev/null"))[-len(run.words) :] == list(
+        run.words
+    )
+
+
+def test_units_have_plain_names() -> None:
+    assert scheduled(name="Zelle 3 (Süd)").unit == "hexacell-zelle-3-s-d"
+    assert scheduled(name="+").unit == "hexacell-cell"
+
+
+@pytest.mark.parametrize("text", ["24:00", "2:30", "02:60", "", "02:30:00", "-1:00", "02.30"])
+def test_what_is_no_time_of_day_is_refused(text) -> None:
+    with pytest.raises(UsageError, match="no time of day"):
+        time_of_day(text)
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="this computer has no systemd")
+@pytest.mark.parametrize("user", [None, "root"])
+def test_systemd_finds_nothing_wrong_with_them(tmp_path, user) -> None:
+    run = scheduled(str(tmp_path / "a cell$ with %i" / "cell.toml"))
+    run.cell.parent.mkdir()
+    units = {"service": service_text(run, user, [], "mail@%n.service"), "timer": timer_text(run)}
+    for kind, text in units.items():
+        (tmp_path / f"{run.unit}.{kind}").write_text(text)
+    files = [str(tmp_path / f"{run.unit}.{kind}") for kind in units]
+    done = subprocess.run(
+        ["systemd-analyze", "verify", *files], capture_output=True, text=True, check=False
+    )
+    assert [line for line in done.stderr.splitlines() if run.unit in line] == []

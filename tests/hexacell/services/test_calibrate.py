@@ -1,0 +1,252 @@
+"""A calibration from the cell file to its end, through real drivers and files."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from hexacell.cell.loader import load_cell
+from hexacell.config.change import ConfigChange
+from hexacell.config.contents import fingerprint
+from hexacell.config.receipt import Receipt
+from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
+from hexacell.measurements.csv_file import read_measurements
+from hexacell.runs.cell_lock import cell_lock
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.run.accepted_results import last_accepted_result
+from hexacell.services.run.calibration_run import calibrate
+from hexacell.services.run.replay_run import replay
+from hexacell.verdict.decision import Verdict
+from procedures.calibration.workflow import Mode
+from procedures.journal.journal import Journal, read_journal
+from procedures.run import events
+from procedures.run.state import fold
+from procedures.run.steps import Phase
+
+
+def test_a_calibration_passes(finished) -> None:
+    assert finished.ended.exit_code == ExitCode.DONE
+    assert "35 parameters, 24 records at 2 points; mean deviation at held-out poses" in finished.ended.line
+    judged = fold(finished.history).judged
+    assert judged
+    assert judged.verdict is Verdict.PASS
+
+
+def test_listeners_get_the_events_of_the_journal(finished) -> None:
+    assert finished.told == finished.history
+
+
+def test_the_controllers_config_is_changed_in_its_numbers_only(finished) -> None:
+    before, after = finished.config_before.decode(), finished.cell.config_path.read_text()
+    assert before != after
+    proposal = ConfigChange.load(finished.folder.proposal)
+    assert (proposal.text_before, proposal.text_after) == (before, after)
+    for old, new in zip(before.splitlines(), after.splitlines(), strict=True):
+        assert old == new or ("[" in old and "]" in old) or "# leg" in old
+        assert old.partition("#")[2] == new.partition("#")[2]
+
+
+def test_the_receipt_and_the_backup_for_a_rollback_are_kept(finished) -> None:
+    receipt = Receipt.of(finished.folder.path)
+    assert receipt.backup() == (finished.config_before,)
+    assert receipt.sha256_after == fingerprint(finished.cell.config_path)
+
+
+def test_the_run_folder_has_everything(finished) -> None:
+    folder, state = finished.folder, fold(finished.history)
+    assert (folder.path / "cell.toml").read_text() == finished.cell.text
+    assert read_measurements(folder.measurements) == state.measurements()
+    assert state.identified
+    result = json.loads(folder.result.read_text())
+    identified = state.identified.result.model_dump(mode="json")
+    assert {key: result[key] for key in identified} == identified
+    assert result["findings"]
+    assert folder.wire.stat().st_size > 1000
+
+
+def test_the_first_event_has_the_inputs_of_the_run(finished) -> None:
+    started = finished.history[0]
+    assert started.cell == "simulated-hexaglide"
+    assert started.cell_text == finished.cell.text
+    assert started.config_sha256 != fingerprint(finished.cell.config_path)
+    assert started.controller == finished.cell.settings.robot.nominal.model_dump()
+    assert started.branch == (-1, -1, -1, 1, 1, 1)
+    protocols = [device.protocol for device in started.devices]
+    assert protocols == ["sylvac", "mux10", "cdi", *["cia406"] * 6, "linuxcncrsh"]
+    assert len({device.serial_number for device in started.devices if device.protocol == "cia406"}) == 6
+
+
+def test_raw_readings_are_what_the_devices_sent(finished) -> None:
+    samples = fold(finished.history).samples(Phase.IDENTIFY)
+    for sample in samples:
+        assert np.mean(sample.reading.counts, axis=0) * 0.001 == pytest.approx(sample.reading.joints)
+        assert all(len(answer) == 3 and all(answer) for answer in sample.reading.answers)
+
+
+def test_a_calibration_reduces_the_deviations_at_held_out_points(finished) -> None:
+    state = fold(finished.history)
+    before, after = (np.linalg.norm(state.held_out(phase), axis=1) for phase in (Phase.BEFORE, Phase.AFTER))
+    assert before.mean() > 1.0
+    assert after.mean() < 0.2
+
+
+async def test_a_run_that_is_over_is_not_resumed(finished) -> None:
+    before = finished.folder.journal.read_bytes()
+    with pytest.raises(UsageError, match="is over: 35 parameters"):
+        await calibrate(finished.order(resume=True))
+    assert finished.folder.journal.read_bytes() == before
+
+
+async def test_a_folder_with_a_run_takes_no_new_one(finished) -> None:
+    before = finished.folder.journal.read_bytes()
+    with pytest.raises(UsageError, match="holds a run already"):
+        await calibrate(finished.order())
+    assert finished.folder.journal.read_bytes() == before
+
+
+async def test_a_cell_in_use_is_left_alone(make_site) -> None:
+    site = make_site()
+    with cell_lock(site.cell.config_path), pytest.raises(CellBusy) as refusal:
+        await site.calibrate()
+    assert refusal.value.exit_code is ExitCode.BUSY
+    assert not site.folder.path.exists()
+
+
+async def test_the_cell_is_held_while_it_runs_and_free_afterwards(make_site, finished) -> None:
+    site = make_site()
+    site.write(finished.until(events.Proposed), finished)
+    busy: list[bool] = []
+
+    def listener(event: events.Event, _: object) -> None:
+        if isinstance(event, events.Committed):
+            with pytest.raises(CellBusy), cell_lock(site.cell.config_path):
+                pass
+            busy.append(True)
+
+    await site.calibrate(listener, resume=True)
+    assert busy == [True]
+    with cell_lock(site.cell.config_path):
+        pass
+
+
+async def test_after_a_calibration_a_check_finds_it_good(finished, tmp_path) -> None:
+    before = finished.cell.config_path.read_bytes()
+    order = finished.order(folder=RunFolder(tmp_path / "check"), mode=Mode.CHECK)
+    ended = await calibrate(order)
+    assert ended.exit_code == ExitCode.DONE
+    assert finished.cell.config_path.read_bytes() == before
+    told = fold(read_journal(order.folder.journal))
+    assert told.started is not None
+    assert told.started.accepted is not None
+    assert told.started.accepted.run == str(finished.folder.path)
+    assert told.judged is not None
+    assert told.judged.check is not None
+    assert told.judged.check.drift_scale == 1.0
+    assert (await replay(order.folder.path)).differences == []
+
+
+async def test_a_check_of_a_config_that_no_run_wrote_starts_from_the_drawing(make_site) -> None:
+    site = make_site()
+    ended = await site.calibrate(mode=Mode.CHECK)
+    [started] = site.happened(events.RunStarted)
+    assert started.accepted is None
+    assert ended.exit_code == ExitCode.OUT_OF_LIMITS
+    assert "position error at the task poses" in ended.line
+
+
+async def test_the_effects_of_an_accepted_result_are_those_of_its_records(make_cell, finished) -> None:
+    cell = make_cell(uncertainty__encoder_scale_um_m=100.0)
+    cell.config_path.write_bytes(finished.cell.config_path.read_bytes())
+    shutil.copytree(runs_folder(finished.cell), runs_folder(cell))
+    found = last_accepted_result(cell)
+    assert found is not None
+    assert list(found.effects) == ["scale of each encoder"]
+    columns = found.parameter_columns["scale of each encoder"]
+    # Of 1 um/m over some 300 mm of travel, in parameters that the records determine.
+    assert columns.shape == (35, 6)
+    assert 1e-4 < np.abs(columns).max() < 1e-1
+
+
+async def test_a_run_without_a_beginning_cannot_be_resumed(make_site) -> None:
+    site = make_site()
+    with pytest.raises(FileError, match="does not exist"):
+        await site.calibrate(resume=True)
+    site.folder.path.mkdir()
+    site.folder.journal.touch()
+    with pytest.raises(FileError, match="journal is empty"):
+        await site.calibrate(resume=True)
+
+
+async def test_a_run_is_resumed_with_the_cell_file_it_began_with(make_site, finished) -> None:
+    site = make_site()
+    site.write(finished.until(events.RecordTaken), finished)
+    site.cell.path.write_text(site.cell.text + "# changed\n")
+    site.cell = load_cell(site.cell.path)
+    with pytest.raises(UsageError, match="has changed since the run began"):
+        await site.calibrate(resume=True)
+
+
+async def test_a_run_is_resumed_in_its_mode(make_site, finished) -> None:
+    site = make_site()
+    site.write(finished.until(events.RecordTaken), finished)
+    with pytest.raises(UsageError, match="begun in the mode optimise"):
+        await site.calibrate(resume=True, mode=Mode.CHECK)
+
+
+async def test_a_run_gets_no_length_check_when_it_is_resumed(make_site, finished) -> None:
+    site = make_site()
+    site.write(finished.until(events.RecordTaken), finished)
+    with pytest.raises(UsageError, match="begun without a length check"):
+        await site.calibrate(resume=True, length_check=True)
+
+
+async def test_a_damaged_journal_is_not_resumed(make_site, finished) -> None:
+    site = make_site()
+    site.write(finished.until(events.RecordTaken), finished)
+    site.folder.journal.write_bytes(site.folder.journal.read_bytes().replace(b'"P"', b'"Q"', 1))
+    with pytest.raises(FileError, match="damaged"):
+        await site.calibrate(resume=True)
+
+
+async def test_a_run_whose_journal_is_open_elsewhere_is_not_resumed(make_site, finished) -> None:
+    site = make_site()
+    site.write(finished.until(events.Proposed), finished)
+    before = site.folder.journal.read_bytes()
+    with Journal(site.folder.journal), pytest.raises(CellBusy):
+        await site.calibrate(resume=True)
+    assert site.folder.journal.read_bytes() == before
+    assert site.config == finished.config_before
+
+
+async def test_a_cancelled_run_stops_in_place_and_can_be_resumed(make_site, finished) -> None:
+    site = make_site()
+    site.write(finished.until(events.SetClosed), finished)
+    heard = 0
+
+    def cancel(event: events.Event, _: object) -> None:
+        nonlocal heard
+        heard += isinstance(event, events.RecordTaken)
+        if heard >= 3:
+            running.cancel()  # again and again, until it is over
+
+    running = asyncio.create_task(site.calibrate(cancel, resume=True))
+    with pytest.raises(asyncio.CancelledError):
+        await running
+    assert site.happened(events.Interrupted)[-1] == events.Interrupted(
+        reason="CancelledError", exit_code=ExitCode.INTERRUPTED
+    )
+    assert site.simulated.physics.progress() == 1.0
+    first, wire = read_journal(site.folder.journal), site.folder.wire.read_bytes()
+
+    ended = await site.calibrate(resume=True)
+    assert ended.exit_code == ExitCode.DONE
+    history = read_journal(site.folder.journal)
+    assert history[: len(first)] == first
+    assert [str(event.at) for event in site.happened(events.ReferenceConfirmed)] == ["P2"]
+    assert not site.happened(events.SetInvalidated), "the gauges stood there all the time"
+    assert site.folder.wire.read_bytes() == wire
+    assert (site.folder.path / "wire-2").exists()

@@ -1,0 +1,77 @@
+"""What differs from the last run is told with the device."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from drivers.interfaces import DeviceIdentity
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.devices.changed_devices import with_changes
+from hexacell.services.run.calibration_run import new_calibration, preflight, run_started
+from procedures.calibration.workflow import Mode
+from procedures.journal.journal import Journal
+
+GAUGE = DeviceIdentity("x", "mux10", "MUX-10F 1.0", port="1-1.2")
+ENCODER = DeviceIdentity("encoder of leg 3 (node 3)", "cia406", "absolute linear", "503", "preset 0")
+
+
+@pytest.fixture
+def cell(make_cell):
+    return make_cell()
+
+
+def kept(cell, name: str, *devices: DeviceIdentity) -> RunFolder:
+    folder = RunFolder(runs_folder(cell) / name)
+    folder.create(cell)
+    with Journal(folder.journal) as journal:
+        journal.append(run_started(cell, new_calibration(cell, Mode.OPTIMISE), devices))
+    return folder
+
+
+def test_without_a_run_before_there_is_nothing_to_tell(cell) -> None:
+    assert [one.remark for one in with_changes(cell, (GAUGE, ENCODER))] == ["", ""]
+
+
+def test_an_encoder_that_was_set_since_the_last_run_is_told(cell) -> None:
+    kept(cell, "2026-11-01T000000Z", GAUGE, replace(ENCODER, settings="preset 7"))
+    kept(cell, "2026-11-02T000000Z", GAUGE, ENCODER)
+    now = replace(ENCODER, settings="preset 500", remark="it reports a warning")
+    gauge, encoder = with_changes(cell, (GAUGE, now))
+    assert gauge.remark == ""
+    assert encoder.remark == (
+        "it reports a warning; since the run 2026-11-02T000000Z: settings preset 500, which was preset 0"
+    )
+    assert encoder == now, "a remark is not compared"
+
+
+def test_an_exchanged_device_and_another_port_are_told(cell) -> None:
+    kept(cell, "2026-11-02T000000Z", GAUGE, ENCODER)
+    gauge, encoder = with_changes(cell, (replace(GAUGE, port="1-1.3"), replace(ENCODER, serial_number="9")))
+    assert gauge.remark.endswith("port 1-1.3, which was 1-1.2")
+    assert encoder.remark.endswith("serial number 9, which was 503")
+
+
+def test_what_a_run_of_before_did_not_tell_is_no_change(cell) -> None:
+    kept(cell, "2026-11-02T000000Z", replace(GAUGE, port=""), replace(ENCODER, settings=""))
+    assert [one.remark for one in with_changes(cell, (GAUGE, ENCODER))] == ["", ""]
+
+
+def test_a_run_that_cannot_be_read_is_passed_over(cell) -> None:
+    kept(cell, "2026-11-01T000000Z", ENCODER)
+    damaged = kept(cell, "2026-11-02T000000Z", replace(ENCODER, settings="preset 7"))
+    damaged.journal.write_bytes(b"nothing\n")
+    (runs_folder(cell) / "2026-11-03T000000Z").mkdir()
+    [encoder] = with_changes(cell, (replace(ENCODER, settings="preset 1"),))
+    assert "since the run 2026-11-01T000000Z: settings preset 1, which was preset 0" in encoder.remark
+
+
+async def test_preflight_tells_it(cell) -> None:
+    found = await preflight(cell, Mode.OPTIMISE, unattended=True)
+    before = [replace(one, serial_number="1") if one.name == "x" else one for one in found]
+    kept(cell, "2026-11-02T000000Z", *before)
+    again = await preflight(cell, Mode.OPTIMISE, unattended=True)
+    told = {one.name: one.remark for one in again if one.remark}
+    assert list(told) == ["x"]
+    assert "which was 1" in told["x"]

@@ -1,0 +1,239 @@
+"""The history of a cell's config: each way of writing it leaves a record, which outlives its run."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from datetime import UTC, datetime
+from pathlib import Path
+from unittest.mock import Mock
+
+import pytest
+
+from hexacell.cell.loader import Cell
+from hexacell.config import write_record
+from hexacell.config.write_back import commit
+from hexacell.config.write_record import (
+    RECORDS,
+    THE_RUN,
+    WriteCause,
+    WriteKind,
+    read_records,
+    recorded_write,
+)
+from hexacell.errors import FileError, UsageError
+from hexacell.robot.model import config_layout
+from hexacell.runs.cell_lock import user_name
+from hexacell.runs.run_folder import runs_folder
+from hexacell.services.write_back.config_history import config_history
+from hexacell.services.write_back.config_rollback import roll_back_config
+from hexacell.services.write_back.proposals import COMMAND, apply_proposal, read_proposal
+from hexacell.verdict.decision import Verdict
+from procedures.journal import journal as journals
+from procedures.journal.journal import Journal
+from procedures.run import events
+from procedures.run.questions import UnattendedOperator
+from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Cell:
+    return a_cell(tmp_path)
+
+
+@pytest.fixture
+def records(cell) -> Path:
+    return runs_folder(cell) / RECORDS
+
+
+async def apply(run: ProposedRun, reason: str = "") -> str:
+    applied = await apply_proposal(read_proposal(run.folder), UnattendedOperator(), reason=reason)
+    return applied.unrecorded
+
+
+def kinds(cell: Cell) -> list[WriteKind]:
+    return [one.record.kind for one in config_history(cell).writes]
+
+
+async def test_applied_and_rolled_back_by_hand(cell) -> None:
+    run = propose_run(cell)
+    assert await apply(run, "  the fixture was exchanged ") == ""
+    assert roll_back_config(cell, reason="it hums").unrecorded == ""
+    back, applied = config_history(cell).writes
+    assert (applied.record.kind, applied.record.run) == (WriteKind.APPLIED, run.folder.path.name)
+    assert (applied.record.by, applied.record.reason) == (COMMAND, "the fixture was exchanged")
+    assert (applied.record.why, applied.verdict) == ("0.1 mm: pass", Verdict.PASS)
+    assert (applied.record.user, applied.record.host) == (user_name(), os.uname().nodename)
+    assert applied.record.files == (cell.config_path.absolute(),)
+    assert (back.record.kind, back.record.reason) == (WriteKind.ROLLED_BACK, "it hums")
+    assert back.record.why == f"by hand, as it was before {run.folder.path.name}"
+    assert back.record.numbers_changed == applied.record.numbers_changed == 42
+    for one, change in ((applied, 0.25), (back, -0.25)):
+        assert one.record.largest is not None
+        assert one.record.largest.change == pytest.approx(change)
+        assert one.record.largest.unit == "mm"
+    assert (applied.record.sha256_before, applied.record.sha256_after) == (
+        run.change.sha256_before,
+        run.change.sha256_after,
+    )
+    assert back.record.sha256_after == run.change.sha256_before
+    assert back.verdict is None
+
+
+async def test_what_writes_nothing_leaves_no_record(cell, records) -> None:
+    run = propose_run(cell)
+    await apply(run)
+    await apply(run)
+    roll_back_config(cell, run.folder.path.name)
+    assert kinds(cell) == [WriteKind.APPLIED]
+
+
+async def test_a_reason_of_several_lines_is_refused_before_anything_is_written(cell) -> None:
+    run = propose_run(cell)
+    with pytest.raises(UsageError, match="one line"):
+        await apply(run, "one\ntwo")
+    assert cell.config_path.read_bytes() == run.before
+    await apply(run)
+    with pytest.raises(UsageError, match="one line"):
+        roll_back_config(cell, reason="x" * 1001)
+    assert cell.config_path.read_bytes() == run.after
+
+
+async def test_the_records_outlive_the_runs(cell) -> None:
+    run = propose_run(cell)
+    await apply(run)
+    shutil.rmtree(run.folder.path)
+    (left,) = config_history(cell).writes
+    assert (left.record.run, left.is_recorded, left.verdict) == (run.folder.path.name, True, None)
+
+
+async def test_a_torn_last_line_costs_no_other(cell, records) -> None:
+    run = propose_run(cell)
+    await apply(run)
+    roll_back_config(cell)
+    whole = records.read_bytes()
+    records.write_bytes(whole[:-20])
+    found = config_history(cell)
+    assert ([one.record.kind for one in found.writes], found.damaged) == ([WriteKind.APPLIED], (2,))
+    roll_back_config(cell, run.folder.path.name)
+    found = config_history(cell)
+    assert [one.record.kind for one in found.writes] == [WriteKind.ROLLED_BACK, WriteKind.APPLIED]
+    assert found.damaged == (2,)
+
+
+async def test_a_line_without_its_end_counts_if_it_is_whole(cell, records) -> None:
+    await apply(propose_run(cell))
+    records.write_bytes(records.read_bytes().removesuffix(b"\n"))
+    assert kinds(cell) == [WriteKind.APPLIED]
+    roll_back_config(cell)
+    assert kinds(cell) == [WriteKind.ROLLED_BACK, WriteKind.APPLIED]
+    assert read_records(runs_folder(cell))[1] == ()
+
+
+async def test_a_write_that_cannot_be_recorded_stays_and_is_told(cell, records) -> None:
+    records.mkdir(parents=True)
+    run = propose_run(cell)
+    told = await apply(run)
+    assert cell.config_path.read_bytes() == run.after
+    assert told.startswith("The config is written, but the history has no record of it: ")
+    assert RECORDS in told
+    done = roll_back_config(cell)
+    assert cell.config_path.read_bytes() == run.before
+    assert done.unrecorded.startswith("The config is written, but the history has no record of it: ")
+    records.rmdir()
+    (known,) = config_history(cell).writes
+    assert (known.record.kind, known.record.by, known.is_recorded) == (WriteKind.APPLIED, COMMAND, False)
+
+
+async def test_a_full_disk_leaves_no_part_of_a_record(cell, records, monkeypatch) -> None:
+    run = propose_run(cell)
+    await apply(run)
+    before = records.read_bytes()
+
+    def full(descriptor: int, data: bytes) -> int:
+        raise OSError(28, os.strerror(28))
+
+    monkeypatch.setattr("hexacell.storage.appended_lines.os.write", full)
+    assert "the disk is full" in roll_back_config(cell).unrecorded
+    assert (cell.config_path.read_bytes(), records.read_bytes()) == (run.before, before)
+
+
+async def test_a_link_is_not_followed(cell, records, tmp_path) -> None:
+    run = propose_run(cell)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.write_bytes(b"precious")
+    records.symlink_to(elsewhere)
+    assert await apply(run)
+    assert elsewhere.read_bytes() == b"precious"
+
+
+def journalled(run: ProposedRun, *more: events.Event) -> None:
+    with Journal(run.folder.journal) as journal:
+        for event in more:
+            journal.append(event)
+
+
+def test_a_provisional_geometry_has_no_verdict(cell) -> None:
+    run = propose_run(cell)
+    cause = WriteCause(WriteKind.PROVISIONAL, THE_RUN, run.folder.name, "to measure on")
+    with recorded_write(run.folder.siblings, cell.config_paths, config_layout(cell.settings), cause):
+        commit(run.change, run.folder.path)
+    (written,) = config_history(cell).writes
+    assert (written.record.kind, written.verdict, written.why) == (
+        WriteKind.PROVISIONAL,
+        None,
+        "to measure on",
+    )
+
+
+def test_folders_of_before_are_told_by_their_journals(cell) -> None:
+    run = propose_run(cell, verdict=None)
+    commit(run.change, run.folder.path)
+    journalled(run, events.Committed(approved_by="a tester"))
+    cell.config_path.write_bytes(run.before)
+    judged = events.ResultValidated(verdict=Verdict.FAIL, line="0.3 mm: fail (worse than before)")
+    journalled(run, judged, events.RolledBack())
+    back, written = config_history(cell).writes
+    assert (written.record.kind, written.record.by) == (WriteKind.RESULT, "a tester")
+    assert (written.is_recorded, written.verdict, written.record.user) == (False, Verdict.FAIL, "")
+    assert written.record.sha256_after == run.change.sha256_after == back.record.sha256_before
+    assert (back.record.kind, back.record.why) == (WriteKind.TAKEN_BACK, "0.3 mm: fail (worse than before)")
+
+
+@pytest.mark.parametrize("recorded_after_us", [0, 900])
+def test_writes_within_a_millisecond_stay_in_their_order_and_are_told_once(
+    cell, monkeypatch, recorded_after_us: int
+) -> None:
+    """Journals have milliseconds, records of writes microseconds: a fast computer does all that in one."""
+    run = propose_run(cell, verdict=None)
+    at = datetime(2026, 11, 20, 10, 5, tzinfo=UTC)
+    record_time = Mock(now=lambda zone: at.replace(microsecond=recorded_after_us))
+    monkeypatch.setattr(write_record, "datetime", record_time)
+    monkeypatch.setattr(journals, "now", lambda: (at.replace(microsecond=999), 1.0))
+    cause = WriteCause(WriteKind.RESULT, "a tester", run.folder.name, "")
+    with recorded_write(run.folder.siblings, cell.config_paths, config_layout(cell.settings), cause):
+        commit(run.change, run.folder.path)
+    judged = events.ResultValidated(verdict=Verdict.FAIL, line="0.3 mm: fail (worse than before)")
+    journalled(run, events.Committed(approved_by="a tester"), judged, events.RolledBack())
+    assert kinds(cell) == [WriteKind.TAKEN_BACK, WriteKind.RESULT]
+
+
+async def test_a_write_that_was_recorded_is_not_told_twice(cell, records) -> None:
+    run = propose_run(cell)
+    await apply(run)
+    roll_back_config(cell)
+    await apply(run)
+    assert kinds(cell) == [WriteKind.APPLIED, WriteKind.ROLLED_BACK, WriteKind.APPLIED]
+
+
+def test_records_of_a_newer_program_are_left_out_and_numbered(cell, records) -> None:
+    records.parent.mkdir(parents=True)
+    records.write_bytes(b'{"version": 2, "novelty": 1}\n')
+    found = config_history(cell)
+    assert (found.writes, found.damaged) == ((), (1,))
+
+
+def test_records_that_cannot_be_read_are_an_error(cell, records) -> None:
+    records.mkdir(parents=True)
+    with pytest.raises(FileError, match="not a file"):
+        config_history(cell)

@@ -1,0 +1,200 @@
+"""Tasks of a study on a real Dask cluster, whose processes are killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import threading
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from functools import partial
+from itertools import chain, repeat
+from pathlib import Path
+
+import pytest
+
+from hexacell import __version__
+from hexacell.errors import UsageError
+from hexacell.services.study.dask_cluster import ClusterError, dask_cluster
+from hexacell.services.study.studies import NewExecutor
+from hexacell.study.tasks import results_of
+from tests.dask_processes import DaskProcesses, dask_processes
+from tests.waiting import wait_until
+
+SQUARES = {str(number): number for number in range(100)}
+GIVEN_UP_AT_ONCE = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
+"""The scheduler gives no task of a lost worker to another one, so that this program must."""
+
+NO_SCHEDULER = "{}: no Dask scheduler answers. Start one there"
+NO_WORKERS = "{}: the Dask scheduler has no workers. Start some with `dask worker "
+SOON_S = 5.0
+LATE_S = 250.0
+
+
+def square(number: int) -> int:
+    return number * number
+
+
+def square_unless_killed(number: int, folder: Path) -> int:
+    """The first worker to come to 50 dies of it."""
+    if number == 50 and not (folder / "killed").exists():
+        (folder / "killed").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return square(number)
+
+
+def square_until_held(number: int, folder: Path) -> int:
+    """From 50 on nothing ends before the test says so."""
+    if number >= 50:
+        (folder / "held").touch()
+        wait_until((folder / "go").exists)
+    return square(number)
+
+
+def fail(number: int) -> int:
+    raise ValueError(number)
+
+
+def impatient_after_the_first(address: str) -> NewExecutor:
+    """Executors of which the first waits for the cluster to start, and those after it not again."""
+    executors = chain(
+        [dask_cluster(address, patience_s=LATE_S)], repeat(dask_cluster(address, patience_s=SOON_S))
+    )
+
+    def next_one() -> Executor:
+        return next(executors)()
+
+    return next_one
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[DaskProcesses]:
+    """Two workers."""
+    with dask_processes(tmp_path, 2, **GIVEN_UP_AT_ONCE) as processes:
+        yield processes
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{}, pytest.param(GIVEN_UP_AT_ONCE, marks=pytest.mark.slow)],
+    ids=["by the scheduler", "by this program"],
+)
+def test_tasks_of_a_killed_worker_are_done_again(tmp_path: Path, settings: dict[str, str]) -> None:
+    with dask_processes(tmp_path, 3, **settings) as cluster:
+        carry_out = partial(square_unless_killed, folder=tmp_path)
+        found = list(results_of(SQUARES, carry_out, dask_cluster(cluster.address, patience_s=LATE_S)))
+        wait_until(lambda: any(worker.poll() == -signal.SIGKILL for worker in cluster.workers))
+    assert len(found) == 100
+    assert dict(found) == {key: number**2 for key, number in SQUARES.items()}
+
+
+def test_what_a_task_raises_ends_the_study_and_leaves_the_cluster_in_use(cluster) -> None:
+    with pytest.raises(ValueError, match="0"):
+        list(results_of({"0": 0}, fail, dask_cluster(cluster.address, patience_s=LATE_S)))
+    assert dict(results_of({"3": 3}, square, dask_cluster(cluster.address, patience_s=LATE_S))) == {"3": 9}
+
+
+def test_a_scheduler_that_goes_away_is_named_and_what_was_done_is_told(cluster, tmp_path: Path) -> None:
+    carry_out = partial(square_until_held, folder=tmp_path)
+    found = results_of(SQUARES, carry_out, impatient_after_the_first(cluster.address))
+    done = dict(next(found) for _ in range(40))
+    wait_until((tmp_path / "held").exists)
+    cluster.scheduler.kill()
+    with pytest.raises(ClusterError, match=NO_SCHEDULER.format(cluster.address)):
+        done |= dict(found)
+    assert all(done[key] == int(key) ** 2 for key in done)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [pytest.param({}, marks=pytest.mark.slow), GIVEN_UP_AT_ONCE],
+    ids=["nothing is told", "tasks are lost"],
+)
+def test_workers_that_all_leave_are_missed(tmp_path: Path, settings: dict[str, str]) -> None:
+    with dask_processes(tmp_path, 2, **settings) as cluster:
+        started = results_of({"3": 3}, square, dask_cluster(cluster.address, patience_s=LATE_S))
+        assert dict(started) == {"3": 9}
+        carry_out = partial(square_until_held, folder=tmp_path)
+        found = results_of(SQUARES, carry_out, dask_cluster(cluster.address, patience_s=SOON_S))
+        next(found)
+        wait_until((tmp_path / "held").exists)
+        for worker in cluster.workers:
+            worker.kill()
+        with pytest.raises(ClusterError, match=NO_WORKERS.format(cluster.address)):
+            list(found)
+
+
+def test_a_scheduler_without_workers_says_how_to_start_some(tmp_path: Path) -> None:
+    with (
+        dask_processes(tmp_path, 0) as cluster,
+        pytest.raises(ClusterError, match=NO_WORKERS.format(cluster.address)),
+    ):
+        dask_cluster(cluster.address, patience_s=SOON_S)()
+
+
+def test_a_study_that_is_given_up_waits_for_no_task(cluster, tmp_path: Path) -> None:
+    """As Ctrl-C does it: the workers are held still when this ends."""
+    found = results_of(
+        SQUARES,
+        partial(square_until_held, folder=tmp_path),
+        dask_cluster(cluster.address, patience_s=LATE_S),
+    )
+    next(found)
+    wait_until((tmp_path / "held").exists)
+    found.close()  # type: ignore[attr-defined]
+    (tmp_path / "go").touch()
+
+
+def test_nobody_at_the_address() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        address = "tcp://{}:{}".format(*free.getsockname())
+    with pytest.raises(ClusterError, match=NO_SCHEDULER.format(address)):
+        dask_cluster(address, patience_s=SOON_S)()
+
+
+def test_something_else_at_the_address() -> None:
+    def speak() -> None:
+        connection, _ = server.accept()
+        with connection:
+            connection.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = "tcp://{}:{}".format(*server.getsockname())
+        speaker = threading.Thread(target=speak)
+        speaker.start()
+        with pytest.raises(ClusterError, match=NO_SCHEDULER.format(address)):
+            dask_cluster(address, patience_s=SOON_S)()
+        speaker.join()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("__version__ = '0.0.1'\n", f"has hexacell 0.0.1, this computer {__version__}. Install hexacell=="),
+        ("raise ImportError('numpy')\n", "has no hexacell that can be imported, this computer"),
+    ],
+)
+def test_a_worker_with_another_version_is_named(tmp_path: Path, content: str, words: str) -> None:
+    (tmp_path / "other" / "hexacell").mkdir(parents=True)
+    (tmp_path / "other" / "hexacell" / "__init__.py").write_text(content)
+    with dask_processes(tmp_path, 0) as cluster:
+        cluster.start_worker(PYTHONPATH=str(tmp_path / "other"))
+        with pytest.raises(ClusterError, match=rf"tcp://127.0.0.1:\d+: .*{words}"):
+            dask_cluster(cluster.address, patience_s=LATE_S)()
+
+
+def test_a_worker_that_comes_later_with_another_version_is_named(cluster, monkeypatch) -> None:
+    executor = dask_cluster(cluster.address, patience_s=LATE_S)()
+    monkeypatch.setattr("hexacell.services.study.dask_cluster.__version__", "9.9")
+    with (
+        executor,
+        pytest.raises(ClusterError, match=rf"tcp://127.*: has hexacell {__version__}, the study 9.9"),
+    ):
+        executor.submit(square, 3).result()
+
+
+@pytest.mark.parametrize("address", ["", "here", "127.0.0.1:8786", "tcp://127.0.0.1", "tcp://:port"])
+def test_what_is_no_address_is_refused(address: str) -> None:
+    with pytest.raises(UsageError, match="is no address of a Dask scheduler"):
+        dask_cluster(address)

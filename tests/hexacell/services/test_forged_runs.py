@@ -1,0 +1,253 @@
+"""A run folder that was forged, its checksums right, is refused before anything moves or is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from hexacell.campaign.pilots import FIRST_PILOT, MOST_TO_A_LIST
+from hexacell.config.interface import ControllerLimits
+from hexacell.errors import FileError, HexacellError
+from hexacell.services.run.replay_run import replay
+from procedures.journal.journal import Journal
+from procedures.run import events
+from procedures.run.steps import Phase, SetKey
+
+History = list[Any]
+
+
+def changed(history: History, kind: type[Any], **changes: Any) -> None:
+    """The last event of a kind with other fields."""
+    place = max(n for n, event in enumerate(history) if isinstance(event, kind))
+    history[place] = history[place].model_copy(update=changes)
+
+
+def result_changed(history: History, **changes: Any) -> None:
+    identified = next(event for event in history if isinstance(event, events.Identified))
+    changed(history, events.Identified, result=identified.result.model_copy(update=changes))
+
+
+def scaled(geometry: dict[str, Any], factor: float) -> dict[str, Any]:
+    return {**geometry, "l": tuple(factor * one for one in geometry["l"])}
+
+
+def reading_changed(history: History, **changes: Any) -> None:
+    taken = next(event for event in reversed(history) if isinstance(event, events.RecordTaken))
+    changed(history, events.RecordTaken, reading=taken.reading.model_copy(update=changes))
+
+
+def pilot_taken(history: History, orientation: int) -> events.PilotTaken:
+    taken = next(event for event in history if isinstance(event, events.RecordTaken))
+    return events.PilotTaken(at=taken.at, orientation=orientation, pose=taken.pose, reading=taken.reading)
+
+
+FAR = (0.0, 0.0, 5500.0, 0.0, 0.0, 0.0)
+TILTED = (0.0, 0.0, 550.0, 0.0, 46.0, 0.0)
+STEEP = (0.0, 0.0, 550.0, 170.0, 0.0, 0.0)
+V9 = SetKey(phase=Phase.BEFORE, point=9)
+
+FORGERIES: dict[str, tuple[Callable[[History], None], str]] = {
+    "another geometry": (
+        lambda h: changed(h, events.RunStarted, controller=scaled(h[0].controller, 1.01)),
+        "states another geometry than",
+    ),
+    "wider joint ranges": (
+        lambda h: changed(h, events.RunStarted, joint_ranges=((-800.0, 800.0),) * 6),
+        "states other limits than",
+    ),
+    "no joint ranges": (
+        lambda h: changed(h, events.RunStarted, joint_ranges=None),
+        "states other limits than",
+    ),
+    "wider limits of the controller": (
+        lambda h: changed(h, events.RunStarted, limits=ControllerLimits(axes=((-1e3, 1e3),) * 6)),
+        "states other limits than",
+    ),
+    "limits of five axes": (
+        lambda h: changed(h, events.RunStarted, limits=ControllerLimits(axes=((-1.0, 1.0),) * 5)),
+        "there are six axes",
+    ),
+    "five joint ranges": (
+        lambda h: changed(h, events.RunStarted, joint_ranges=((-800.0, 200.0),) * 5),
+        "there are six joint ranges",
+    ),
+    "joint ranges that are none": (
+        lambda h: changed(h, events.RunStarted, joint_ranges=((float("nan"), 200.0),) * 6),
+        "is not within +-1e+06",
+    ),
+    "another branch": (
+        lambda h: changed(h, events.RunStarted, branch=tuple(-one for one in h[0].branch)),
+        "states another geometry than",
+    ),
+    "parameters of another machine": (
+        lambda h: changed(h, events.RunStarted, controller={"S": ((1.0, 2.0),)}),
+        "a geometry has other parameters",
+    ),
+    "legs without length": (
+        lambda h: changed(h, events.RunStarted, controller=scaled(h[0].controller, 0.0)),
+        "lengths that are not above zero",
+    ),
+    "a held-out pose out of reach": (
+        lambda h: changed(h, events.Identified, held_out=((FAR, FAR), (FAR, FAR))),
+        "has the pose 0, 0, 5500, 0, 0, 0, which the robot cannot take",
+    ),
+    "a steep held-out pose": (
+        lambda h: changed(h, events.Identified, held_out_after=((STEEP,), (STEEP,))),
+        "which the robot cannot take",
+    ),
+    "a held-out pose beyond the tilt": (
+        lambda h: changed(h, events.Identified, held_out_after=((TILTED,), (TILTED,))),
+        "which the robot cannot take",
+    ),
+    "a reference out of reach": (
+        lambda h: changed(h, events.RecordTaken, pose=FAR),
+        "which the robot cannot take",
+    ),
+    "held-out poses at other points": (
+        lambda h: changed(h, events.Identified, held_out=((FAR,),)),
+        "the held-out poses are not those of the cell file's points",
+    ),
+    "a point that there is not": (
+        lambda h: changed(h, events.RecordTaken, at=V9),
+        "the cell file has no held-out point 9",
+    ),
+    "a record taken twice": (
+        lambda h: h.append(next(one for one in h if isinstance(one, events.RecordTaken))),
+        "orientation 1 is not the next one",
+    ),
+    "a pilot pose as a record": (
+        lambda h: changed(h, events.RecordTaken, orientation=FIRST_PILOT),
+        "there is no orientation 1001",
+    ),
+    "a pilot pose too many": (
+        lambda h: h.append(pilot_taken(h, FIRST_PILOT + MOST_TO_A_LIST)),
+        "there is no orientation 1025",
+    ),
+    "a pilot pose after none": (
+        lambda h: h.append(pilot_taken(h, FIRST_PILOT + 1)),
+        "pilot pose 2 is not the next one",
+    ),
+    "a pose beyond any machine": (
+        lambda h: changed(h, events.Arrived, pose=(1e308,) * 6),
+        "1e+308 is not within",
+    ),
+    "a reading that is no number": (
+        lambda h: reading_changed(h, gauges_mm=(float("nan"), 0.0, 0.0)),
+        "nan is not within",
+    ),
+    "five encoders": (
+        lambda h: reading_changed(h, counts=((1, 2, 3, 4, 5),)),
+        "the encoders have other counts",
+    ),
+    "a covariance of another size": (
+        lambda h: result_changed(h, covariance=((1.0,),)),
+        "a covariance has another size",
+    ),
+    "a covariance with negative variances": (
+        lambda h: result_changed(h, covariance=((-1.0,) * 42,) * 42),
+        "a covariance is none",
+    ),
+    "a geometry written without proposal": (
+        lambda h: h.append(events.Committed(approved_by="me")),
+        "'committed' has nothing that it follows from",
+    ),
+    "two starts": (lambda h: h.append(h[0]), "the run was started before"),
+}
+
+
+def rewritten(site: Any, history: History) -> None:
+    site.folder.journal.unlink()
+    with Journal(site.folder.journal) as journal:
+        for event in history:
+            journal.append(event)
+
+
+async def refusal_of(site: Any) -> str:
+    """Why a run is not resumed; nothing has moved, and the config is as it was."""
+    joints, config = site.simulated.machine.joints(), site.config
+    with pytest.raises(HexacellError) as refused:
+        await site.calibrate(resume=True)
+    assert isinstance(refused.value, FileError)
+    assert site.simulated.machine.joints() == joints
+    assert site.config == config
+    return str(refused.value)
+
+
+@pytest.mark.parametrize("forgery", FORGERIES)
+async def test_a_forged_journal_is_refused(finished, make_site, forgery: str) -> None:
+    site = make_site()
+    site.write(finished.until(events.Identified), moved_from=finished)
+    history: History = list(finished.until(events.Identified))
+    history[0] = history[0].model_copy(update={"cell_text": site.cell.text})
+    forge, words = FORGERIES[forgery]
+    forge(history)
+    rewritten(site, history)
+    assert words in await refusal_of(site)
+
+
+async def test_what_is_not_forged_is_resumed(finished, make_site) -> None:
+    site = make_site()
+    site.write(finished.until(events.Identified), moved_from=finished)
+    ended = await site.calibrate(resume=True)
+    assert ended.kind == "ended"
+
+
+@pytest.mark.parametrize("name", ["proposal.json", "write-back.json", "lent/write-back.json"])
+async def test_a_file_that_names_another_config_leads_nowhere(
+    finished, make_site, tmp_path, name: str
+) -> None:
+    """Otherwise a rollback, or a proposal, would be written there."""
+    victim = tmp_path / "victim"
+    victim.write_bytes(finished.config_before)
+    site = make_site()
+    site.write(finished.until(events.Committed), moved_from=finished)
+    kept = "write-back.json" if name.startswith("lent") else name
+    text = (finished.folder.path / kept).read_text()
+    path = site.folder.path / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(text.replace(str(finished.cell.config_path), str(victim)))
+    assert f"{name}: is for another config, {victim}" in await refusal_of(site)
+    assert victim.read_bytes() == finished.config_before
+
+
+@pytest.mark.parametrize("name", ["result.json", "measurements.csv", "wire", "lent"])
+async def test_a_link_in_a_run_folder_is_not_followed(finished, make_site, tmp_path, name: str) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir() if name == "lent" else elsewhere.write_text("precious")
+    site = make_site()
+    site.write(finished.until(events.Identified), moved_from=finished)
+    (site.folder.path / name).symlink_to(elsewhere)
+    assert f"{name}: is a link" in await refusal_of(site)
+    assert elsewhere.is_dir() or elsewhere.read_text() == "precious"
+
+
+def test_a_journal_that_is_a_link_is_not_appended_to(tmp_path) -> None:
+    (tmp_path / "elsewhere").touch()
+    (tmp_path / "journal.jsonl").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(FileError, match="the journal cannot be opened"):
+        Journal(tmp_path / "journal.jsonl")
+
+
+async def test_a_replay_opens_no_list_of_poses_that_the_journal_only_names(finished, tmp_path) -> None:
+    history: History = list(finished.history)
+    text = history[0].cell_text.replace("[identification]\n", '[identification]\nposes = "/etc/passwd"\n')
+    history[0] = history[0].model_copy(update={"cell_text": text})
+    with Journal(tmp_path / "journal.jsonl") as journal:
+        for event in history:
+            journal.append(event)
+    with pytest.raises(FileError, match="names a list of poses, /etc/passwd, and does not have it"):
+        await replay(tmp_path)
+
+
+async def test_a_replay_of_a_forged_journal_is_refused_with_its_line(finished, tmp_path) -> None:
+    history: History = list(finished.history)
+    changed(history, events.Arrived, pose=(1e308,) * 6)
+    with Journal(tmp_path / "journal.jsonl") as journal:
+        for event in history:
+            journal.append(event)
+    line = 1 + max(n for n, event in enumerate(history) if isinstance(event, events.Arrived))
+    with pytest.raises(FileError, match=r"1e\+308 is not within") as refused:
+        await replay(tmp_path)
+    assert refused.value.line == line

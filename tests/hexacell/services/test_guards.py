@@ -1,0 +1,137 @@
+"""Guards of the whole program with simulated devices, real drivers and the journal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from hexacell.cell.recovery import UnattendedRecovery
+from hexacell.cell.simulation import FaultKind, SimulatedFault
+from hexacell.errors import ExitCode, HexacellError
+from hexacell.services.run.calibration_run import preflight
+from procedures.calibration.workflow import Mode
+from procedures.run import events
+from procedures.run.trips import Guard, GuardTripped
+from tests.injection_times import injection_times
+
+GIVES_UP = UnattendedRecovery(**dict.fromkeys(UnattendedRecovery.model_fields, ("abort",)))
+SLOW: dict[str, Any] = {
+    "recovery__unattended": GIVES_UP,
+    "timing__clock_factor": 20.0,
+    "simulation__motion__minimum_s": 20.0,
+    "encoders__timeout_s": 0.5,
+}
+"""A move lasts a second on the wall, so that something can happen in it."""
+
+IN_A_SET, TO_A_POINT = "P1/o02/move", "P1/o01/move"
+FAULTS = [
+    ("stop line", "", IN_A_SET, {Guard.STOP_LINE}),
+    ("stop line", "", TO_A_POINT, {Guard.STOP_LINE}),
+    ("emergency stop", "controller", IN_A_SET, {Guard.EMERGENCY_STOP}),
+    ("following error", "controller", TO_A_POINT, {Guard.FOLLOWING}),
+    ("at its end", "x", IN_A_SET, {Guard.GAUGE_END}),
+    ("off its plate", "z", IN_A_SET, {Guard.PLATE, Guard.GAUGE_END}),
+    ("unplugged", "x", IN_A_SET, {Guard.DEVICE, Guard.STALE}),
+    ("alarm", "encoder 3", TO_A_POINT, {Guard.ENCODERS}),
+    ("warning", "encoder 6", IN_A_SET, {Guard.ENCODERS}),
+    ("frozen", "encoder 2", IN_A_SET, {Guard.FOLLOWING}),
+    ("jumped", "encoder 4", IN_A_SET, {Guard.FOLLOWING, Guard.ENCODERS}),
+    ("unplugged", "encoder 5", IN_A_SET, {Guard.ENCODERS, Guard.STALE}),
+    ("unplugged", "controller", IN_A_SET, {Guard.DEVICE, Guard.STALE}),
+    ("frozen", "controller", IN_A_SET, {Guard.STALE}),
+]
+
+
+def striking(site: Any, key: str, kind: FaultKind, device: str) -> Callable[..., None]:
+    """A listener that has something go wrong in the middle of a move."""
+
+    def listener(event: events.Event, _: object) -> None:
+        if isinstance(event, events.StepBegun) and event.step.key == key:
+            schedule = site.simulated.schedule
+            fault = {
+                "kind": kind,
+                "device": device,
+                "at_move": schedule.move_count + 1,
+                "after_s": 5.0,
+            }
+            schedule.schedule(SimulatedFault.model_validate(fault))
+
+    return listener
+
+
+@pytest.mark.sample(
+    "stop line-*",
+    "emergency stop-*",
+    "at its end-*",
+    "unplugged-x-*",
+    "frozen-encoder*",
+    "unplugged-controller-*",
+)
+@pytest.mark.parametrize(("kind", "device", "key", "guards"), FAULTS)
+async def test_a_fault_during_a_move_stops_the_robot_and_trips_its_guard(
+    make_site, kind, device, key, guards
+) -> None:
+    stale_s = 0.4 if Guard.STALE in guards else 10.0  # a busy machine pauses for longer than the first
+    site = make_site(**SLOW, guards__stale_s=stale_s, guards__following=0.2)
+    before = site.config
+    struck_s = injection_times(site.simulated)
+    with pytest.raises(GuardTripped) as tripped:
+        await site.calibrate(striking(site, key, kind, device))
+    assert tripped.value.trip.guard in guards
+    assert tripped.value.exit_code is ExitCode.HARDWARE
+    assert site.config == before
+    told, interrupted = site.happened(events.Tripped), site.happened(events.Interrupted)
+    assert [event.guard for event in told] == [tripped.value.trip.guard]
+    assert interrupted[-1].reason == str(tripped.value)
+    # The first point is where the robot stands already: it may be there before it is stopped.
+    assert key in [event.step.key for event in site.happened(events.StepBegun)][-3:]
+    assert len(struck_s) == 1
+    if device == "controller" and kind in {"unplugged", "frozen"}:
+        assert str(tripped.value).startswith("PRESS THE EMERGENCY STOP. The robot could not be stopped")
+    else:
+        assert site.simulated.physics.motion_end_s < struck_s[0] + 20.0, "a second on the wall"
+
+
+@pytest.mark.slow
+async def test_a_run_resumes_after_the_cable_is_plugged_in_again(make_site) -> None:
+    site = make_site(**SLOW, guards__stale_s=0.4)
+    with pytest.raises(GuardTripped):
+        await site.calibrate(striking(site, IN_A_SET, "unplugged", "x"))
+    site.simulated.faults.clear("unplugged", "x")
+
+    class Enough(Exception):
+        pass
+
+    def enough(event: events.Event, _: object) -> None:
+        if isinstance(event, events.RecordTaken) and event.orientation == 2:
+            raise Enough
+
+    with pytest.raises(Enough):
+        await site.calibrate(enough, resume=True)
+
+
+async def test_preflight_fails_while_the_stop_file_exists(make_cell) -> None:
+    cell = make_cell(guards__stop_file="stop")
+    (cell.path.parent / "stop").touch()
+    with pytest.raises(GuardTripped, match=r"stop line: motion is forbidden: .*stop exists\. Release it"):
+        await preflight(cell, Mode.OPTIMISE, unattended=True)
+    (cell.path.parent / "stop").unlink()
+    await preflight(cell, Mode.OPTIMISE, unattended=True)
+
+
+async def test_preflight_fails_without_free_disk_space(make_cell) -> None:
+    cell = make_cell(guards__free_disk_mb=1e12)
+    with pytest.raises(HexacellError, match=r"MB are free where the run is kept, less than 1e\+12 MB"):
+        await preflight(cell, Mode.OPTIMISE, unattended=True)
+
+
+async def test_a_fault_planned_in_the_cell_file_trips_its_guard(make_cell, make_site) -> None:
+    fault = SimulatedFault.model_validate(
+        {"kind": "stop line", "at_move": 2, "after_s": 5.0, "lasts_s": 1e6}
+    )
+    site = make_site(**SLOW, simulation__faults=(fault,))
+    with pytest.raises(GuardTripped, match="motion is forbidden"):
+        await site.calibrate()
+    assert [event.step.key for event in site.happened(events.StepBegun)][-1] == IN_A_SET

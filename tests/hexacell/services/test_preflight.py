@@ -1,0 +1,150 @@
+"""Preflight: all failures are in one report, and the robot does not move."""
+
+from __future__ import annotations
+
+import asyncio
+
+import numpy as np
+import pytest
+from pydantic import SecretStr
+
+from hexacell.campaign import feasibility
+from hexacell.errors import (
+    AnswerNeeded,
+    CellBusy,
+    DeviceError,
+    ExitCode,
+    FileError,
+    ReachError,
+    SeveralErrors,
+)
+from hexacell.runs.cell_lock import cell_lock
+from hexacell.services.run.calibration_run import preflight
+from procedures.calibration.workflow import Mode
+
+FAR = (0.0, 0.0, 2000.0)
+HASTY = {"encoders__timeout_s": 0.3}
+
+
+async def check(site, *, unattended: bool = True):
+    return await preflight(site.order().cell, Mode.OPTIMISE, unattended=unattended)
+
+
+async def test_a_ready_cell_gives_its_devices_and_nothing_moves(make_site) -> None:
+    site = make_site()
+    before = site.simulated.machine.joints()
+    identities = await check(site)
+    names = [identity.name for identity in identities]
+    assert names[:3] == ["x", "y", "z"]
+    assert len(names) == 10
+    assert site.simulated.machine.joints() == before
+    assert not site.simulated.controller.state.enabled, "not even switched on"
+
+
+async def test_a_cell_that_serves_itself_is_checked_too(make_cell) -> None:
+    assert len(await preflight(make_cell(), Mode.CHECK, unattended=True)) == 10
+
+
+async def test_every_failure_is_reported_at_once(make_site) -> None:
+    good = (100.0, -100.0, 500.0)
+    site = make_site(
+        identification__points=(good, FAR),
+        verification__points=(FAR, good),
+        stations__placement="by-hand",
+        **HASTY,
+    )
+    site.simulated.gauges.indicators["x"].inch = True
+    site.simulated.gauges.indicators["z"].held_mm = 1.0
+    site.simulated.faults.inject("unplugged", "encoder 4")
+    wrong = {"connect_password": SecretStr("WRONG")}
+    controller = site.simulated.settings.controller.model_copy(update=wrong)
+    site.simulated.settings = site.simulated.settings.model_copy(update={"controller": controller})
+    before = site.simulated.machine.joints()
+    with pytest.raises(SeveralErrors) as refusal:
+        await check(site)
+    said = str(refusal.value)
+    for words in (
+        "identification point 2: leg 1 cannot reach",
+        "verification point 1: leg 1 cannot reach",
+        "the gauges are put at each point by hand",
+        "gauge x: answers in inch",
+        "gauge z: is on hold",
+        "password",
+    ):
+        assert words in said
+    kinds = [type(error) for error in refusal.value.errors]
+    assert kinds[:3] == [ReachError, ReachError, AnswerNeeded]
+    assert len(kinds) == 7
+    assert all(issubclass(kind, DeviceError) for kind in kinds[3:])
+    assert refusal.value.exit_code is ExitCode.HARDWARE
+    assert site.simulated.machine.joints() == before
+
+
+async def test_a_run_begins_with_the_same_checks_and_leaves_no_folder(make_site) -> None:
+    good = (100.0, -100.0, 500.0)
+    site = make_site(verification__points=(FAR, good), **HASTY)
+    site.simulated.gauges.indicators["y"].inch = True
+    with pytest.raises(SeveralErrors, match=r"(?s)verification point 1.*gauge y: answers in inch"):
+        await site.calibrate()
+    assert not site.folder.path.exists()
+
+
+async def test_a_stop_during_the_checks_of_the_plan_leaves_nothing(make_site, monkeypatch) -> None:
+    site = make_site()
+    loop = asyncio.get_running_loop()
+    run = asyncio.ensure_future(site.calibrate())
+
+    def told_to_stop(_plan: object) -> tuple[()]:
+        loop.call_soon_threadsafe(run.cancel)
+        return ()
+
+    monkeypatch.setattr(feasibility, "reach_failures", told_to_stop)
+    with pytest.raises(asyncio.CancelledError):
+        await run
+    assert not site.folder.path.exists()
+    assert not site.simulated.controller.state.enabled, "not even switched on"
+    with cell_lock(site.cell.config_path):
+        pass
+
+
+async def test_devices_that_open_but_cannot_be_read_are_reported(make_site, monkeypatch) -> None:
+    site = make_site(verification__points=(FAR, (100.0, -100.0, 500.0)), **HASTY)
+    site.simulated.faults.inject("silent", "encoder 2")
+    with pytest.raises(SeveralErrors) as refusal:
+        await check(site)
+    kinds = [type(error) for error in refusal.value.errors]
+    assert kinds[0] is ReachError
+    assert len(kinds) == 2
+    assert issubclass(kinds[1], DeviceError)
+
+
+async def test_gauges_away_from_the_ball_are_no_preflight_failure(make_site) -> None:
+    site = make_site()
+    site.simulated.physics.gauges.station += np.array([9.0, -9.0, 0.0])
+    assert len(await check(site)) == 10
+
+
+async def test_an_unreachable_point_of_a_simulated_cell_is_reported(make_cell) -> None:
+    cell = make_cell(identification__points=(FAR, FAR))
+    with pytest.raises(SeveralErrors, match=r"(?s)identification point 1.*identification point 2"):
+        await preflight(cell, Mode.OPTIMISE, unattended=True)
+
+
+async def test_a_single_failure_is_raised_as_it_is(make_site) -> None:
+    site = make_site(stations__placement="by-hand")
+    with pytest.raises(AnswerNeeded):
+        await check(site)
+    assert len(await check(site, unattended=False)) == 10
+
+
+async def test_preflight_of_a_cell_in_use_is_refused(make_site) -> None:
+    site = make_site()
+    with cell_lock(site.cell.config_path), pytest.raises(CellBusy):
+        await check(site)
+
+
+async def test_a_cell_without_its_controllers_config_is_refused(make_site) -> None:
+    site = make_site()
+    site.cell.config_path.unlink()
+    with pytest.raises(FileError, match="does not exist"):
+        await check(site)

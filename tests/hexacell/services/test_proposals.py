@@ -1,0 +1,207 @@
+"""Proposals applied after their run: bit for bit, under the run's own gates, never over an edit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hexacell.cell.loader import Cell
+from hexacell.config.receipt import Receipt
+from hexacell.config.three_way import ConfigEditedSince
+from hexacell.errors import (
+    AnswerNeeded,
+    CellBusy,
+    ExitCode,
+    FileError,
+    LimitError,
+    UsageError,
+    WriteBackUndone,
+)
+from hexacell.runs.cell_lock import cell_lock
+from hexacell.runs.run_folder import RunFolder
+from hexacell.services.write_back.proposals import COMMAND, apply_proposal, later_approval, read_proposal
+from hexacell.storage import atomic_files
+from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.decision import Verdict
+from procedures.run.questions import PendingChange, Question, UnattendedOperator
+from tests.hexacell.services.proposed_runs import MET, ProposedRun, a_cell, propose_run
+
+DOUBTFUL = AcceptanceGate(
+    name="agrees with the noise", passed=False, sentence="Doubtful: 1.4 times.", needs_person=True
+)
+GRAVE = AcceptanceGate(
+    name="within tolerance", passed=False, sentence="Beyond: S1x.", needs_person=True, needs_cell_name=True
+)
+HOPELESS = AcceptanceGate(name="converged", passed=False, sentence="It did not converge.")
+
+
+class Person:
+    """Answers with a name, or declines, and remembers the questions."""
+
+    def __init__(self, name: str | None = "a tester") -> None:
+        self.name = name
+        self.asked: list[Question] = []
+
+    async def ask(self, question: Question) -> str | None:
+        self.asked.append(question)
+        return self.name
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Cell:
+    return a_cell(tmp_path)
+
+
+async def apply(run: ProposedRun, person: Person | UnattendedOperator | None = None) -> str:
+    return (await apply_proposal(read_proposal(run.folder), person or UnattendedOperator())).by
+
+
+async def test_a_proposal_is_written_bit_for_bit_and_can_be_undone(cell) -> None:
+    run = propose_run(cell)
+    assert cell.config_path.read_bytes() == run.before
+    assert await apply(run) == COMMAND
+    assert cell.config_path.read_bytes() == run.after != run.before
+    assert Receipt.of(run.folder.path).backup() == (run.before,)
+    approval = later_approval(run.folder)
+    assert approval is not None
+    assert (approval.by, approval.sha256_after) == (COMMAND, run.change.sha256_after)
+
+
+async def test_what_is_there_already_is_not_written_again(cell) -> None:
+    run = propose_run(cell)
+    await apply(run)
+    before = cell.config_path.stat()
+    assert await apply(run) == ""
+    assert cell.config_path.stat().st_ino == before.st_ino
+
+
+@pytest.mark.parametrize(("gate", "consent"), [(DOUBTFUL, "yes"), (GRAVE, "simulated-hexaglide")])
+async def test_gates_need_the_person_that_they_needed_in_the_run(cell, gate, consent: str) -> None:
+    run = propose_run(cell, gates=(MET, gate))
+    with pytest.raises(AnswerNeeded, match=gate.sentence) as refusal:
+        await apply(run)
+    assert refusal.value.exit_code is ExitCode.ANSWER_NEEDED
+    assert cell.config_path.read_bytes() == run.before
+    person = Person()
+    assert await apply(run, person) == "a tester"
+    (question,) = person.asked
+    assert question.consent == consent
+    assert isinstance(question.subject, PendingChange)
+    assert question.subject.diff == run.change.diff
+    assert cell.config_path.read_bytes() == run.after
+
+
+@pytest.mark.parametrize(
+    ("verdict", "sentence"),
+    [
+        (Verdict.CONDITIONAL_PASS, "Its verification: 0.1 mm: conditional pass"),
+        (Verdict.NOT_EVALUATED, "Its verification: 0.1 mm: not evaluated"),
+        (Verdict.FAIL, "Its verification: 0.1 mm: fail"),
+        (None, "No held-out record has verified it"),
+    ],
+)
+async def test_what_did_not_pass_needs_a_person(cell, verdict: Verdict | None, sentence: str) -> None:
+    run = propose_run(cell, verdict=verdict)
+    with pytest.raises(AnswerNeeded, match=sentence):
+        await apply(run)
+    await apply(run, Person())
+    assert cell.config_path.read_bytes() == run.after
+
+
+@pytest.mark.parametrize(
+    ("gates", "verification"),
+    [((HOPELESS,), {}), ((MET,), {"is_worse": True}), ((MET,), {"after_mm": None})],
+)
+async def test_what_nobody_may_accept_is_refused(cell, gates, verification) -> None:
+    run = propose_run(cell, gates=gates, verdict=Verdict.FAIL, **verification)
+    person = Person()
+    with pytest.raises(LimitError, match="the new geometry is refused") as refusal:
+        await apply(run, person)
+    assert refusal.value.exit_code is ExitCode.OUT_OF_LIMITS
+    assert person.asked == []
+    assert cell.config_path.read_bytes() == run.before
+
+
+async def test_who_declines_changes_nothing(cell) -> None:
+    run = propose_run(cell, gates=(DOUBTFUL,))
+    with pytest.raises(LimitError, match="was declined; nothing was applied"):
+        await apply(run, Person(None))
+    assert cell.config_path.read_bytes() == run.before
+    assert later_approval(run.folder) is None
+
+
+async def test_an_edit_is_shown_number_by_number_and_kept(cell) -> None:
+    run = propose_run(cell)
+    text = run.before.decode()
+    first = text.index("l = [") + len("l = [")
+    edited = (text[:first] + "1234.5" + text[text.index(",", first) :]).encode()
+    cell.config_path.write_bytes(edited)
+    with pytest.raises(ConfigEditedSince, match="undo the edit") as refusal:
+        await apply(run, Person())
+    versions = refusal.value.versions
+    assert len(versions.numbers) == 42
+    touched = [one for one in versions.numbers if one.is_edited]
+    assert [(one.name, one.now) for one in touched] == [("l1", 1234.5)]
+    assert touched[0].written == pytest.approx(touched[0].before + 0.25)
+    assert not versions.is_from_written
+    assert "+l = [1234.5," in versions.edit
+    assert cell.config_path.read_bytes() == edited
+    assert not (run.folder.path / "write-back.json").exists()
+
+
+async def test_an_edit_that_is_no_config_is_shown_too(cell) -> None:
+    run = propose_run(cell)
+    cell.config_path.write_bytes(b"\xff not = a config")
+    with pytest.raises(ConfigEditedSince) as refusal:
+        await apply(run)
+    numbers = refusal.value.versions.numbers
+    assert {(one.now, one.is_edited) for one in numbers} == {(None, False)}
+
+
+async def test_a_write_that_fails_is_undone_and_approved_by_nobody(cell, monkeypatch) -> None:
+    run = propose_run(cell)
+    written = atomic_files.write_atomically
+
+    def garbled(path: Path, data: bytes, **options: Any) -> None:
+        written(path, data + b"#" if data == run.after else data, **options)
+
+    monkeypatch.setattr(atomic_files, "write_atomically", garbled)
+    with pytest.raises(WriteBackUndone) as failure:
+        await apply(run)
+    assert failure.value.exit_code is ExitCode.WRITE_BACK_UNDONE
+    assert cell.config_path.read_bytes() == run.before
+    assert later_approval(run.folder) is None
+
+
+async def test_a_cell_in_use_is_left_alone(cell) -> None:
+    run = propose_run(cell)
+    with cell_lock(cell.config_path), pytest.raises(CellBusy):
+        await apply(run)
+    assert cell.config_path.read_bytes() == run.before
+
+
+async def test_a_proposal_of_another_run_is_refused(cell) -> None:
+    run, other = propose_run(cell), propose_run(cell, "2026-11-21T100000Z", shift_mm=0.5)
+    run.folder.proposal.write_bytes(other.folder.proposal.read_bytes())
+    with pytest.raises(FileError, match="is not the one of its journal"):
+        read_proposal(run.folder)
+
+
+async def test_a_linked_proposal_is_refused(cell, tmp_path) -> None:
+    run = propose_run(cell)
+    elsewhere = tmp_path / "elsewhere"
+    run.folder.proposal.rename(elsewhere)
+    run.folder.proposal.symlink_to(elsewhere)
+    with pytest.raises(FileError, match="is not the one of its journal"):
+        read_proposal(run.folder)
+
+
+def test_a_run_without_a_proposal_is_refused(cell, tmp_path) -> None:
+    run = propose_run(cell)
+    run.folder.proposal.unlink()
+    with pytest.raises(UsageError, match="proposed no change"):
+        read_proposal(run.folder)
+    with pytest.raises(FileError, match="cannot be read"):
+        read_proposal(RunFolder(tmp_path))

@@ -1,0 +1,134 @@
+"""The measurement file of a run belongs to what commanded it, whatever the controller has by now."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.config.toml_format import NativeToml
+from hexacell.errors import IdentifiabilityError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.measurements.records import MeasurementSet
+from hexacell.noise.measured_noise import InstrumentNoise, MeasuredNoise
+from hexacell.runs.run_folder import RunFolder
+from hexacell.services.recorded.recorded_commands import commanding_geometries, noise_of_run
+from hexacell.services.records.offline import fit_measurements
+from hexacell.text.identification import identification_report
+from procedures.journal.journal import Journal
+from procedures.run import events
+from procedures.run.steps import Phase, SetKey
+
+ON_FLOOR = FrameTransform(
+    base=Rotation.from_rotvec([-0.7, 0.0, 0.0]).as_matrix(),
+    origin=np.array([50.0, 200.0, -900.0]),
+    platform=Rotation.from_rotvec([0.3, 0.1, -0.5]).as_matrix(),
+)
+"""From the paper's frames to those of a config with its origin on the floor."""
+TURNED = FrameTransform(np.eye(3), np.array([5.0, -8.0, 12.0]), ON_FLOOR.platform.T)
+"""What a calibration changes of them, and more."""
+
+
+@pytest.fixture
+def cell(tmp_path: Path, paper) -> Cell:
+    """A cell that was calibrated: its controller has the true geometry in frames of its own."""
+    source = load_cell(bundled_config("simulated-hexaglide"))
+    shutil.copy(source.path, tmp_path)
+    text = source.config_path.read_text()
+    now = Hexaglide().change_frames(paper.actual, ON_FLOOR.then(TURNED))
+    (tmp_path / source.config_path.name).write_text(NativeToml(HEXAGLIDE_PARAMETERS).rewrite(text, now))
+    return load_cell(tmp_path / source.path.name)
+
+
+def run_of(folder: Path, *history: events.Event) -> RunFolder:
+    with Journal(RunFolder(folder).journal) as journal:
+        for event in history:
+            journal.append(event)
+    return RunFolder(folder)
+
+
+def started(controller: Geometry, paper) -> events.RunStarted:
+    return events.RunStarted(
+        software="hexacell",
+        cell="a cell",
+        cell_text="",
+        mode="optimise",
+        config="a config",
+        config_sha256="",
+        controller=controller.document(),
+        branch=paper.branch,
+        devices=(),
+    )
+
+
+def test_they_are_those_of_the_journal_in_the_frames_of_the_run(tmp_path, paper):
+    controller = Hexaglide().change_frames(paper.nominal, ON_FLOOR)
+    lent = events.ProvisionalApplied(geometry=paper.calibrated.document(), folder="lent")
+    settings = load_cell(bundled_config("simulated-hexaglide")).settings
+    own, provisional = commanding_geometries(run_of(tmp_path, started(controller, paper), lent), settings)
+    np.testing.assert_allclose(own.geometry.vector, paper.nominal.vector, atol=1e-9)
+    np.testing.assert_array_equal(provisional.geometry.vector, paper.calibrated.vector)
+    for one in (own, provisional):
+        np.testing.assert_allclose(one.frames.origin, ON_FLOOR.inverse().origin, atol=1e-9)
+
+
+def test_a_folder_without_a_run_tells_nothing(tmp_path):
+    settings = load_cell(bundled_config("simulated-hexaglide")).settings
+    assert commanding_geometries(RunFolder(tmp_path), settings) == ()
+    RunFolder(tmp_path).journal.write_text("no journal\n")
+    assert commanding_geometries(RunFolder(tmp_path), settings) == ()
+
+
+def measured_noise(*gauges_mm: float) -> events.NoiseMeasured:
+    gauges = [InstrumentNoise(name="a gauge", stated=0.01, record=one) for one in gauges_mm]
+    encoder = InstrumentNoise(name="an encoder", stated=0.01, record=0.01)
+    noise = MeasuredNoise(gauges=tuple(gauges), encoders=(encoder,) * 6)
+    return events.NoiseMeasured(at=SetKey(phase=Phase.IDENTIFY, point=1), noise=noise)
+
+
+def test_records_in_a_run_folder_are_weighted_by_the_noise_that_the_run_measured(tmp_path, paper, visit):
+    cell, measured = load_cell(bundled_config("simulated-hexaglide")), visit(seed=2).measured(0.01, seed=1)
+    run = run_of(tmp_path, started(paper.nominal, paper), measured_noise(0.01, 0.04, 0.01))
+    told = noise_of_run(run, cell.settings)
+    assert told is not None
+    assessed = fit_measurements(cell, measured, run)
+    assert assessed.measured_noise == told
+    assert "noise                    gauges 10 to 40, encoders 10 um" in identification_report(assessed)
+    assert assessed.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.04, 0.01])
+    alone = fit_measurements(cell, measured)
+    assert alone.measured_noise is None
+    assert "noise                    gauges" not in identification_report(alone)
+    assert alone.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.01, 0.01])
+    assert assessed.found.goodness.ratio < alone.found.goodness.ratio
+    assert noise_of_run(RunFolder(tmp_path / "nothing"), cell.settings) is None
+
+
+def test_records_in_a_run_folder_are_fitted_after_the_controller_got_other_frames(
+    cell, tmp_path, paper, visit
+):
+    exact = visit(seed=2).measured()
+    told = MeasurementSet(
+        tuple(
+            replace(
+                record,
+                pose=ON_FLOOR.poses(exact.poses).pose(row),
+                deviation=tuple((ON_FLOOR.base @ record.deviation).tolist()),
+            )
+            for row, record in enumerate(exact.records)
+        )
+    )
+    with pytest.raises(IdentifiabilityError, match="do not belong to the commanded pose"):
+        fit_measurements(cell, told)
+    (tmp_path / "run").mkdir()
+    controller = Hexaglide().change_frames(paper.nominal, ON_FLOOR)
+    assessed = fit_measurements(cell, told, run_of(tmp_path / "run", started(controller, paper)))
+    assert assessed.found.converged
+    assert assessed.found.geometry.largest_difference(paper.actual) < 0.5

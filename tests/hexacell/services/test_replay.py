@@ -1,0 +1,142 @@
+"""A run folder, or a journal alone, is replayed in a folder of its own; nothing else is touched."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hexacell.errors import ExitCode, FileError, HexacellError
+from hexacell.runs.run_folder import RunFolder
+from hexacell.services.run.calibration_run import calibrate
+from hexacell.services.run.replay_run import replay
+from procedures.journal.journal import read_entries, read_journal
+from procedures.journal.line_format import Entry, encode
+from procedures.replay.comparison import Aspect
+from procedures.replay.replayer import Scope
+from procedures.run import events
+from tests.hexacell.services.conftest import order_of
+
+
+def recorded(finished: Any) -> list[Any]:
+    return list(read_entries(finished.folder.journal))
+
+
+def write(path: Path, entries: Iterable[Entry]) -> Path:
+    path.write_bytes(b"".join(map(encode, entries)))
+    return path
+
+
+def with_beginning(entries: list[Any], **changes: Any) -> list[Entry]:
+    started = entries[0].event.model_copy(update=changes)
+    return [replace(entries[0], event=started), *entries[1:]]
+
+
+def everything_in(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+async def test_the_replay_of_a_run_has_no_differences(finished, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    before = everything_in(finished.cell.path.parent)
+    replayed = await replay(finished.folder.path)
+    assert replayed.is_same
+    assert replayed.differences == []
+    assert replayed.events == len(finished.history)
+    assert replayed.decisions == sum(isinstance(e, events.StepBegun) for e in finished.history)
+    assert everything_in(finished.cell.path.parent) == before
+    assert list(tmp_path.iterdir()) == [], "nothing is left behind"
+
+
+async def test_a_journal_alone_is_replayed(finished, tmp_path) -> None:
+    journal = shutil.copy(finished.folder.journal, tmp_path / "sent-by-mail")
+    replayed = await replay(Path(journal), Scope.RESULTS)
+    assert replayed.is_same
+    assert {event.kind for event in finished.history} >= {"proposed", "committed"}
+    assert replayed.results > 60
+
+
+@pytest.mark.slow
+async def test_a_run_that_followed_a_list_is_the_same_without_the_list(make_cell, tmp_path) -> None:
+    """Gauges with a long travel can measure it; the journal contains its poses."""
+    listed, run = tmp_path / "list.csv", RunFolder(tmp_path / "run")
+    points = (100.0, -100.0, 500.0), (0.0, 0.0, 550.0)
+    rows = ["point,orientation,x,y,z,a,b,c"]
+    for number, (x, y, z) in enumerate(points, start=1):
+        for n in range(1, 13):
+            turned = [0.0] * 3
+            turned[n % 3] = 0.3 * n * (n - 1)
+            rows.append(",".join(map(str, (number, n, x, y, z, *turned))))
+    listed.write_text("\n".join(rows) + "\n")
+    gauges = [gauge.model_copy(update={"travel_mm": 130.0}) for gauge in make_cell().settings.gauges]
+    changes = {"gauges": tuple(gauges), "limits.gauge_travel_mm": 60.0, "identification.points": points}
+    changes["stations.mounting_mm"] = 30.0  # a gauge that slipped is zeroed where it is
+    cell = make_cell(**changes, identification__poses=listed.name)
+    with suppress(HexacellError):  # how well such a list calibrates is not under test
+        await calibrate(order_of(cell, run))
+    listed.unlink()
+    replayed = await replay(run.path)
+    assert replayed.differences == []
+    assert replayed.decisions > 2 * 2 * 10
+    started = read_journal(run.journal)[0]
+    assert isinstance(started, events.RunStarted)
+    assert started.pose_list == "\n".join(rows) + "\n"
+
+
+async def test_the_replay_ignores_a_saved_config_that_differs_from_the_runs(finished, tmp_path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(finished.folder.path, folder)
+    (folder / "config-before").write_text("something else")
+    assert (await replay(folder, Scope.RESULTS)).is_same
+
+
+async def test_the_replay_of_a_manipulated_journal_has_a_difference(finished, tmp_path) -> None:
+    entries = recorded(finished)
+    place = next(n for n, entry in enumerate(entries) if isinstance(entry.event, events.Identified))
+    identified = entries[place].event
+    result = identified.result.model_copy(update={"chi2": identified.result.chi2 + 1e-6})
+    entries[place] = replace(entries[place], event=identified.model_copy(update={"result": result}))
+    path = write(tmp_path / "journal.jsonl", entries)
+    replayed = await replay(path, Scope.IDENTIFICATION)
+    assert not replayed.is_same
+    [difference] = replayed.differences
+    assert (difference.line, difference.change.field) == (place + 1, "result.chi2")
+    assert (await replay(path, Scope.IDENTIFICATION, tolerance=1e-5)).is_same
+
+
+async def test_different_decisions_of_another_version_are_reported_and_accepted(finished, tmp_path) -> None:
+    entries = recorded(finished)
+    places = [n for n, entry in enumerate(entries) if isinstance(entry.event, events.StepBegun)]
+    begun = entries[places[5]].event
+    step = begun.step.model_copy(update={"orientation": 7})
+    entries[places[5]] = replace(entries[places[5]], event=begun.model_copy(update={"step": step}))
+    path = write(tmp_path / "journal.jsonl", entries)
+    assert not (await replay(path, Scope.DECISIONS)).is_same
+    other = with_beginning(entries, software="hexacell 0.0.9")
+    replayed = await replay(write(path, other), Scope.DECISIONS)
+    [difference] = replayed.differences
+    assert difference.aspect is Aspect.DECISION
+    assert replayed.is_same, "a difference that is reported and does not count"
+
+
+async def test_a_journal_without_beginning_is_refused(tmp_path) -> None:
+    (tmp_path / "journal.jsonl").touch()
+    with pytest.raises(FileError, match="no start") as refusal:
+        await replay(tmp_path)
+    assert refusal.value.exit_code is ExitCode.USAGE
+
+
+async def test_a_cell_file_of_another_version_is_refused_by_name(finished, tmp_path) -> None:
+    entries = recorded(finished)
+    text = entries[0].event.cell_text.replace("version = 1", "version = 9")
+    journal = write(tmp_path / "journal.jsonl", with_beginning(entries, cell_text=text))
+    with pytest.raises(FileError, match="this version cannot read the cell file") as refusal:
+        await replay(journal)
+    assert refusal.value.subject == str(journal)
+    assert refusal.value.action == f"Replay it with {entries[0].event.software}"

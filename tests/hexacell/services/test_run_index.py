@@ -1,0 +1,108 @@
+"""The index over the runs is as new as their folders, whatever became of it."""
+
+from __future__ import annotations
+
+import shutil
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from hexacell.cell.loader import Cell
+from hexacell.config.write_back import commit
+from hexacell.runs.archive import INDEX, Archive
+from hexacell.runs.archived_documents import DocumentKind, StampedDocument
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.history.history import PastRun, past_runs
+from hexacell.services.history.run_index import RunIndex
+from procedures.journal.journal import Journal, read_entries
+from procedures.journal.line_format import Entry
+from procedures.run import events
+from tests.hexacell.services.proposed_runs import a_cell, propose_run
+
+SUMMARY = DocumentKind.SUMMARY
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Cell:
+    cell = a_cell(tmp_path)
+    for name in ("a", "b"):
+        propose_run(cell, name)
+    return cell
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The runs whose journals were read."""
+    names: list[str] = []
+
+    def noted(path: Path) -> tuple[Entry, ...]:
+        names.append(path.parent.name)
+        return read_entries(path)
+
+    monkeypatch.setattr("hexacell.services.history.history.read_entries", noted)
+    return names
+
+
+def names(runs: tuple[PastRun, ...]) -> list[str]:
+    return [run.name for run in runs]
+
+
+def test_folders_are_read_once(cell, opened) -> None:
+    first = past_runs(cell)
+    assert (names(first), sorted(opened)) == (["b", "a"], ["a", "b"])
+    opened.clear()
+    assert past_runs(cell) == first
+    assert opened == []
+
+
+def test_only_what_changed_is_read_again(cell, opened) -> None:
+    past_runs(cell)
+    opened.clear()
+    with Journal(RunFolder(runs_folder(cell) / "a").journal) as journal:
+        journal.append(events.Interrupted(reason="later", exit_code=3))
+    past_runs(cell)
+    assert opened == ["a"]
+
+
+def test_what_is_written_later_shows(cell) -> None:
+    assert not any(run.is_in_controller or run.summary.has_written for run in past_runs(cell))
+    third = propose_run(cell, "c")
+    past_runs(cell)
+    commit(third.change, third.folder.path)
+    assert [run.is_in_controller for run in past_runs(cell)] == [True, False, False]
+
+
+def test_a_run_that_is_gone_is_forgotten(cell) -> None:
+    past_runs(cell)
+    shutil.rmtree(runs_folder(cell) / "a")
+    assert names(past_runs(cell)) == ["b"]
+    with closing(Archive(runs_folder(cell), cell.settings.name)) as archive:
+        assert list(archive.documents(SUMMARY)) == ["b"]
+
+
+def test_a_damaged_index_is_made_anew(cell, opened) -> None:
+    first = past_runs(cell)
+    path = runs_folder(cell) / INDEX
+    path.write_bytes(b"rubbish" * 1000)
+    assert past_runs(cell) == first
+    opened.clear()
+    assert past_runs(cell) == first
+    assert opened == []
+
+
+def test_a_damaged_document_is_read_from_its_folder(cell) -> None:
+    first = past_runs(cell)
+    with closing(Archive(runs_folder(cell), cell.settings.name)) as archive:
+        stamp = archive.documents(SUMMARY)["a"].stamp
+        archive.store(SUMMARY, {"a": StampedDocument(stamp, b'{"mode": 3}')})
+    assert past_runs(cell) == first
+
+
+def test_without_an_archive_the_folders_are_read_with_a_warning(cell, tmp_path) -> None:
+    first = past_runs(cell)
+    warnings: list[str] = []
+    index = RunIndex(cell, f"postgresql://nobody@/none?host={tmp_path}", warnings.append)
+    assert past_runs(cell, index) == first
+    assert len(warnings) == 1
+    assert "read from their folders" in warnings[0]

@@ -1,0 +1,55 @@
+"""Thermometers of a cell file, from their files to the journal; their failures never end a run."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import pytest
+
+from hexacell.cell.devices import ThermometerSettings
+from hexacell.errors import FileError
+from hexacell.services.devices.device_setup import require_drivers
+from hexacell.services.run.calibration_run import preflight
+from hexacell.services.run.replay_run import replay
+from procedures.calibration.workflow import Mode
+from procedures.replay.replayer import Scope
+from procedures.run import events
+
+
+def in_the_room(tmp_path: Path) -> ThermometerSettings:
+    path = tmp_path / "temp1_input"
+    path.write_text("20125\n")
+    return ThermometerSettings(name="room", path=str(path))
+
+
+async def test_temperatures_are_in_the_journal_and_do_not_change_its_replay(
+    make_site, tmp_path, caplog
+) -> None:
+    nowhere = ThermometerSettings(name="rails", path=str(tmp_path / "nowhere"))
+    site = make_site(thermometers=(in_the_room(tmp_path), nowhere))
+    with caplog.at_level(logging.WARNING):
+        await site.calibrate(mode=Mode.CHECK)
+    [warning] = [record.getMessage() for record in caplog.records if "thermometer" in record.getMessage()]
+    assert warning.startswith("thermometer rails: cannot be read: it does not exist")
+    [started] = site.happened(events.RunStarted)
+    assert [one.name for one in started.devices if one.protocol == "sysfs"] == ["thermometer room"]
+    for sampled in site.happened(events.RecordTaken):
+        room, rails = sampled.reading.temperatures
+        assert (room.name, room.celsius, room.raw, room.problem) == ("room", 20.125, "20125", "")
+        assert (rails.name, rails.celsius) == ("rails", None)
+        assert rails.problem.startswith("thermometer rails: cannot be read")
+    replayed = await replay(site.folder.path, Scope.RESULTS)
+    assert replayed.differences == []
+
+
+async def test_preflight_names_the_thermometers_that_answer(make_site, tmp_path) -> None:
+    site = make_site(thermometers=(in_the_room(tmp_path),))
+    found = await preflight(site.order().cell, Mode.CHECK, unattended=True)
+    assert found[-1].name == "thermometer room"
+
+
+def test_a_protocol_without_a_driver_is_refused(make_cell, tmp_path) -> None:
+    strange = in_the_room(tmp_path).model_copy(update={"protocol": "sysfz"})
+    with pytest.raises(FileError, match=r"no thermometer protocol 'sysfz'. Did you mean 'sysfs'\?"):
+        require_drivers(make_cell(thermometers=(strange,)))

@@ -1,0 +1,104 @@
+"""A report as HTML and as PDF/A: whole, the same each time, and nothing in it is taken for markup."""
+
+from __future__ import annotations
+
+from datetime import date
+from html.parser import HTMLParser
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hexacell.errors import UsageError
+from hexacell.text.report.blocks import (
+    Chapter,
+    Facts,
+    Paragraph,
+    Picture,
+    Report,
+    Table,
+    Tone,
+)
+from hexacell.text.report.html import html_of
+from hexacell.text.report.pdf import pdf_of, typst_of
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><rect width="9" height="9"/></svg>'
+
+
+def report(text: str) -> Report:
+    blocks = (
+        Paragraph(text),
+        Paragraph(text, is_strong=True),
+        Facts(((text, text),)),
+        Table((text, text), ((text, text),)),
+        Picture(SVG, text),
+    )
+    return Report(text, text, date(2026, 11, 23), text, Tone.GOOD, (Chapter(text, blocks),))
+
+
+class Reader(HTMLParser):
+    """The tags and the text of a page."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        self.tags.append(tag)
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+
+def read(page: str) -> Reader:
+    reader = Reader()
+    reader.feed(page)
+    return reader
+
+
+HOSTILE = [
+    '</p><script>alert("1")</script>',
+    '#read("/etc/passwd")',
+    '"; } body { display: none',
+    "\\u{41}$x$*_",
+]
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_hostile_texts_stay_texts(text) -> None:
+    page = html_of(report(text))
+    assert read(page).tags == read(html_of(report("plain"))).tags
+    assert "".join(read(page).text).count(text) >= 9
+    assert pdf_of(report(text)).startswith(b"%PDF")
+
+
+@settings(max_examples=20)
+@given(st.text(max_size=40))
+def test_any_text_makes_the_same_page_of_tags(text) -> None:
+    assert read(html_of(report(text))).tags == read(html_of(report("plain"))).tags
+    assert typst_of(report(text)).count("\n") == typst_of(report("plain")).count("\n")
+
+
+def test_both_are_the_same_each_time_and_need_nothing_else() -> None:
+    page = html_of(report("a <b> & c"))
+    assert page == html_of(report("a <b> & c"))
+    assert "default-src 'none'" in page
+    assert not {"script", "link", "img", "iframe"} & set(read(page).tags)
+    made = pdf_of(report("a <b> & c"))
+    assert made == pdf_of(report("a <b> & c"))
+    assert b"pdfaid:part>2<" in made.replace(b" ", b"")
+
+
+def test_without_typst_the_way_to_it_is_told(monkeypatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "typst", None)
+    with pytest.raises(UsageError, match="a PDF needs the package typst") as refusal:
+        pdf_of(report("x"))
+    assert "hexacell[pdf]" in (refusal.value.action or "")
+
+
+def test_the_column_with_most_text_gets_the_room() -> None:
+    rows = (("x", "CDI or Starrett indicator, with RS-232", "17", ""), ("y", "", "18", ""))
+    table = Table(("Instrument", "kind", "serial number", "due"), rows, None)
+    page = Report("", "", date(2026, 11, 23), "", Tone.OPEN, (Chapter("", (table,)),))
+    assert "#table(columns: (auto, 1fr, auto, auto)" in typst_of(page)

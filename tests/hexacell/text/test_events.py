@@ -1,0 +1,125 @@
+"""Text for events: what the run does now, and the lines that a run prints."""
+
+from __future__ import annotations
+
+from typing import Any, get_args
+
+import pytest
+
+from hexacell.campaign.decisions import Forecast
+from hexacell.cell.recovery import Action, FailureKind
+from hexacell.text.events import (
+    COMPUTATIONS,
+    CONFIG_CHANGES,
+    EventFormatter,
+    activity,
+    event_text,
+    set_name,
+)
+from procedures.run import events
+from procedures.run.state import RunState, fold
+from procedures.run.steps import Compute, Expectation, Move, Phase, SetKey
+
+POSE = (0.0,) * 6
+ZERO = (0.0, 0.0, 0.0)
+POINT = SetKey(phase=Phase.IDENTIFY, point=2)
+HELD_OUT = SetKey(phase=Phase.BEFORE, point=1)
+FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
+READING = events.Reading(gauges_mm=ZERO, spread_mm=ZERO, joints=POSE, answers=(), counts=())
+
+
+def move(at: SetKey, orientation: int, forecast: Forecast | None = None) -> events.StepBegun:
+    expected = Expectation(deviation_mm=ZERO, sigma_mm=ZERO, gain=1.0, forecast=forecast)
+    step = Move(at=at, orientation=orientation, pose=POSE, expected=expected if forecast else None)
+    return events.StepBegun(step=step)
+
+
+def taken(at: SetKey, orientation: int, deviation_mm: tuple[float, float, float]) -> events.RecordTaken:
+    return events.RecordTaken(
+        at=at, orientation=orientation, pose=POSE, reading=READING, deviation_mm=deviation_mm
+    )
+
+
+def closed(at: SetKey) -> list[Any]:
+    """Two records and the closing of their set."""
+    end = events.SetClosed(at=at, drift_mm=(0.0, -0.02, 0.01))
+    return [taken(at, 1, ZERO), taken(at, 2, (0.5, -1.25, 0.0)), end]
+
+
+def test_a_move_has_its_place_and_the_predicted_error():
+    assert activity(move(POINT, 7, FORECAST)) == "point 2, orientation 7: 0.310 -> 0.060 mm"
+    assert activity(move(HELD_OUT, 1)) == "held-out point 1, before, orientation 1"
+    assert activity(events.Paused()) is None
+
+
+def test_a_set_with_fewer_records_than_planned_says_why():
+    *before, end = closed(POINT)
+    short = end.model_copy(update={"reason": "no safe straight line starts here"})
+    lines = EventFormatter().lines(short, fold([*before, short]))
+    assert lines[1:] == ["point 2 ends with 2 records: no safe straight line starts here"]
+
+
+@pytest.mark.parametrize("kind", get_args(Compute.model_fields["kind"].annotation))
+def test_every_computation_has_its_text(kind):
+    assert activity(events.StepBegun(step=Compute(kind=kind))) == COMPUTATIONS[kind]
+
+
+def test_every_change_of_the_config_has_its_text():
+    for event in (events.ProvisionalReverted(), events.RolledBack()):
+        assert event_text(event, RunState()) == CONFIG_CHANGES[event.kind]
+
+
+def test_a_closed_set_is_summarized_in_one_line():
+    history = closed(HELD_OUT)
+    lines = EventFormatter().lines(history[-1], fold(history))
+    assert lines == ["held-out point 1, before  2 records, largest deviation 1.250 mm, drift 0.020 mm"]
+
+
+def test_a_closed_set_of_the_identification_is_followed_by_the_forecast():
+    formatter = EventFormatter()
+    history = [move(POINT, 7, FORECAST), *closed(POINT)]
+    lines = [line for event in history for line in formatter.lines(event, fold(history))]
+    assert [line.split(",")[0].split(";")[0] for line in lines] == [
+        "point 2                   2 records",
+        "  predicted error at the task 0.290 mm",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("event", "text"),
+    [
+        (events.SetInvalidated(at=POINT, reason="drift"), "point 2 is measured again: drift"),
+        (
+            events.RecordRejected(at=POINT, orientation=3, reason="out of travel"),
+            "point 2, orientation 3 left out: out of travel",
+        ),
+        (events.RecordDiscarded(at=POINT, orientation=3), "point 2, orientation 3 is measured again"),
+        (
+            events.ReferenceConfirmed(at=POINT, change_mm=ZERO),
+            "point 2 continues: its reference is unchanged",
+        ),
+        (events.Committed(approved_by="a rule"), "written to the controller, approved by a rule"),
+        (events.CommandRejected(command="undo", reason="no record"), "undo: no record"),
+        (events.Paused(), "paused"),
+        (
+            events.Failed(
+                step=None,
+                failure=FailureKind.LINK_LOST,
+                attempt=2,
+                reason="gauge x is silent",
+                action=Action.RETRY,
+            ),
+            "gauge x is silent\n  attempt 2: retry",
+        ),
+        (events.Located(pose=POSE), None),
+    ],
+    ids=lambda value: getattr(value, "kind", ""),
+)
+def test_the_text_of_each_event(event, text):
+    assert event_text(event, RunState()) == text
+
+
+@pytest.mark.parametrize("phase", [phase for phase in Phase if phase is not Phase.LENGTH])
+def test_the_line_of_a_set_fits_a_terminal(phase) -> None:
+    at = SetKey(phase=phase, point=9)
+    assert len(set_name(at)) <= 24

@@ -1,0 +1,112 @@
+"""The length scale as a person reads of it, and where the gauges are wanted in a length check."""
+
+from __future__ import annotations
+
+import pytest
+
+from hexacell.kinematics.pose import Pose
+from hexacell.results.length_result import LengthResult, LengthSource
+from hexacell.text.length import earlier_scale_line, length_text, not_checked, scale_lines
+from hexacell.text.run import question_text
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.length_statement import LengthStatement, length_line
+from hexacell.verdict.verification import JudgedError
+from procedures.run.questions import ask_mounting
+
+SOURCES = tuple(
+    LengthSource(name=name, um_m=size)
+    for name, size in [
+        ("noise of the readings", 8.0),
+        ("certificate", 3.4),
+        ("seating of the gauges", 4.1),
+        ("waves", 0.1),
+        ("sag", 1.0),
+    ]
+)
+ERROR = JudgedError(value=0.19, expanded=0.004, limit=0.15, verdict=Verdict.FAIL)
+
+
+def length_of(long_um_m: float = 12.0, reason: str = "") -> LengthResult:
+    return LengthResult(
+        distance_mm=300.0,
+        length_mm=300.0036,
+        long_um_m=long_um_m,
+        expanded_um_m=20.0,
+        stated_um_m=15.0,
+        sources=SOURCES,
+        is_consistent=not reason,
+        reason=reason,
+    )
+
+
+def stated(found: LengthResult, verdict: Verdict = Verdict.PASS) -> LengthStatement:
+    return LengthStatement(verdict=verdict, result=found, error=ERROR)
+
+
+@pytest.mark.parametrize(
+    ("long_um_m", "said"),
+    [
+        (12.0, "length scale: checked over 300.000 mm: encoders read 12 +- 20 um/m long"),
+        (-12.0, "length scale: checked over 300.000 mm: encoders read 12 +- 20 um/m short"),
+    ],
+)
+def test_a_scale_within_its_uncertainty_is_one_line(long_um_m: float, said: str) -> None:
+    assert scale_lines(length_of(long_um_m)) == [said]
+
+
+@pytest.mark.parametrize(("long_um_m", "factor"), [(1000.0, "0.999001"), (-1000.0, "1.001001")])
+def test_a_significant_scale_has_its_remedy(long_um_m: float, factor: str) -> None:
+    said = " ".join(" ".join(scale_lines(length_of(long_um_m))).split())
+    assert f"multiply the scale factor of all encoders by {factor}, at the drives" in said
+
+
+def test_what_was_not_checked_is_said_and_what_says_nothing_is_left_out() -> None:
+    assert scale_lines(None) == [not_checked()] == [earlier_scale_line(None)]
+    assert scale_lines(length_of(reason="the fixture moved")) == []
+    assert earlier_scale_line(length_of(reason="the fixture moved")) == not_checked()
+    assert earlier_scale_line(length_of()).endswith(
+        "as checked in that run: encoders read 12 +- 20 um/m long"
+    )
+
+
+def test_a_length_check_of_its_own_says_what_the_scale_does_and_its_largest_sources() -> None:
+    lines = length_text(stated(length_of(1000.0), Verdict.FAIL)).splitlines()
+    assert lines[0] == "verdict: fail"
+    assert "  position error by that at the task poses: 0.190 mm, U 0.004 (limit 0.15)" in lines
+    assert " ".join(" ".join(lines).split()).endswith(
+        "1 sigma: noise of the readings 8.0, seating of the gauges 4.1, certificate 3.4, sag 1.0"
+    )
+    assert max(map(len, lines)) <= 80
+
+
+def test_a_check_that_contradicts_itself_says_why() -> None:
+    found = stated(length_of(1000.0, "the gauges were zeroed"), Verdict.NOT_EVALUATED)
+    assert length_text(found).splitlines() == [
+        "verdict: not evaluated",
+        "  the length check says nothing: the gauges were zeroed",
+    ]
+    assert length_line(found) == "length check: not evaluated (the gauges were zeroed)"
+
+
+def test_the_outcome_in_one_line() -> None:
+    assert length_line(stated(length_of(1000.0), Verdict.FAIL)) == (
+        "length check over 300.000 mm: encoders read 1000 +- 20 um/m long; position error by that "
+        "0.190 +- 0.004 mm (limit 0.15): fail"
+    )
+
+
+@pytest.mark.parametrize(
+    ("mounting", "seat", "words"),
+    [
+        (1, 1, "Mount the gauges in the first seat around the ball"),
+        (2, 2, "Mount the gauges in seat 2, the same way round. Do not zero them"),
+        (3, 1, "Mount the gauges in seat 1, the same way round. Do not zero them"),
+    ],
+)
+def test_a_mounting_is_asked_for_with_what_not_to_do(mounting: int, seat: int, words: str) -> None:
+    text = question_text(ask_mounting(mounting, seat, Pose(150.0, 0.0, 500.0)))
+    assert f"Length check, mounting {mounting}: the robot holds the ball at " in text
+    assert words in text
+    assert ("and zero them" in text) == (mounting == 1)
+    _, _, *instructions = text.splitlines()
+    assert max(map(len, instructions)) <= 80

@@ -1,0 +1,146 @@
+"""What a run says of the noise that it measured: figures, what is wrong, and what to do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from hexacell.noise.approach_scatter import ScatterSource
+from hexacell.noise.measured_noise import (
+    AveragingForecast,
+    InstrumentNoise,
+    MeasuredNoise,
+    RepeatedApproaches,
+)
+from hexacell.text.measured_noise import measured_noise_text, noise_and_averaging_text
+
+
+def instrument(name: str, **more: Any) -> InstrumentNoise:
+    usual = {"reading": 0.001, "degrees_of_freedom": 38, "stated": 0.01, "record": 0.01}
+    return InstrumentNoise(name=name, **(usual | more))
+
+
+def measured(*changed: InstrumentNoise, **more: Any) -> MeasuredNoise:
+    names = [*(f"gauge {axis}" for axis in "xyz"), *(f"encoder {leg}" for leg in range(1, 7))]
+    every = {name: instrument(name) for name in names} | {one.name: one for one in changed}
+    x, y, z, *encoders = every.values()
+    return MeasuredNoise(gauges=(x, y, z), encoders=tuple(encoders), **more)
+
+
+def said(noise: MeasuredNoise) -> str:
+    return " ".join(noise_and_averaging_text(noise).split())
+
+
+def visits(ratio: float, source: ScatterSource | None = None, excess: float = 0.0) -> RepeatedApproaches:
+    return RepeatedApproaches(
+        visits=7, degrees_of_freedom=18, ball_mm=0.02, ratio=ratio, source=source, excess=excess
+    )
+
+
+def test_a_quiet_cell_is_told_in_short() -> None:
+    text = measured_noise_text(measured(approaches=visits(0.9)))
+    assert text.splitlines() == [
+        "noise                    gauges 10, encoders 10 um a record",
+        "  readings at rest: gauges 1, encoders 1 um",
+        "  7 visits of one pose agree with what is stated for a record: they scatter 0.9",
+        "  times as much",
+    ]
+
+
+def test_the_ranges_of_unlike_instruments_are_told() -> None:
+    text = said(measured(instrument("gauge y", reading=0.004, record=0.02)))
+    assert "gauges 10 to 20, encoders 10 um a record" in text
+    assert "readings at rest: gauges 1 to 4, encoders 1 um" in text
+
+
+def test_large_noise_is_told_in_whole_micrometres() -> None:
+    text = said(measured(instrument("gauge y", reading=0.1234, record=1.5)))
+    assert "gauges 10 to 1500, encoders 10 um a record" in text
+    assert "readings at rest: gauges 1 to 123, encoders 1 um" in text
+
+
+def test_without_a_series_no_readings_at_rest_are_told() -> None:
+    text = said(measured(instrument("gauge x", reading=None)))
+    assert "at rest" not in text
+
+
+@pytest.mark.parametrize(
+    ("name", "action"), [("gauge y", "a loose clamp"), ("encoder 3", "its cable, its head and vibration")]
+)
+def test_a_noisy_instrument_is_named_with_what_to_do(name: str, action: str) -> None:
+    noisy = instrument(name, reading=0.113, record=0.045, is_noisier=True)
+    text = said(measured(noisy))
+    assert f"{name}: its readings scatter by 113 um without moving, more than the 10 um stated" in text
+    assert "The run counts with 45 um." in text
+    assert action in text
+    assert "state it in [noise]" in text
+    assert "scatter by" not in said(measured(instrument(name, reading=0.113)))
+
+
+def test_a_drift_is_told_where_it_matters() -> None:
+    assert "gauge z: it drifted by -30 um within the series: let it warm up" in said(
+        measured(instrument("gauge z", drift=-0.03))
+    )
+    assert "encoder 2: it drifted by +30 um within the series: see whether it slides" in said(
+        measured(instrument("encoder 2", drift=0.03))
+    )
+    assert "drifted" not in said(measured(instrument("gauge z", drift=-0.002)))
+
+
+def test_false_readings_are_told() -> None:
+    assert "gauge x: a reading was false, and left out." in said(
+        measured(instrument("gauge x", outliers=1))
+    )
+    assert "gauge x: 2 readings were false" in said(measured(instrument("gauge x", outliers=2)))
+
+
+@pytest.mark.parametrize(
+    ("source", "what", "action"),
+    [
+        (ScatterSource.JOINTS, "the joints stop 49 um beside what their encoders show", "Look for play"),
+        (ScatterSource.ENCODERS, "encoders: 49 um beside where the joints are", "reading heads"),
+        (ScatterSource.ENCODER_3, "encoder 3: 49 um beside where the joints are", "reading heads"),
+        (ScatterSource.GAUGE_Z, "gauge z shows 49 um more or less at the same place", "its plunger"),
+    ],
+)
+def test_what_does_not_repeat_is_named_with_what_to_do(
+    source: ScatterSource, what: str, action: str
+) -> None:
+    text = said(measured(approaches=visits(4.2, source, 0.049)))
+    assert "7 visits of one pose scatter 4.2 times as much as the stated noise explains" in text
+    assert what in text
+    assert action in text
+    assert "agree with what is stated" not in text
+
+
+def forecasts(*errors: float) -> tuple[AveragingForecast, ...]:
+    return tuple(
+        AveragingForecast(windows=2**place, error_mm=error, minutes=0.5 * (2**place - 1))
+        for place, error in enumerate(errors)
+    )
+
+
+def test_means_that_would_gain_are_told_with_the_setting_that_allows_them() -> None:
+    text = said(measured(forecasts=forecasts(0.2, 0.15, 0.12, 0.115), encoders_part_mm=0.17))
+    assert "the encoders contribute 0.170 of the 0.200 mm expected at the task in the end" in text
+    assert "4 windows of readings a record would give 0.120 mm for 2 minutes more" in text
+    assert "averaged_windows = 4 in [noise] allows it" in text
+
+
+def test_means_that_are_taken_are_told_with_their_gain() -> None:
+    text = said(measured(forecasts=forecasts(0.2, 0.15, 0.12), windows=4))
+    assert "a record is the mean of 4 windows of readings, which gives 0.120 mm for 2 minutes more" in text
+    assert "allows it" not in text
+
+
+def test_means_that_gain_nothing_are_not_proposed() -> None:
+    text = said(measured(forecasts=forecasts(0.2, 0.199, 0.198), encoders_part_mm=0.17))
+    assert "windows" not in text
+
+
+def test_where_the_run_is_over_the_averaging_is_not_told() -> None:
+    told = measured(forecasts=forecasts(0.2, 0.15, 0.12), encoders_part_mm=0.17)
+    assert "expected at the task" in noise_and_averaging_text(told)
+    assert noise_and_averaging_text(told).startswith(measured_noise_text(told))
+    assert "expected at the task" not in measured_noise_text(told)

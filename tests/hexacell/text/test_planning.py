@@ -1,0 +1,180 @@
+"""Text for the plan: what to do now, what the remaining records gain, what the plan will give."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.cell.bundled import bundled_config
+from hexacell.cli.app import main
+from hexacell.dry_run.campaign import DryRunResult
+from hexacell.dry_run.verdict_forecast import VerdictForecast
+from hexacell.errors import ExitCode
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.csv_file import write_measurements
+from hexacell.measurements.records import MeasurementSet
+from hexacell.noise.measured_noise import AveragingForecast
+from hexacell.services.records.offline import PlanTrial
+from hexacell.text.layout import duration
+from hexacell.text.planning import (
+    decision_text,
+    forecast_text,
+    plan_trial_lines,
+    run_forecast_line,
+)
+from hexacell.verdict.decision import ErrorLimits, Verdict
+
+ZERO = (0.0,) * 6
+FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
+RUN_FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
+MEASURE = MeasurePose(2, 7, Pose(1.0, 2.0, 3.0), ZERO, (0.1, -0.2, 0.0), (0.5, 0.6, 0.7), 1.8, None)
+
+
+def test_the_text_of_each_decision():
+    assert decision_text(Finished("all 5 points are measured")) == "Done: all 5 points are measured."
+    start = decision_text(StartPoint(2, Pose(0.0, -200.0, 550.0), ZERO))
+    assert start.startswith("Begin point 2: go to X0.000 Y-200.000 Z550.000 A0.000")
+    measure = decision_text(MEASURE)
+    assert measure.startswith("Point 2, orientation 7: go to X1.000 Y2.000 Z3.000")
+    assert "x +0.100 +- 0.500, y -0.200 +- 0.600, z +0.000 +- 0.700 mm" in measure
+
+
+def test_waypoints_are_named_before_the_pose():
+    via = MeasurePose(
+        2, 7, Pose(1.0, 2.0, 3.0), ZERO, (0.0,) * 3, (0.0,) * 3, 1.8, None, (Pose(4.0, 5.0, 6.0),)
+    )
+    assert ": pass through X4.000 Y5.000 Z6.000" in decision_text(via)
+
+
+def test_the_text_of_a_forecast():
+    text = forecast_text(FORECAST)
+    assert text.startswith("Predicted error at the worst task pose 0.310 mm (one sigma);")
+    assert text.endswith("continuing gains 0.250 mm in 24 records, about 12 minutes.")
+    assert forecast_text(Forecast(now_mm=0.06, next_mm=0.06, end_mm=0.06, records=0, minutes=0.0)).endswith(
+        "0.060 mm (one sigma)."
+    )
+    assert "none of the task poses" in forecast_text(None)
+
+
+def test_a_forecast_states_u_where_the_systematic_effects_are_known():
+    known = FORECAST.model_copy(update={"systematic_mm": 0.08})
+    assert known.expanded_mm(0.06) == pytest.approx(0.2)
+    assert FORECAST.expanded_mm(0.06) is None
+    text = forecast_text(known)
+    assert "0.310 mm (one sigma), U 0.640 mm with the systematic effects;" in text
+    assert text.endswith("continuing gains 0.250 mm, U 0.200 mm then in 24 records, about 12 minutes.")
+    line = run_forecast_line(known)
+    assert line == "  predicted error at the task 0.290 mm, U 0.602; in 12 minutes 0.060, U 0.200"
+    assert len(line) <= 80
+    last = known.model_copy(update={"records": 1})
+    assert run_forecast_line(last) == "  predicted error at the task 0.290 mm, U 0.602"
+
+
+@pytest.mark.parametrize(
+    ("minutes", "text"),
+    [(0.4, "24 seconds"), (1.4, "84 seconds"), (1.6, "2 minutes"), (61.2, "61 minutes")],
+)
+def test_durations_are_rounded_to_seconds_or_minutes(minutes, text):
+    assert duration(minutes) == text
+
+
+def test_a_run_states_what_the_remaining_records_gain():
+    line = run_forecast_line(RUN_FORECAST)
+    assert line == "  predicted error at the task 0.290 mm; in 12 minutes 0.060"
+    last = RUN_FORECAST.model_copy(update={"records": 1})
+    assert run_forecast_line(last) == "  predicted error at the task 0.290 mm"
+
+
+def lines(target_mm=None, **changes):
+    values = {
+        "drawn": 3,
+        "robots": 2,
+        "points": 5,
+        "records": 55,
+        "outside": 0,
+        "worst_sigma_mm": 0.0214,
+        "minutes": 40.2,
+    }
+    return [
+        *plan_trial_lines(PlanTrial(DryRunResult(**(values | changes)), {1: 0.0, 2: 0.0625}, target_mm))
+    ]
+
+
+def test_the_text_of_a_predicted_plan():
+    first, *rest = lines(drawn=2)
+    assert first == (
+        "55 records at 5 points will give about 0.021 mm at the worst of your task poses (one sigma), "
+        "in about 40 minutes."
+    )
+    assert len(rest) == 1
+    assert rest[0].startswith("Point 2: 6% of the robots within the tolerances cannot reach it")
+
+
+def test_the_expanded_uncertainty_is_stated_with_the_plan():
+    _, second, *_ = lines(expanded_mm=0.0661)
+    assert second == (
+        "The expanded uncertainty U of the largest error there will be about 0.066 mm, with the systematic "
+        "effects of [uncertainty]."
+    )
+
+
+def test_the_verdicts_on_healthy_machines_and_the_part_of_the_encoders_are_told():
+    probabilities = dict.fromkeys(Verdict, 0.0) | {Verdict.PASS: 0.6, Verdict.CONDITIONAL_PASS: 0.4}
+    limits = ErrorLimits(0.15, 0.05)
+    verdicts = VerdictForecast(probabilities, limits, ErrorLimits(0.18, 0.02), "load at work", 0.05, 0.06)
+    told = lines(verdicts=verdicts)
+    assert told[1].startswith("A healthy machine of this cell passes with a probability of 60%")
+    assert "95% would pass position_mm = 0.18 in [acceptance]" in told[2]
+    forecasts = tuple(
+        AveragingForecast(windows=windows, error_mm=0.2 / windows**0.5, minutes=0.5 * windows)
+        for windows in (1, 2, 4)
+    )
+    trial = PlanTrial(DryRunResult(2, 2, 5, 55, 0, 0.02, 40.0), {}, None, forecasts, 0.17)
+    assert [*plan_trial_lines(trial)][-1] == (
+        "The noise of the encoders makes about 0.170 of 0.200 mm (one sigma). As far as noise differs "
+        "from reading to reading, which a run measures, 4 windows of readings a record give 0.100 mm for "
+        "2 minutes more."
+    )
+
+
+def test_a_target_that_will_not_be_reached_is_reported():
+    assert any("not the target of 0.02 mm" in line for line in lines(target_mm=0.02))
+    assert not any("target" in line for line in lines(target_mm=0.05))
+
+
+def test_a_plan_that_fails_on_simulated_robots_is_reported():
+    assert "1 of 3 simulated robots could not be calibrated with this plan." in lines()
+    assert lines(robots=0, drawn=6)[0].startswith("None of 6 robots drawn within the tolerances")
+    assert "no accuracy is predicted" in lines(worst_sigma_mm=None)[0]
+
+
+@pytest.fixture
+def propose(tmp_path, capsys):
+    """``hexacell next`` for some records."""
+
+    def run(measurements, *options):
+        file = tmp_path / "measured.csv"
+        write_measurements(file, measurements)
+        cell = str(bundled_config("simulated-hexaglide"))
+        assert main(["next", cell, "--measurements", str(file), *options]) == ExitCode.DONE
+        return capsys.readouterr().out
+
+    return run
+
+
+def test_next_says_which_records_it_leaves_out(propose, visit):
+    measured = visit(seed=2).measured(0.01, seed=1)
+    wrong = measured.records[17]
+    x, y, z = wrong.deviation
+    records = [
+        replace(wrong, deviation=(x, y, z + 1.0)) if one is wrong else one for one in measured.records
+    ]
+    spoilt = MeasurementSet(tuple(records))
+    sentence = "Left out, as the other records contradict them: point 2, orientation 7."
+    assert sentence in " ".join(propose(spoilt).split())
+    assert json.loads(propose(spoilt, "--json"))["left_out"] == [[2, 7]]
+    assert "Left out" not in propose(measured)
+    assert json.loads(propose(measured, "--json"))["left_out"] == []

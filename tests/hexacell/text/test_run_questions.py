@@ -1,0 +1,138 @@
+"""Questions as they are put on a terminal: what they are about first, what to type last."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.interfaces import StartupAction
+from hexacell.cell.recovery import Action
+from hexacell.kinematics.pose import Pose
+from hexacell.results.result import ExpectedImprovement
+from hexacell.results.written_geometry import TaskDisplacement
+from hexacell.text.answers import TypedAnswer, request_text, typed_answer
+from hexacell.text.run import question_text
+from hexacell.text.teaching import teaching_sentence
+from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.verification import Verification
+from procedures.run.questions import (
+    NO,
+    YES,
+    Question,
+    ask_acceptance,
+    ask_approval,
+    ask_placement,
+    ask_recovery,
+    ask_startup,
+)
+from procedures.run.steps import Phase, SetKey
+
+CHOICES = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)
+FAILURE = ask_recovery("It broke.", CHOICES)
+APPROVAL = ask_approval([], "-1", cell="bench")
+GRAVE = ask_approval(
+    [AcceptanceGate(name="a", passed=False, sentence="b.", needs_cell_name=True)], "-1", cell="bench"
+)
+
+
+def placement(phase: Phase) -> Question:
+    return ask_placement(SetKey(phase=phase, point=3), Pose(1.0, 2.0, 3.0))
+
+
+def test_placing_gauges_names_the_point_and_the_pose() -> None:
+    text = question_text(placement(Phase.IDENTIFY))
+    assert text.startswith("\nPoint 3: the robot is at X1.000 ")
+    assert text.endswith("Press Enter when they are in place, or type a to abort: ")
+
+
+def test_a_held_out_point_is_not_called_as_the_others() -> None:
+    before, after = (question_text(placement(phase)) for phase in (Phase.BEFORE, Phase.AFTER))
+    assert before.startswith("\nHeld-out point 3: ")
+    assert after.startswith("\nHeld-out point 3 with the new geometry: ")
+
+
+def test_an_approval_shows_the_change_then_every_gate() -> None:
+    gates = [
+        AcceptanceGate(name="converged", passed=True, sentence="The solver ended."),
+        AcceptanceGate(name="small change", passed=False, sentence="It is 9 mm.", needs_person=True),
+    ]
+    improvement = ExpectedImprovement(now_mm=4.931, expanded_mm=0.0581)
+    assert question_text(ask_approval(gates, "-1\n+2", None, improvement, cell="bench")) == (
+        "\n-1\n+2\nok  The solver ended.\nNO  It is 9 mm.\n"
+        "Largest position error at the task poses: 4.93 mm with the config of now, 0 +-\n"
+        "    0.058 mm with this one.\n"
+        "Write this into the controller's config? Type yes or no: "
+    )
+
+
+def test_approval_and_acceptance_say_what_must_be_taught_anew_before_it_asks() -> None:
+    moved = TaskDisplacement(position_mm=30.8, orientation_deg=4.0, poses=6, is_within_limits=False)
+    whether_written = ask_approval([], "-1\n+2", moved, cell="bench")
+    whether_kept = ask_acceptance("all ill", Verification(verdict=Verdict.FAIL), moved)
+    for question, asks in ((whether_written, "Write this"), (whether_kept, "The new geometry is in")):
+        *_, first, second, asked = question_text(question).splitlines()
+        assert f"{first} {second.strip()}" == teaching_sentence(moved)
+        assert asked.startswith(asks)
+
+
+def test_a_failure_names_the_choices() -> None:
+    assert (
+        question_text(FAILURE) == "\nIt broke.\nHow to continue (retry, measure-again, redo-set, abort)? "
+    )
+    assert request_text(FAILURE) == "Type one of retry, measure-again, redo-set, abort: "
+
+
+@pytest.mark.parametrize(
+    ("typed", "choice"),
+    [
+        ("redo\n", "redo-set"),
+        ("Measure again\n", "measure-again"),
+        ("a", "abort"),
+        ("re", None),
+        ("\n", None),
+        ("leave", None),
+    ],
+)
+def test_an_unambiguous_beginning_selects_a_choice(typed: str, choice: str | None) -> None:
+    answer = typed_answer(typed, FAILURE, "somebody")
+    assert answer == (None if choice is None else TypedAnswer(choice))
+
+
+@pytest.mark.parametrize(
+    ("question", "typed", "answer"),
+    [
+        (placement(Phase.IDENTIFY), "\n", TypedAnswer("placed")),
+        (placement(Phase.IDENTIFY), "  \n", TypedAnswer("placed")),
+        (APPROVAL, "yes\n", TypedAnswer("somebody")),
+        (APPROVAL, "Y\n", TypedAnswer("somebody")),
+        (APPROVAL, "no\n", TypedAnswer(None)),
+        (APPROVAL, "N", TypedAnswer(None)),
+        (GRAVE, "bench\n", TypedAnswer("somebody")),
+        (GRAVE, "no\n", TypedAnswer(None)),
+    ],
+)
+def test_what_a_question_offers_is_an_answer(question: Question, typed: str, answer: TypedAnswer) -> None:
+    assert typed_answer(typed, question, "somebody") == answer
+
+
+@pytest.mark.parametrize(
+    ("question", "typed"),
+    [
+        *((placement(Phase.IDENTIFY), typed) for typed in ("a\n", "m\n", "yes\n", "no\n", "placed\n")),
+        *((APPROVAL, typed) for typed in ("\n", "a\n", "yess\n", "bench\n", "ok\n")),
+        *((GRAVE, typed) for typed in ("\n", "yes\n", "y\n", "benc\n")),
+    ],
+)
+def test_nothing_else_is_an_answer(question: Question, typed: str) -> None:
+    assert typed_answer(typed, question, "somebody") is None
+
+
+def test_the_controller_is_made_ready_on_an_explicit_yes_only() -> None:
+    question = ask_startup(StartupAction.HOME, "controller: is not homed", is_theirs=False)
+    assert question_text(question) == (
+        "\ncontroller: is not homed. Is its way free? Home it, which moves the machine?\nType yes or no: "
+    )
+    for typed, answer in (("y", YES), ("Yes", YES), ("n", NO), ("no", NO)):
+        assert typed_answer(typed, question, "a person") == TypedAnswer(answer)
+    for typed in ("", "a", "m", "home", "yes please"):
+        assert typed_answer(typed, question, "a person") is None

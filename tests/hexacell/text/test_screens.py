@@ -1,0 +1,263 @@
+"""The words of the screens: gauges that are being placed, questions, guidance, faults, records."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from drivers.interfaces import StartupAction
+from hexacell.checks.check_result import CheckResult, ParameterChange
+from hexacell.kinematics.pose import Pose
+from hexacell.run_process.messages import (
+    ControlChanged,
+    EventRecorded,
+    HostFailed,
+    HostMessage,
+    QuestionOpened,
+    RunDescribed,
+    StatusChanged,
+)
+from hexacell.run_process.snapshots import ControllerSnapshot, EncoderSnapshot, GaugeSnapshot, LiveSnapshot
+from hexacell.text.screens.block_digits import block_text
+from hexacell.text.screens.faults import fault_view
+from hexacell.text.screens.lines import device_lines
+from hexacell.text.screens.live import live_view, mounting_advice, travel_bar
+from hexacell.text.screens.measuring import guidance, record_lines
+from hexacell.text.screens.parameters import parameter_lines
+from hexacell.text.screens.questions import question_view
+from hexacell.text.screens.reviewing import review_view
+from hexacell.text.screens.run_picture import RunPicture, picture_after
+from hexacell.text.screens.views import Urgency
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.verification import Verification
+from procedures.engine.command_loop import Status
+from procedures.run import events
+from procedures.run.questions import ask_acceptance, ask_mounting, ask_startup
+from procedures.run.state import fold
+from procedures.run.steps import Expectation, Move, Phase, SetKey
+from tests.procedures.story import Story
+
+POINT = SetKey(phase=Phase.IDENTIFY, point=2)
+
+
+def gauge(**changes: object) -> GaugeSnapshot:
+    known = {"name": "x", "axis": "x", "shown_mm": 0.0, "travel_mm": 12.5, "middle_mm": 0.0, "age_s": 0.1}
+    return GaugeSnapshot.model_validate(known | changes)
+
+
+def pictured(*messages: HostMessage) -> RunPicture:
+    picture = RunPicture()
+    for message in messages:
+        picture = picture_after(picture, message, 0.0)
+    return picture
+
+
+def described(**changes: object) -> RunDescribed:
+    known = {"cell": "c", "cell_file": Path("c.toml"), "folder": Path("r"), "mode": "optimise"}
+    return RunDescribed.model_validate(known | changes)
+
+
+def recorded(event: events.Event, number: int = 1) -> EventRecorded:
+    at = datetime(2026, 1, 1, tzinfo=UTC) + timedelta(seconds=30 * number)
+    return EventRecorded(sequence=number, at=at, event=event)
+
+
+@pytest.mark.parametrize(
+    ("changes", "advice"),
+    [
+        ({"shown_mm": -1.2}, "move the x gauge 1.2 mm in (along -x)"),
+        ({"shown_mm": 1.2}, "move the x gauge 1.2 mm out (along +x)"),
+        ({"shown_mm": 1.2, "sign": -1}, "move the x gauge 1.2 mm out (along -x)"),
+        ({"shown_mm": -1.2, "sign": -1}, "move the x gauge 1.2 mm in (along +x)"),
+        ({"shown_mm": 3.4, "middle_mm": 3.0}, "ok, 0.4 mm from mid travel"),
+        ({"middle_mm": None}, "set the x plunger to mid travel by eye"),
+        ({"shown_mm": None}, "the x gauge does not answer"),
+        ({"problem": "silent"}, "the x gauge does not answer"),
+    ],
+)
+def test_a_gauge_says_how_it_is_to_be_moved(changes: dict[str, object], advice: str) -> None:
+    assert mounting_advice(gauge(**changes), 1.0) == advice
+
+
+@pytest.mark.parametrize(
+    ("place", "bar"),
+    [
+        (0.0, "[--------O--------]"),
+        (-6.25, "[O-------+--------]"),
+        (6.25, "[--------+-------O]"),
+        (99.0, "[--------+-------O]"),
+        (None, "[--------+--------]"),
+    ],
+)
+def test_a_plunger_is_shown_in_its_travel(place: float | None, bar: str) -> None:
+    assert travel_bar(place, 6.25) == bar
+
+
+def test_a_device_that_is_silent_gets_older_by_itself() -> None:
+    snapshot = LiveSnapshot(gauges=(gauge(),), encoders=EncoderSnapshot(positions=(0.0,) * 6, age_s=0.1))
+    assert "0.1 s" in device_lines(live_view(snapshot))[0][0]
+    lines = device_lines(live_view(snapshot, later_s=7.0))
+    assert "7.1 s" in lines[0][0]
+    assert lines[1][0].endswith("mm, 7.1 s ago")
+
+
+def test_what_is_urgent_is_said_in_words_too() -> None:
+    snapshot = LiveSnapshot(
+        gauges=(gauge(problem="gauge x: it answers in inch"),),
+        encoders=EncoderSnapshot(problem="leg 3 is silent"),
+        controller=ControllerSnapshot(estop=True, enabled=False, error_messages=("drive 3",), age_s=0.1),
+        stop_reason="the door is open",
+    )
+    assert device_lines(live_view(snapshot)) == [
+        ("x   NO READING for 0.1 s: it answers in inch", Urgency.ALARM),
+        ("encoders   leg 3 is silent", Urgency.ALARM),
+        ("controller EMERGENCY STOP; drive 3", Urgency.ALARM),
+        ("stop line  NO MOTION: the door is open", Urgency.ALARM),
+    ]
+
+
+def test_without_devices_that_is_said() -> None:
+    assert device_lines(live_view(None)) == [("No device is connected.", Urgency.CALM)]
+
+
+def test_a_line_of_a_gauge_fits_a_narrow_terminal() -> None:
+    snapshot = LiveSnapshot(gauges=(gauge(shown_mm=-12.3456, noise_mm=0.0123, travel_mm=25.0),))
+    line, _ = device_lines(live_view(snapshot, 12.0, (1.0, 1.0, 1.0)))[0]
+    assert len(line) <= 78
+
+
+def test_a_length_check_says_which_seat_and_not_to_zero() -> None:
+    view = question_view(ask_mounting(2, 2, Pose(0.0, 0.0, 500.0)), None)
+    assert view.title == "Mount the gauges in seat 2 of the fixture (mounting 2)"
+    assert "Do not zero them, and leave the fixture where it is." in view.paragraphs
+
+
+def test_an_emergency_stop_is_a_persons() -> None:
+    view = question_view(ask_startup(StartupAction.RESET_ESTOP, "it is stopped", is_theirs=True), None)
+    assert "this program does not. Is it reset?" in view.paragraphs[1]
+    assert [choice.key for choice in view.choices] == ["y", "n"]
+
+
+def test_guidance_without_a_run() -> None:
+    assert guidance(RunPicture(), None).now == "no run is being measured here"
+
+
+@pytest.mark.parametrize(
+    ("messages", "now"),
+    [
+        ((StatusChanged(status=Status.PAUSED),), "paused: the robot stands still"),
+        ((StatusChanged(status=Status.PAUSING),), "choosing the next pose, then it pauses"),
+        (
+            (recorded(events.CommandRejected(command="Undo", reason="there is no record")),),
+            "Undo was refused: there is no record",
+        ),
+        (
+            (HostFailed(problem="its disk is full", exit_code=3), StatusChanged(status=Status.ENDED)),
+            "ended early: its disk is full",
+        ),
+    ],
+)
+def test_guidance_says_what_happens_now(messages: tuple[HostMessage, ...], now: str) -> None:
+    assert guidance(pictured(described(), *messages), None).now == now
+
+
+def test_the_time_that_is_left_follows_from_the_pace() -> None:
+    story = Story(POINT)
+    told = [recorded(story.sampled(number), number) for number in range(1, 6)]
+    picture = pictured(described(expected_records=25), *told)
+    assert guidance(picture, None).remaining == "about 10 minutes: at most 20 of 25 readings are left"
+
+
+def test_who_watches_is_told_who_is_in_control() -> None:
+    picture = pictured(described(), ControlChanged(is_in_control=False, who="grace"))
+    assert guidance(picture, None).stopping == "you only watch: grace is in control; c takes over"
+    asked = picture_after(picture, QuestionOpened(question=ask_mounting(1, 1, Pose(0.0, 0.0, 0.0))), 0.0)
+    assert guidance(asked, None).now == "a question waits for who is in control"
+
+
+def test_who_does_not_keep_a_result_knows_that_the_old_config_comes_back() -> None:
+    verification = Verification(verdict=Verdict.CONDITIONAL_PASS, before_mm=3.0, after_mm=0.1)
+    view = question_view(ask_acceptance("0.1 mm", verification), None)
+    assert [choice.label for choice in view.choices] == ["yes, keep it", "no, put the old config back"]
+
+
+def test_a_record_has_its_largest_residual_and_how_many_sigma_that_is() -> None:
+    story, pose = Story(POINT), (0.0, 0.0, 500.0, 1.0, 0.0, 0.0)
+    expected = Expectation(deviation_mm=(0.1, 0.0, 0.0), sigma_mm=(0.05, 0.1, 0.1), gain=1.0)
+    step = Move(at=POINT, orientation=2, pose=pose, expected=expected)
+    picture = pictured(
+        recorded(story.sampled(1)),
+        recorded(events.StepBegun(step=step)),
+        recorded(story.sampled(2, (-0.1, 0.01, 0.02))),
+        recorded(story.sampled(3, (0.0, 0.01, 0.02))),
+    )
+    assert record_lines(picture) == (
+        "2/1           +0.000  +0.000  +0.000      reference",
+        "2/2           -0.100  +0.010  +0.020   -0.200   4.0",
+        "2/3           +0.000  +0.010  +0.020        -     -",
+    )
+
+
+def test_going_back_in_a_recorded_run_forgets_what_came_later() -> None:
+    told: list[HostMessage] = [described(is_recorded=True), recorded(Story(POINT).sampled(1))]
+    assert record_lines(pictured(*told)) != ()
+    assert record_lines(pictured(*told, described(is_recorded=True))) == ()
+
+
+def test_a_fault_has_its_cause_and_the_next_action() -> None:
+    view = fault_view(HostFailed(problem="the cell is in use", action="Wait", exit_code=5))
+    assert (view.title, view.cause, view.action) == (
+        "The run could not go on",
+        "the cell is in use",
+        "Wait",
+    )
+
+
+def test_figures_for_across_the_room() -> None:
+    assert [line.replace(" ", ".") for line in block_text("-1.")] == [
+        "..........██",
+        "........████",
+        "██████....██",
+        "..........██",
+        "........██████..██",
+    ]
+    assert len(block_text("5", 2)) == 10
+
+
+def test_a_check_shows_what_has_changed() -> None:
+    changes = (
+        ParameterChange(name="S1y", unit="mm", change=0.12, sigma=0.02),
+        ParameterChange(name="l4", unit="mm", change=-0.01, sigma=0.02),
+    )
+    check = CheckResult(verdict=Verdict.PASS, records=16, points=4, changes=changes)
+    judged = events.ResultValidated(verdict=Verdict.PASS, line="pass", check=check)
+    assert parameter_lines(fold([judged]), None) == (
+        "S1y                               +0.120    0.020  changed (6 sigma)",
+        "l4                                -0.010    0.020  unchanged (0.5 sigma)",
+    )
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_every_verdict_is_said_in_words_with_its_scope(verdict: Verdict) -> None:
+    judged = events.ResultValidated(verdict=verdict, line="what came of it")
+    view = review_view(pictured(described(), recorded(judged)), None)
+    assert view.verdict.lower().startswith(f"{verdict.value}: ")
+    assert view.scope == ("what came of it",)
+
+
+@pytest.mark.parametrize(
+    ("told", "approval"),
+    [
+        ((), "Approving is not possible yet: the geometry is not identified."),
+        (
+            (events.ResultValidated(verdict=Verdict.FAIL, line=""), events.RolledBack()),
+            "The old config was put back.",
+        ),
+        ((events.Committed(approved_by="ada"),), "Written to the controller, approved by ada."),
+    ],
+)
+def test_the_approval_says_how_it_stands(told: tuple[events.Event, ...], approval: str) -> None:
+    picture = pictured(described(), *map(recorded, told))
+    assert review_view(picture, None).approval == approval

@@ -1,0 +1,80 @@
+"""The uncertainty budget as ``fit`` prints it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.config.interface import ControllerGeometry
+from hexacell.robot.model import make_robot
+from hexacell.robot.stated_effects import stated_effects
+from hexacell.text.uncertainty import budget_table
+from hexacell.verdict.assessment import assess
+from hexacell.verdict.documents import fit_document
+
+
+@pytest.fixture(scope="module")
+def assessed_of(identified, noisy, paper):
+    settings = load_cell(bundled_config("simulated-hexaglide")).settings
+    robot = make_robot(settings, ControllerGeometry(paper.nominal, paper.branch))
+
+    def assessed(range_k=None, **sizes):
+        stated = settings.model_copy(update={"uncertainty": UncertaintySettings(**sizes)})
+        machine = replace(robot, effects=stated_effects(stated, range_k))
+        return assess(stated, machine, noisy, identified)
+
+    return assessed
+
+
+def test_a_simulation_has_the_noise_and_what_no_record_shows(assessed_of) -> None:
+    assessed = assessed_of(grade="ideal")
+    title, noise, standard, expanded, *unseen = budget_table(assessed.budget).splitlines()
+    assert title.split()[-4:] == ["size", "result", "direct", "both"]
+    worst = f"{assessed.accuracy.after.position_largest_mm:.3f}"
+    assert noise.split()[-2:] == [worst, worst]
+    assert standard.split()[-1] == worst
+    assert expanded.split()[-1] == f"{assessed.budget.expanded_mm:.3f}"
+    text = " ".join(" ".join(unseen).split())
+    assert text.startswith("Not checked, as no record shows it: scale common to all encoders (")
+    assert "ball beside the tool's centre (0.58 mm by 1 mm)." in text
+
+
+def test_every_effect_of_the_grade_that_matters_has_a_line(assessed_of) -> None:
+    budget = assessed_of(grade="ordinary").budget
+    lines = budget_table(budget).splitlines()
+    assert max(map(len, lines)) <= 80
+    (encoders,) = (line for line in lines if "scale of each encoder" in line)
+    assert "20 um/m" in encoders
+    (line,) = (line for line in budget.lines if line.effect.name == "scale of each encoder")
+    assert encoders.split()[-3:] == [
+        f"{mm:.3f}" for mm in (line.through_mm, line.direct_mm, line.combined_mm)
+    ]
+    (load,) = (line for line in lines if "load at work" in line)
+    assert load.split()[-3] == "-"
+
+
+def test_without_a_reachable_task_pose_there_is_no_table() -> None:
+    assert budget_table(None) == ""
+
+
+def test_the_document_has_all_lines_and_their_sum(assessed_of) -> None:
+    document = fit_document(assessed_of(range_k=0.4, grade="precision"))["uncertainty"]
+    rows = {row["name"]: row for row in document["lines"]}
+    assert rows["scale of each encoder"]["source"] == "assumed: precision"
+    assert rows["temperature while measuring"]["size"] == 0.4
+    assert rows["temperature while measuring"]["source"] == "thermometers"
+    assert not rows["scale common to all encoders"]["visible"]
+    assert rows["load at work"]["acts"] == "at work only"
+    assert document["noise_mm"] < document["standard_mm"] < document["expanded_mm"]
+
+
+def test_the_calibrated_robot_of_the_paper_is_as_good_as_a_grade_allows(assessed_of) -> None:
+    """Sizes grow from grade to grade, and so does U."""
+    ideal, precision, ordinary = (
+        assessed_of(grade=grade).budget.expanded_mm for grade in ("ideal", "precision", "ordinary")
+    )
+    assert ideal < precision < ordinary

@@ -1,0 +1,53 @@
+"""What preflight says of the limits: how likely a healthy machine passes, and what would help."""
+
+from __future__ import annotations
+
+import pytest
+
+from hexacell.dry_run.verdict_forecast import NOISE, VerdictForecast
+from hexacell.text.verdict_forecast import verdict_forecast_lines
+from hexacell.verdict.decision import ErrorLimits, Verdict
+
+NONE = dict.fromkeys(Verdict, 0.0)
+
+
+def forecast(passed: float, part: str = NOISE, *, position: float = 0.2, orientation: float = 0.01):
+    probabilities = NONE | {Verdict.PASS: passed, Verdict.CONDITIONAL_PASS: 1.0 - passed}
+    passing = ErrorLimits(position, orientation)
+    return VerdictForecast(probabilities, ErrorLimits(0.15, 0.05), passing, part, 0.064, 0.072)
+
+
+def test_limits_that_good_machines_pass_take_one_line() -> None:
+    (line,) = verdict_forecast_lines(forecast(0.97))
+    assert line == "A healthy machine of this cell passes with a probability of 97% (conditional pass 3%)."
+    (sure,) = verdict_forecast_lines(forecast(0.997))
+    assert sure == "A healthy machine of this cell passes with a probability of 99.7%."
+
+
+def test_limits_that_good_machines_fail_are_warned_of_with_what_would_do() -> None:
+    first, warning = verdict_forecast_lines(forecast(0.62, "scale of each encoder", position=0.2031))
+    assert "probability of 62% (conditional pass 38%)" in first
+    assert warning == (
+        "That is too little: a good machine fails these limits. 95% would pass position_mm = 0.21 in "
+        "[acceptance]. The largest part of the uncertainty at the worst task pose is the scale of each "
+        "encoder (0.064 of 0.072 mm): have it calibrated, or measure it, and state its size in "
+        "[uncertainty]."
+    )
+
+
+def test_against_noise_more_records_help() -> None:
+    _, warning = verdict_forecast_lines(forecast(0.5))
+    assert "noise of the readings (0.064 of 0.072 mm): more records, or means of more readings" in warning
+
+
+@pytest.mark.parametrize(
+    ("position", "orientation", "said"),
+    [
+        (0.1, 0.0612, "would pass orientation_deg = 0.062 in"),
+        (0.2, 0.06, "would pass position_mm = 0.2 and orientation_deg = 0.06 in"),
+        (0.1, 0.01, "would pass the limits in"),
+    ],
+)
+def test_only_limits_that_are_too_small_are_named(position: float, orientation: float, said: str) -> None:
+    _, warning = verdict_forecast_lines(forecast(0.5, position=position, orientation=orientation))
+    assert said in warning

@@ -1,0 +1,117 @@
+"""The verdicts of calibrations and checks, as a person reads them."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+import pytest
+
+from hexacell.checks.check_result import CheckResult, ParameterChange, check_line
+from hexacell.results.result import AcceptedResult
+from hexacell.text.length import not_checked
+from hexacell.text.verification import check_start_text, check_text, verification_text
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.model_evidence import ModelTest
+from hexacell.verdict.verification import JudgedError, Verification, VerifiedAccuracy
+
+WHEN = datetime(2026, 11, 20, 2, 30, tzinfo=UTC)
+
+
+def accuracy(verdict: Verdict = Verdict.PASS) -> VerifiedAccuracy:
+    return VerifiedAccuracy(
+        position=JudgedError(value=0.036, expanded=0.04, limit=0.15, verdict=verdict),
+        orientation=JudgedError(value=0.008, expanded=0.007, limit=0.05, verdict=Verdict.PASS),
+        poses=6,
+        task_named=True,
+        worst=(0.0,) * 6,
+    )
+
+
+def outcomes(*passed: bool) -> tuple[ModelTest, ...]:
+    return tuple(
+        ModelTest(name=f"test {n}", passed=one, sentence=f"Test {n}.") for n, one in enumerate(passed)
+    )
+
+
+def result(verdict: Verdict, **changes: object) -> CheckResult:
+    given = {
+        "records": 15,
+        "points": 2,
+        "accuracy": accuracy(),
+        "earlier_run": "runs/a",
+        "earlier_at": WHEN,
+    }
+    return CheckResult.model_validate({"verdict": verdict, **given, **changes})
+
+
+def test_a_verdict_fits_six_lines_with_what_must_be_taught_anew() -> None:
+    verified = Verification(
+        verdict=Verdict.PASS,
+        tests=outcomes(True, True),
+        accuracy=accuracy(),
+        before_mm=4.9,
+        after_mm=0.03,
+    )
+    lines = verification_text(verified).splitlines()
+    assert lines == [
+        "verdict: pass; the model agrees with the records in 2 tests",
+        "  largest position error at 6 task poses: 0.036 mm, U 0.040 (limit 0.15)",
+        "  largest orientation error there: 0.008 deg, U 0.007 (limit 0.05)",
+        "  mean deviation at held-out poses 4.90 -> 0.030 mm",
+        f"  {not_checked()}",
+    ]
+
+
+def test_a_test_that_failed_is_told_in_the_place_of_agreement() -> None:
+    verified = Verification(verdict=Verdict.NOT_EVALUATED, tests=outcomes(True, False), accuracy=accuracy())
+    lines = verification_text(verified).splitlines()
+    assert lines[0] == "verdict: not evaluated"
+    assert "  Test 1." in lines
+    assert "  Test 0." not in lines
+
+
+def test_a_check_says_what_it_starts_from() -> None:
+    accepted = AcceptedResult(run="runs/cell/first", at=WHEN, covariance=())
+    assert check_start_text(accepted) == "the check starts from the result of 2026-11-20, first"
+    assert check_start_text(None).endswith("the check starts from the drawing")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "change", "said"),
+    [
+        (Verdict.PASS, 0.01, "  no parameter has changed significantly since 2026-11-20"),
+        (Verdict.FAIL, 0.01, None),
+        (Verdict.FAIL, -0.5, "  changed most since 2026-11-20: l3 by -0.500 mm (sigma 0.020)"),
+    ],
+)
+def test_a_check_names_the_parameter_that_changed_most(
+    verdict: Verdict, change: float, said: str | None
+) -> None:
+    changes = (
+        ParameterChange(name="S1x", unit="mm", change=0.02, sigma=0.02),
+        ParameterChange(name="l3", unit="mm", change=change, sigma=0.02),
+    )
+    lines = check_text(result(verdict, changes=changes)).splitlines()
+    assert lines[0] == f"verdict: {verdict.value}"
+    assert [line for line in lines if "changed" in line] == ([] if said is None else [said])
+    assert lines[-1] == f"  {not_checked()}"
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"further_records": 12}, "about 12 more records would decide"),
+        ({}, "further records would not decide"),
+        ({"is_consistent": False}, "the residuals are larger than the stated noise explains"),
+        ({"accuracy": None}, "the robot can take none of the task poses"),
+    ],
+)
+def test_a_check_that_decides_nothing_says_why(changes: dict[str, object], reason: str) -> None:
+    assert check_line(result(Verdict.NOT_EVALUATED, **changes)).endswith(f": not evaluated ({reason})")
+
+
+def test_a_check_that_decides_states_error_and_limit() -> None:
+    assert check_line(result(Verdict.PASS)) == (
+        "check: 15 records at 2 points; position error at the task poses 0.036 +- 0.040 mm "
+        "(limit 0.15): pass"
+    )

@@ -26,9 +26,6 @@ FAULTS = "fault-matrix"  # what a test calls the cases that it tried
 # As in the program and the Makefile: threads only slow small matrices down. Numpy is imported later.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# Without the extra as most have it; the tests of compiled loops ask for them.
-os.environ.setdefault("HEXACELL_COMPILED", "no")
-
 settings.register_profile(
     "hexacell",
     deadline=None,  # a shared machine is slow now and then

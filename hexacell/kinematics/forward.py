@@ -30,9 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.kinematics import rotations
-from hexacell.kinematics.compiled.availability import own
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_closure import LegClosure, closure_to_compile
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -80,14 +78,7 @@ def modes_of(
     mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
 ) -> Array:
     """:func:`assembly_mode` (n,) of n poses with joint variables (n, 6), mm."""
-    closure = closure_to_compile(mechanism, geometry, joints)
-    if closure is None:
-        return assembly_mode(mechanism.residual_and_jacobian(geometry, poses, joints)[1])
-    from hexacell.kinematics.compiled.newton import modes_at  # noqa: PLC0415 - where numba is installed
-
-    modes = np.empty(len(joints))
-    modes_at(*closure.arrays(), own(poses.positions), own(poses.rotations), modes)
-    return modes
+    return assembly_mode(mechanism.residual_and_jacobian(geometry, poses, joints)[1])
 
 
 def apply_twist(poses: PoseBatch, step: Array) -> PoseBatch:
@@ -197,10 +188,6 @@ def forward_kinematics(
     default that of ``start``; ``tolerance_mm`` is the largest constraint of a solution. Poses whose second
     step is more than ``largest_contraction`` of the first one are not found.
     """
-    if closure := closure_to_compile(mechanism, geometry, joints):
-        compiled = _compiled(closure, start, mode, tolerance_mm, max_steps, largest_contraction)
-        if compiled is not None:
-            return compiled
     iteration = _NewtonIteration(mechanism, geometry, joints, start, mode, largest_contraction)
     for _ in range(max_steps):
         errors = iteration.errors()
@@ -212,43 +199,6 @@ def forward_kinematics(
     else:
         iteration.finish(np.ones(len(iteration.rows), dtype=bool), iteration.errors() < tolerance_mm)
     return ForwardResult(PoseBatch(iteration.positions, iteration.rotations), iteration.found)
-
-
-def _compiled(
-    closure: LegClosure,
-    start: PoseBatch,
-    mode: Array | None,
-    tolerance_mm: float,
-    max_steps: int,
-    largest_contraction: float,
-) -> ForwardResult | None:
-    """The same, compiled; none if a pose came to a singularity exactly."""
-    from hexacell.kinematics.compiled.newton import newton  # noqa: PLC0415 - where numba is installed
-
-    positions, orientations = np.array(start.positions), np.array(start.rotations)
-    found = np.zeros(len(start), dtype=bool)
-    modes = np.zeros(len(start))
-    if mode is not None:
-        modes[:] = mode
-    base, platform, lengths, is_quadratic = closure.arrays()
-    is_complete = newton(
-        base,
-        platform,
-        lengths,
-        is_quadratic,
-        positions,
-        orientations,
-        modes,
-        tolerance_mm,
-        max_steps,
-        largest_contraction,
-        MAX_TRANSLATION_MM,
-        MAX_ROTATION_RAD,
-        found,
-    )
-    if not is_complete:
-        return None
-    return ForwardResult(PoseBatch(positions, orientations), found)
 
 
 def continue_solution(

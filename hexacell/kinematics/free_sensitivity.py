@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.kinematics.compiled.availability import is_compiled, own
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import ConstraintDerivatives, Mechanism
 from hexacell.kinematics.pose import PoseBatch
@@ -48,8 +47,6 @@ def free_sensitivity(
         LinAlgError: a pose is exactly at a singularity.
     """
     linear = mechanism.derivatives(geometry, poses, joints)
-    if is_compiled() and (found := _compiled(mechanism, linear, coordinates)):
-        return found
     inverse, mode = inverse_and_mode(linear.pose)
     return _by_inverse(mechanism, linear, inverse, mode, coordinates)
 
@@ -69,8 +66,6 @@ def sensitivity_and_margin(
     """
     linear = mechanism.derivatives(geometry, poses, joints)
     radius = float(mechanism.platform_radius(geometry))
-    if is_compiled() and (found := _compiled_with_margin(mechanism, linear, coordinates, radius, margin)):
-        return found
     try:
         inverse, mode = inverse_and_mode(linear.pose)
         is_regular = np.ones(len(joints), dtype=bool)
@@ -105,47 +100,3 @@ def _by_free(mechanism: Mechanism, by_constraints: Array, linear: ConstraintDeri
     for row, column in convention.dependent:
         by_free[..., column] += of_legs[..., order[row]]
     return by_free
-
-
-def _compiled(
-    mechanism: Mechanism, linear: ConstraintDerivatives, coordinates: int
-) -> FreeSensitivity | None:
-    """The same, compiled; none where a pose is exactly at a singularity."""
-    found = _by_loops(mechanism, linear, coordinates, 1.0, 0.0)
-    return None if found is None else found[0]
-
-
-def _compiled_with_margin(
-    mechanism: Mechanism, linear: ConstraintDerivatives, coordinates: int, radius: float, margin: float
-) -> tuple[FreeSensitivity, Mask] | None:
-    """The same with the margins; the few poses that norms do not decide are decomposed here."""
-    found = _by_loops(mechanism, linear, coordinates, radius, margin)
-    if found is None:
-        return None
-    # Only where numba is installed.
-    from hexacell.kinematics.compiled.margins import ABOVE, UNDECIDED  # noqa: PLC0415
-
-    sensitivity, decided = found
-    has_margin = decided == ABOVE
-    rows = np.flatnonzero(decided == UNDECIDED)
-    if len(rows):
-        inverse = _dimensionless(inverse_and_mode(linear.pose[rows])[0], radius)
-        has_margin[rows] = inverse_has_margin(inverse, margin)
-    return sensitivity, has_margin
-
-
-def _by_loops(
-    mechanism: Mechanism, linear: ConstraintDerivatives, coordinates: int, radius: float, margin: float
-) -> tuple[FreeSensitivity, NDArray[np.int8]] | None:
-    """Compiled, with what norms decide of a margin (n,); none where a pose is exactly at a singularity."""
-    # Only where numba is installed.
-    from hexacell.kinematics.compiled.sensitivities import by_joints_and_free  # noqa: PLC0415
-
-    count, size = len(linear.joints), len(mechanism.convention.free_rows())
-    by_joints, by_free = np.empty((count, coordinates, 6)), np.zeros((count, coordinates, size))
-    determinants, decided = np.empty(count), np.zeros(count, dtype=np.int8)
-    numbers = own(linear.pose), own(linear.joints), own(linear.parameters), mechanism.convention.leg_columns
-    by_joints_and_free(*numbers, radius, margin, by_joints, by_free, determinants, decided)
-    if not determinants.all():
-        return None
-    return FreeSensitivity(by_joints, by_free, np.sign(determinants)), decided

@@ -11,7 +11,6 @@ from itertools import combinations
 
 import numpy as np
 
-from hexacell.kinematics.compiled.availability import is_compiled, own
 from hexacell.kinematics.rotations import Array, Mask
 
 PAIRS = np.array(list(combinations(range(6), 2)))
@@ -68,19 +67,9 @@ class Legs:
 
     def smallest_distance(self) -> Array:
         """Between any two legs (n,), mm: of the lines in their middles."""
-        if is_compiled():
-            return self._compiled_distance()
         ends = self.base_joints, self.platform_joints
         first, second = ([joints[:, PAIRS[:, side]] for joints in ends] for side in (0, 1))
         smallest: Array = segment_distances(*first, *second).min(axis=-1)
-        return smallest
-
-    def _compiled_distance(self) -> Array:
-        # Only where numba is installed.
-        from hexacell.kinematics.compiled.leg_distances import smallest_distances  # noqa: PLC0415
-
-        smallest = np.empty(len(self.base_joints))
-        smallest_distances(own(self.base_joints), own(self.platform_joints), PARALLEL, smallest)
         return smallest
 
 

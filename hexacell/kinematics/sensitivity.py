@@ -26,10 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.kinematics.compiled.availability import is_compiled, own
 from hexacell.kinematics.forward import assembly_mode
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_closure import LegClosure, closure_to_compile
 from hexacell.kinematics.mechanism import ConstraintDerivatives, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -87,13 +85,6 @@ def inverse_and_mode(pose_jacobian: Array) -> tuple[Array, Array]:
     Raises:
         LinAlgError: one is exactly singular.
     """
-    if is_compiled():
-        from hexacell.kinematics.compiled.matrices import invert  # noqa: PLC0415 - where numba is installed
-
-        inverse, determinant = np.empty(pose_jacobian.shape), np.empty(len(pose_jacobian))
-        invert(own(pose_jacobian), inverse, determinant)
-        if determinant.all():
-            return inverse, np.sign(determinant)
     return np.linalg.inv(pose_jacobian), assembly_mode(pose_jacobian)
 
 
@@ -122,8 +113,6 @@ def has_singularity_margin(
     mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array, margin: float
 ) -> Mask:
     """Whether :func:`singularity_margin` is at least ``margin`` at each of n poses, computed faster."""
-    if closure := closure_to_compile(mechanism, geometry, joints):
-        return _compiled(closure, mechanism, geometry, poses, joints, margin)[0]
     return _has_margin(_dimensionless(mechanism, geometry, poses, joints), margin)
 
 
@@ -131,34 +120,8 @@ def margin_and_mode(
     mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array, margin: float
 ) -> tuple[Mask, Array]:
     """:func:`has_singularity_margin`, and the :func:`assembly_mode` of each of n poses."""
-    if closure := closure_to_compile(mechanism, geometry, joints):
-        return _compiled(closure, mechanism, geometry, poses, joints, margin)
     jacobian = _dimensionless(mechanism, geometry, poses, joints)
     return _has_margin(jacobian, margin), assembly_mode(jacobian)
-
-
-def _compiled(
-    closure: LegClosure,
-    mechanism: Mechanism,
-    geometry: Geometry | GeometryBatch,
-    poses: PoseBatch,
-    joints: Array,
-    margin: float,
-) -> tuple[Mask, Array]:
-    """The same, compiled; the few poses that norms do not decide are decomposed here."""
-    from hexacell.kinematics.compiled import margins  # noqa: PLC0415 - where numba is installed
-
-    decided, modes = np.empty(len(joints), dtype=np.int8), np.empty(len(joints))
-    radii = np.array(mechanism.platform_radius(geometry), dtype=float).reshape(-1)
-    at = own(poses.positions), own(poses.rotations)
-    margins.margins_and_modes(*closure.arrays(), *at, radii, margin, decided, modes)
-    has_margin = decided == margins.ABOVE
-    rows = np.flatnonzero(decided == margins.UNDECIDED)
-    if len(rows):
-        of_rows = geometry.subset(rows) if isinstance(geometry, GeometryBatch) else geometry
-        smallest = singularity_margin(mechanism, of_rows, poses[rows], joints[rows])
-        has_margin[rows] = smallest >= margin
-    return has_margin, modes
 
 
 def _has_margin(jacobian: Array, margin: float) -> Mask:

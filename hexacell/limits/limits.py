@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_closure import closure_to_compile
 from hexacell.kinematics.mechanism import SAME_FRAMES, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -160,9 +159,6 @@ class Limits:
         """At which of n poses a robot's passive joints and legs keep their limits, with margins (m,)."""
         if self.legs is None:
             return np.ones(len(joints), dtype=bool)
-        closure = closure_to_compile(mechanism, geometry, joints)
-        if closure is not None and not closure.carriers_turn:
-            return self.legs.keeps_closed(closure, poses, wanted)
         return self.legs.keeps(mechanism.legs(geometry, poses, joints), wanted)
 
     def leg_margins(
@@ -174,9 +170,6 @@ class Limits:
         """
         if self.legs is None:
             return np.zeros((len(joints), 0))
-        closure = closure_to_compile(mechanism, geometry, joints)
-        if closure is not None and not closure.carriers_turn:
-            return self.legs.margins_closed(closure, poses)
         return self.legs.margins(mechanism.legs(geometry, poses, joints))
 
     def including(

@@ -24,14 +24,12 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import VirtualRobot
 from tests.benchmarks.virtual_calibration import robot_that_reaches
-from tests.compiled_loops import compiled
 
 LATE = range(44, 55)
 REPEATS = 5
-MOST_MS = {False: 15.0, True: 8.0}
-"""With numpy, and with compiled loops."""
+MOST_MS = 15.0
 SMALL_SOLVES = 1000
-MOST_REFERENCES = {False: 2.2, True: 1.2}
+MOST_REFERENCES = 2.2
 
 Moment = tuple[Plan, CampaignState, MeasurePose]
 """A plan, a state, and what was decided."""
@@ -82,21 +80,12 @@ def reference_seconds() -> float:
     return time.process_time() - begun
 
 
-@pytest.mark.parametrize("with_loops", [False, True], ids=["numpy", "compiled"])
-def test_a_late_decision(campaign, say, with_loops: bool) -> None:
+def test_a_late_decision(campaign, say) -> None:
     moments, seconds = campaign
-    with compiled(with_loops):
-        seconds_of(moments[0])  # compiles
-        reference = min(reference_seconds() for _ in range(REPEATS))
-        late = float(np.median([seconds_of(moment) for moment in moments]))
+    reference = min(reference_seconds() for _ in range(REPEATS))
+    late = float(np.median([seconds_of(moment) for moment in moments]))
     reference = min(reference, *(reference_seconds() for _ in range(REPEATS)))
-    how = "compiled" if with_loops else "numpy"
-    say(f"a decision at 44 to 54 records, {how}", f"{1e3 * late:.1f} ms", f"{MOST_MS[with_loops]:g} ms")
-    say(
-        "  as a multiple of 1,000 small solves",
-        f"{late / reference:.2f}",
-        f"{MOST_REFERENCES[with_loops]:g}",
-    )
-    if not with_loops:
-        say("a campaign of 55 records, deciding and measuring virtually", f"{seconds:.1f} s", "-")
-    assert late <= MOST_REFERENCES[with_loops] * reference
+    say("a decision at 44 to 54 records", f"{1e3 * late:.1f} ms", f"{MOST_MS:g} ms")
+    say("  as a multiple of 1,000 small solves", f"{late / reference:.2f}", f"{MOST_REFERENCES:g}")
+    say("a campaign of 55 records, deciding and measuring virtually", f"{seconds:.1f} s", "-")
+    assert late <= MOST_REFERENCES * reference

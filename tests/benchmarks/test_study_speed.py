@@ -1,7 +1,7 @@
 """How long a study of many robots takes, each calibrated with orientations that hexacell chooses.
 
 ``ROBOTS`` in the environment says how many; the target is for 1,000 on two processors, fewer are told
-as what 1,000 would take. ``STUDY_COMPILED=no`` goes without ``hexacell[fast]``.
+as what 1,000 would take.
 """
 
 from __future__ import annotations
@@ -37,8 +37,7 @@ ADAPTIVE = Study("adaptive", "robots", tasks_of, run_design_trial, DesignOutcome
 
 
 @pytest.mark.skipif((os.cpu_count() or 1) < PROCESSES, reason="needs two processors")
-def test_a_thousand_robots_in_ten_minutes(tmp_path, say, monkeypatch) -> None:
-    monkeypatch.setenv("HEXACELL_COMPILED", os.environ.get("STUDY_COMPILED", "yes"))
+def test_a_thousand_robots_in_ten_minutes(tmp_path, say) -> None:
     begun = time.perf_counter()
     outcomes = run_study(ADAPTIVE, tmp_path, ROBOTS, processes(PROCESSES), lambda *_: None)
     seconds = time.perf_counter() - begun

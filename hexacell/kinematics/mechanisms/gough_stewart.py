@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_closure import LegClosure
 from hexacell.kinematics.leg_vectors import axes_through, by_pose, mean_radius
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
@@ -95,11 +94,6 @@ class GoughStewart:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         b, length, n = _legs(geometry, poses)
         return length - geometry["offset"] - joints, by_pose(b, n)
-
-    def leg_closure(self, geometry: Geometry | GeometryBatch, joints: Array) -> LegClosure | None:
-        """See :class:`~hexacell.kinematics.leg_closure.HasLegClosure`."""
-        lengths = geometry["offset"] + joints
-        return LegClosure(geometry["base"], geometry["platform"], lengths, is_quadratic=False)
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""

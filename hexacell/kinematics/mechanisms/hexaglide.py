@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexacell.errors import UsageError
-from hexacell.kinematics.compiled.availability import is_compiled, own
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_closure import LegClosure
 from hexacell.kinematics.leg_vectors import CLOSEST_JOINTS_MM, axes_through, by_pose, mean_radius
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
@@ -89,14 +87,8 @@ class Hexaglide:
         b, v = _leg_vectors(geometry, poses, joints)
         return _leg_errors(geometry, v), by_pose(b, -v / geometry["l"][..., None])
 
-    def leg_closure(self, geometry: Geometry | GeometryBatch, joints: Array) -> LegClosure | None:
-        """See :class:`~hexacell.kinematics.leg_closure.HasLegClosure`."""
-        return LegClosure(_at_sliders(geometry, joints), geometry["B"], geometry["l"], is_quadratic=True)
-
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        if is_compiled():
-            return _compiled_derivatives(geometry, poses, joints)
         b, v = _leg_vectors(geometry, poses, joints)
         n = v / geometry["l"][:, None]
         by_length = -0.5 * (np.sum(n * n, axis=-1, keepdims=True) + 1.0)
@@ -108,8 +100,6 @@ class Hexaglide:
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        if is_compiled():
-            return _compiled_inverse(geometry, branch, poses)
         v = geometry["S"] - poses.positions[:, None, :] - _to_platform(geometry, poses)
         along_rail_squared = geometry["l"] ** 2 - v[..., 1] ** 2 - v[..., 2] ** 2
         reachable = along_rail_squared >= 0.0
@@ -165,32 +155,6 @@ class Hexaglide:
 def hexaglide_geometry(S: ArrayLike, B: ArrayLike, l: ArrayLike) -> Geometry:  # noqa: E741
     """The geometry of slider joints S (6, 3), platform joints B (6, 3) and leg lengths l (6,), mm."""
     return Geometry.of(HEXAGLIDE_PARAMETERS, {"S": S, "B": B, "l": l})
-
-
-def _compiled_inverse(geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-    # Only where numba is installed.
-    from hexacell.kinematics.compiled.hexaglide import inverse  # noqa: PLC0415
-
-    joints = np.empty((len(poses), 6))
-    signs = np.array(branch, dtype=float)
-    inverse(*_arrays(geometry), signs, own(poses.positions), own(poses.rotations), joints)
-    return joints
-
-
-def _compiled_derivatives(geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
-    # Only where numba is installed.
-    from hexacell.kinematics.compiled.hexaglide import derivatives  # noqa: PLC0415
-
-    count = len(poses)
-    by_pose, by_joints, by_numbers = np.empty((count, 6, 6)), np.empty((count, 6)), np.empty((count, 6, 7))
-    at = own(poses.positions), own(poses.rotations), own(joints)
-    derivatives(*_arrays(geometry), *at, by_pose, by_joints, by_numbers)
-    return ConstraintDerivatives(by_pose, by_joints, by_numbers)
-
-
-def _arrays(geometry: Geometry) -> tuple[Array, Array, Array]:
-    """The parameters as compiled loops take them."""
-    return own(geometry["S"]), own(geometry["B"]), own(geometry["l"])
 
 
 def _at_sliders(geometry: Geometry | GeometryBatch, joints: Array) -> Array:

@@ -31,7 +31,6 @@ from numpy.typing import ArrayLike
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_closure import LegClosure
 from hexacell.kinematics.leg_vectors import axes_through, by_pose, mean_radius
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
@@ -140,13 +139,6 @@ class RotaryCranks:
         b, v = _rods(geometry, poses, joints)
         length = np.sqrt(np.einsum("nij,nij->ni", v, v))
         return length - geometry["rod"], by_pose(b, -v / length[..., None])
-
-    def leg_closure(self, geometry: Geometry | GeometryBatch, joints: Array) -> LegClosure | None:
-        """See :class:`~hexacell.kinematics.leg_closure.HasLegClosure`."""
-        ends = _ends(geometry, joints)
-        return LegClosure(
-            ends, geometry["platform"], geometry["rod"], is_quadratic=False, carriers_turn=True
-        )
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_closure import LegClosure
 from hexacell.kinematics.leg_vectors import by_pose
 from hexacell.kinematics.mechanism import Branch, ConstraintDerivatives
 from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart
@@ -82,10 +81,6 @@ class ScrewLegs(GoughStewart):
         residual, jacobian = super().residual_and_jacobian(geometry, poses, joints)
         b, found = self._corrections(geometry, poses)
         return residual + found.added, jacobian + _by_pose(b, found)
-
-    def leg_closure(self, geometry: Geometry | GeometryBatch, joints: Array) -> LegClosure | None:
-        """None: the screws add to the lengths what depends on the pose."""
-        return None
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""

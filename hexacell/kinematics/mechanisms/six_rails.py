@@ -27,7 +27,6 @@ from numpy.typing import ArrayLike
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_closure import LegClosure
 from hexacell.kinematics.leg_vectors import CLOSEST_JOINTS_MM, axes_through, by_pose, mean_radius
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
@@ -117,11 +116,6 @@ class SixRails:
         b, v = _leg_vectors(geometry, poses, joints)
         length = np.sqrt(np.einsum("nij,nij->ni", v, v))
         return length - geometry["l"], by_pose(b, -v / length[..., None])
-
-    def leg_closure(self, geometry: Geometry | GeometryBatch, joints: Array) -> LegClosure | None:
-        """See :class:`~hexacell.kinematics.leg_closure.HasLegClosure`."""
-        at_sliders = geometry["S"] + joints[..., None] * _directions(geometry["rail"])
-        return LegClosure(at_sliders, geometry["B"], geometry["l"], is_quadratic=False)
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""

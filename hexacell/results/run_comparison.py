@@ -98,30 +98,23 @@ def compare_results(
 ) -> RunComparison:
     """The changes of the free parameters; raises ``UsageError`` if the frame conventions differ."""
     _require_same_frame((before, after))
-    change = parameters.vector(after.geometry) - parameters.vector(before.geometry)
+    old, new = parameters.vector(before.geometry), parameters.vector(after.geometry)
+    change = new - old
     covariance = np.array(before.covariance) + np.array(after.covariance)
-    free = np.flatnonzero(np.diag(covariance) > 0.0)
+    sigma = np.sqrt(np.diag(covariance))
+    free = np.flatnonzero(sigma > 0.0)
     # The convention ties some parameters to each other: their covariance has a lower rank.
     values, axes = np.linalg.eigh(covariance[np.ix_(free, free)])
     is_own = values > TIED * values.max()
     chi2 = float(np.sum((change[free] @ axes[:, is_own]) ** 2 / values[is_own]))
-    differences = _differences(parameters, before, after, np.sqrt(np.diag(covariance)))
-    return RunComparison(
-        after.frame, tuple(differences[row] for row in free), ChiSquareTest(chi2, float(is_own.sum()))
+    differences = tuple(
+        ParameterDifference(one.name, one.kind.unit.value, *numbers)
+        for row, *numbers in zip(
+            free.tolist(), old[free].tolist(), new[free].tolist(), sigma[free].tolist(), strict=True
+        )
+        for one in (parameters.parameters[row],)
     )
-
-
-def result_differences(
-    parameters: ParameterSet, before: IdentificationResult, after: IdentificationResult
-) -> tuple[ParameterDifference, ...]:
-    """The changes of the free parameters from one result of some records to another of the same ones.
-
-    Sigma is that of ``after``. Raises ``UsageError`` if the frame conventions differ.
-    """
-    _require_same_frame((before, after))
-    sigma = parameters.vector(after.sigma)
-    found = _differences(parameters, before, after, sigma)
-    return tuple(found[row] for row in np.flatnonzero(sigma > 0.0).tolist())
+    return RunComparison(after.frame, differences, ChiSquareTest(chi2, float(is_own.sum())))
 
 
 def trends(
@@ -158,19 +151,6 @@ def _trend(parameters: ParameterSet, row: int, days: Array, values: Array, sigma
         per_day=float(np.sum(weights * centred * values)) / information,
         sigma_per_day=information**-0.5,
     )
-
-
-def _differences(
-    parameters: ParameterSet, before: IdentificationResult, after: IdentificationResult, sigma: Array
-) -> list[ParameterDifference]:
-    rows = zip(
-        parameters.parameters,
-        parameters.vector(before.geometry).tolist(),
-        parameters.vector(after.geometry).tolist(),
-        sigma.tolist(),
-        strict=True,
-    )
-    return [ParameterDifference(one.name, one.kind.unit.value, *values) for one, *values in rows]
 
 
 def _require_same_frame(results: Sequence[IdentificationResult]) -> None:

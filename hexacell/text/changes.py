@@ -1,31 +1,13 @@
-"""Text for what changed between runs: two of them compared by their records, and the watch over all."""
+"""Text for what changed between runs: the watch over all of them."""
 
 from __future__ import annotations
 
 from hexacell.services.history.drift_history import DriftHistory, FoundChange, ParameterRate
-from hexacell.services.history.evidence_comparison import EvidenceComparison
 from hexacell.text.history import TREND_DAYS
 from hexacell.text.layout import wrapped
 
 SMALLEST_SHOWN = 0.001
 """A standard deviation that is smaller has a further digit."""
-
-
-def evidence_comparison_text(found: EvidenceComparison) -> str:
-    """Whether the records of two runs contradict an unchanged machine, and each parameter taken alone."""
-    most = found.likeliest
-    largest = max(abs(one.score) for one in found.causes)
-    verdict = "nothing changed by more than the noise of the records explains"
-    if found.is_changed:
-        verdict = (
-            f"leg {found.leg} changed, as {most.name} by {most.change:+.3f} +- {most.sigma:.3f} {most.unit}"
-        )
-    score = f"the largest score is {largest:.1f}, by chance {found.limit:.1f} in 1 of 100"
-    head = f"{'':5}{'change':>11}{'sigma':>9}{'score':>8}"
-    rows = [f"{one.name:5}{one.change:+11.4f}{one.sigma:9.4f}{one.score:+8.1f}" for one in found.causes]
-    note = "Each parameter is taken alone, as if only it had changed; what the runs do not see is left out."
-    names = f"{found.before.path.name} -> {found.after.path.name}"
-    return "\n".join([wrapped(f"{names}: {verdict} ({score})."), head, *rows, wrapped(note)])
 
 
 def watch_text(found: DriftHistory) -> str:

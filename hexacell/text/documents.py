@@ -11,9 +11,7 @@ from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPo
 from hexacell.dry_run.quick_level import QuickTrial
 from hexacell.results.run_comparison import ParameterTrend, RunComparison
 from hexacell.services.history.drift_history import DriftHistory, FoundChange
-from hexacell.services.history.evidence_comparison import EvidenceComparison
 from hexacell.services.history.history import PastRun
-from hexacell.services.history.refit import RefittedRun
 from hexacell.services.history.retention import Retention
 from hexacell.services.records.offline import NextPose, PlanTrial
 from hexacell.services.run.calibration_run import RunRequest
@@ -260,18 +258,6 @@ def comparison_document(before: PastRun, after: PastRun, compared: RunComparison
     }
 
 
-def evidence_comparison_document(found: EvidenceComparison) -> dict[str, Any]:
-    """What ``history --compare --json`` prints where one of the runs has no geometry of its own."""
-    return {
-        "before": str(found.before.path),
-        "after": str(found.after.path),
-        "changed": found.is_changed,
-        "leg": found.leg if found.is_changed else None,
-        "limit": found.limit,
-        "causes": [asdict(one) for one in found.causes],
-    }
-
-
 def drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> dict[str, Any]:
     """What ``history --drift --json`` prints."""
     return {
@@ -310,19 +296,6 @@ def schedule_document(schedule: Schedule | None) -> dict[str, Any]:
         "unit": schedule.unit,
         "files": list(map(str, schedule.files)),
         "complaints": list(schedule.complaints),
-    }
-
-
-def refit_document(found: RefittedRun) -> dict[str, Any]:
-    """What ``history --refit --json`` prints."""
-    return {
-        "run": str(found.folder.path),
-        "frame": found.today.frame,
-        **{
-            name: {"chi2": one.chi2, "dof": one.dof, "records": one.records, "converged": one.converged}
-            for name, one in (("then", found.then), ("today", found.today))
-        },
-        "parameters": [{**asdict(one), "change": one.change} for one in found.parameters],
     }
 
 

@@ -1,4 +1,4 @@
-"""Text for the runs of a cell so far: a line a run, two of them compared, and the drift over all."""
+"""Text for the runs of a cell: a list, two of them compared, the drift over all, old ones deleted."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from hexacell.results.run_comparison import ParameterDifference, ParameterTrend, RunComparison
 from hexacell.services.history.history import PastRun
+from hexacell.services.history.retention import Retention
 from hexacell.text.layout import wrapped
 
 NO_RUNS = "This cell has no runs yet."
@@ -106,3 +107,15 @@ def _trend_line(one: ParameterTrend) -> str:
     change, sigma = TREND_DAYS * one.per_day, TREND_DAYS * one.sigma_per_day
     mark = "  walking" if one.is_walking else ""
     return f"{one.name:5}{one.values[0]:15.4f}{one.values[-1]:15.4f}{change:+14.4f}{sigma:10.4f}{mark}"
+
+
+def retention_text(found: Retention, *, is_deleted: bool) -> str:
+    """Which old runs go, and why the others stay."""
+    verb = "were deleted" if is_deleted else "may be deleted"
+    counted = f"{len(found.leaving)} of {len(found.leaving) + len(found.kept)} runs"
+    lines = [f"{counted} from before {found.before:%Y-%m-%d} {verb}."]
+    lines += [f"  {run.name}" for run in found.leaving]
+    lines += [f"  {run.name} stays: {reason}" for run, reason in found.kept]
+    if found.leaving and not is_deleted:
+        lines.append("Add --delete to delete them; what they say of drift goes with them.")
+    return "\n".join(lines)

@@ -56,7 +56,7 @@ def _add_reason(parser: Parser) -> None:
 def _history(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "history", "list the runs of a cell, compare two, see what drifts")
     parser.usage = (
-        "hexacell history [-h] [--compare RUN RUN | --show RUN | --refit RUN |\n"
+        "hexacell history [-h] [--compare RUN RUN | --show RUN |\n"
         "                        --keep DAYS [--delete] | --drift | --changes]\n"
         "                        [--archive URL] [--json] [CELL]"
     )  # argparse does not break a group
@@ -71,9 +71,6 @@ def _history(commands: Any) -> None:  # noqa: ANN401
         help="what changed from one run to another, parameter by parameter",
     )
     what.add_argument("--show", metavar="RUN", help="what happened in a run, and when")
-    what.add_argument(
-        "--refit", metavar="RUN", help="identify a calibration again, with today's cell file and program"
-    )
     what.add_argument(
         "--keep",
         type=float,

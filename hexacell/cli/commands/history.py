@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 
 from hexacell.cell.loader import Cell
 from hexacell.cli.archive_argument import archive_url
@@ -12,28 +11,23 @@ from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.runs.run_folder import RunFolder, find_run
 from hexacell.services.history.drift_history import drift_history
-from hexacell.services.history.evidence_comparison import compare_evidence
 from hexacell.services.history.fleet import fleet_runs
-from hexacell.services.history.history import compare_runs, have_results, parameter_trends, past_runs
-from hexacell.services.history.refit import refit_run
+from hexacell.services.history.history import compare_runs, parameter_trends, past_runs
 from hexacell.services.history.retention import delete_runs, retention
 from hexacell.services.history.run_index import RunIndex
 from hexacell.services.write_back.config_history import config_history
-from hexacell.text.changes import evidence_comparison_text, watch_text
+from hexacell.text.changes import watch_text
 from hexacell.text.config_changes import config_history_text
 from hexacell.text.documents import (
     comparison_document,
     config_history_document,
     drift_document,
-    evidence_comparison_document,
     history_document,
-    refit_document,
     retention_document,
     story_document,
 )
 from hexacell.text.fleet import fleet_history_document, fleet_history_text
-from hexacell.text.history import comparison_text, drift_text, history_text
-from hexacell.text.old_runs import refit_text, retention_text
+from hexacell.text.history import comparison_text, drift_text, history_text, retention_text
 from hexacell.text.run_story import story_text
 from procedures.journal.journal import read_entries
 
@@ -49,13 +43,11 @@ def main(options: argparse.Namespace) -> ExitCode:
         return _fleet(options, console)
     cell = cell_at(options.cell, console)
     if options.compare is not None:
-        _compare(cell, options.compare, console)
+        compared = compare_runs(cell, *options.compare)
+        console.document(comparison_document(*compared))
+        console.print(comparison_text(*compared))
     elif options.show is not None:
         _show(find_run(cell, options.show), console)
-    elif options.refit is not None:
-        refitted = refit_run(cell, options.refit)
-        console.document(refit_document(refitted))
-        console.print(refit_text(refitted))
     elif options.keep is not None:
         _keep(cell, options, console)
     elif options.changes:
@@ -80,7 +72,7 @@ def _index(cell: Cell, options: argparse.Namespace, console: Console) -> RunInde
 
 def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
     """The runs of all cells of an archive."""
-    named = (options.compare, options.show, options.refit, options.keep)
+    named = (options.compare, options.show, options.keep)
     is_one_cells = options.drift or options.changes or any(one is not None for one in named)
     if options.archive is None or is_one_cells:
         raise UsageError("no cell is named", action="Name a cell file, or --archive URL for all")
@@ -116,15 +108,3 @@ def _show(run: RunFolder, console: Console) -> None:
         raise UsageError("nothing happened in this run", subject=run.path, action="Name another")
     console.document(story_document(entries))
     console.print(story_text(entries))
-
-
-def _compare(cell: Cell, named: Sequence[str], console: Console) -> None:
-    before, after = named
-    if have_results(cell, named):
-        compared = compare_runs(cell, before, after)
-        console.document(comparison_document(*compared))
-        console.print(comparison_text(*compared))
-    else:
-        by_records = compare_evidence(cell, before, after)
-        console.document(evidence_comparison_document(by_records))
-        console.print(evidence_comparison_text(by_records))

@@ -139,17 +139,8 @@ def compare_runs(cell: Cell, before: str, after: str) -> tuple[PastRun, PastRun,
     """
     config = fingerprint(*cell.config_paths)
     one, other = (past_run(find_run(cell, named), config) for named in (before, after))
-    parameters = cell.settings.mechanism.parameters
-    return one, other, compare_results(parameters, _result_of(one), _result_of(other))
-
-
-def have_results(cell: Cell, named: Iterable[str]) -> bool:
-    """Whether all of these runs, by folder or name, identified a geometry of their own.
-
-    Raises:
-        UsageError: there is no such run.
-    """
-    return all(_result(find_run(cell, one)) is not None for one in named)
+    results = (require_result(_state_of(run.folder), run.name) for run in (one, other))
+    return one, other, compare_results(cell.settings.mechanism.parameters, *results)
 
 
 def parameter_trends(
@@ -180,21 +171,16 @@ def is_applied_later(folder: RunFolder) -> bool:
         return True
 
 
-def _result_of(run: PastRun) -> IdentificationResult:
-    result = _result(run.folder)
-    if result is None:
-        raise UsageError(
-            f"the run {run.name} identified no geometry of its own", action="Name calibrations, which do"
-        )
-    return result
-
-
 def _result(folder: RunFolder) -> IdentificationResult | None:
+    return result_of_its_own(_state_of(folder))
+
+
+def _state_of(folder: RunFolder) -> RunState:
+    """The state of a run as far as it got; empty where its journal cannot be read."""
     try:
-        state = fold(read_journal(folder.journal))
+        return fold(read_journal(folder.journal))
     except HexacellError:
-        return None
-    return result_of_its_own(state)
+        return RunState()
 
 
 def _age_rank(run: PastRun) -> tuple[bool, float, str]:
@@ -209,6 +195,16 @@ def result_of_its_own(state: RunState) -> IdentificationResult | None:
     """
     is_quick = state.started is not None and state.started.mode == "quick"
     return None if state.identified is None or is_quick else state.identified.result
+
+
+def require_result(state: RunState, run: str) -> IdentificationResult:
+    """What the records of a run alone identified; raises ``UsageError`` where there is no such result."""
+    result = result_of_its_own(state)
+    if result is None:
+        raise UsageError(
+            f"the run {run} identified no geometry of its own", action="Name calibrations, which do"
+        )
+    return result
 
 
 def judged_accuracy(judged: events.ResultValidated | None) -> VerifiedAccuracy | None:

@@ -14,7 +14,7 @@ from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.history.history import past_runs
 from hexacell.services.history.retention import LEAVING, KeptFor, delete_runs, retention
-from hexacell.text.old_runs import retention_text
+from hexacell.text.history import retention_text
 from procedures.journal.journal import read_journal
 from procedures.journal.line_format import Entry, encode
 from tests.hexacell.services.proposed_runs import a_cell, propose_run

@@ -161,7 +161,7 @@ class Controller(Device[DeviceIdentity], Protocol):
         """Make it ready to move: out of emergency stop, enabled, homed. May move the machine.
 
         Raises:
-            drivers.controllers.errors.StartupNotPermitted: it needs an action that is not permitted.
+            drivers.errors.StartupNotPermitted: it needs an action that is not permitted.
         """
         ...
 
@@ -187,7 +187,7 @@ class Controller(Device[DeviceIdentity], Protocol):
         It is switched off and on for that, without permission where it was on before.
 
         Raises:
-            drivers.controllers.errors.StartupNotPermitted: as ``prepare``, which may then complete it.
+            drivers.errors.StartupNotPermitted: as ``prepare``, which may then complete it.
         """
         ...
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import serial
 
 from drivers.interfaces import DeviceIdentity
-from drivers.serial.errors import opening_errors
+from drivers.serial.opening import opening_errors
 from drivers.serial.port import close_port
 from hexacell.cell.measuring import GuardSettings
 from hexacell.errors import HexacellError

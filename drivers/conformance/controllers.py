@@ -8,9 +8,9 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AbstractContextManager, asynccontextmanager
 from typing import Protocol
 
-from drivers.conformance.failures import LONGEST_S, failure, require_named
-from drivers.controllers.errors import MotionInterrupted, MoveRefused, StartupNotPermitted
+from drivers.conformance.suite import LONGEST_S, failure, require_named
 from drivers.controllers.linuxcnc.protocol import pose_difference
+from drivers.errors import MotionInterrupted, MoveRefused, StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction
 from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.simulation import FaultKind

@@ -9,8 +9,8 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequen
 from contextlib import AbstractContextManager, asynccontextmanager, contextmanager
 from typing import Protocol
 
-from drivers.conformance.failures import LONGEST_S, failure, require_named
-from drivers.encoders.cia406 import joint_variables
+from drivers.conformance.suite import LONGEST_S, failure, require_named
+from drivers.encoders.bank import joint_variables
 from drivers.interfaces import EncoderBank
 from hexacell.cell.devices import EncoderSettings
 from hexacell.cell.simulation import FaultKind

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AbstractContextManager, asynccontextmanager
 from typing import Protocol
 
-from drivers.conformance.failures import LONGEST_S, failure, require_named
+from drivers.conformance.suite import LONGEST_S, failure, require_named
 from drivers.interfaces import Gauge
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import re
+import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 
-from drivers.discovery import visa
-from drivers.discovery.streams import a_number, uwave_channels
 from drivers.errors import (
     EmptyChannel,
     GaugeAtEnd,
@@ -17,7 +18,10 @@ from drivers.errors import (
     WrongSetting,
     ZeroVoid,
 )
+from drivers.gauges.uwave import UwaveGauge, channel_of
+from drivers.gauges.visa import IDENTIFY, VisaGauge, VisaPort
 from drivers.interfaces import Gauge
+from drivers.serial.port import NoAnswer, SerialPort
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, HexacellError
@@ -74,7 +78,7 @@ class PortFindings:
 
 async def search_port(port: str, factories: Mapping[str, GaugeFactory]) -> PortFindings:
     """Ask in every protocol, then listen; the first that is answered is the port's."""
-    if visa.SEPARATOR in port:
+    if VISA_SEPARATOR in port:
         return await _identify(port)
     heard: list[str] = []
     for protocol, baudrate in _tries(factories):
@@ -100,7 +104,7 @@ def _tries(protocols: Collection[str]) -> Iterator[tuple[str, int | None]]:
 async def _identify(resource: str) -> PortFindings:
     """The instrument with VISA."""
     try:
-        answer = await asyncio.to_thread(visa.identification, resource)
+        answer = await asyncio.to_thread(visa_identification, resource)
     except HexacellError as error:
         return PortFindings(resource, problem=f"{error.problem}. {error.action}")
     return PortFindings(resource, problem=f"is {answer}. {DESCRIBE_QUESTION}" if answer else "")
@@ -171,3 +175,51 @@ async def _ask(
         await gauge.close()
         await ports.close()
     return FoundGauge(protocol, port, identity.description, its_channel, shown, "", baudrate)
+
+
+LISTEN_S = 1.0
+NUMBER = re.compile(rb"[ -~]*\d\.\d[ -~]*")
+
+
+def uwave_channels(port: str) -> tuple[int, ...]:
+    """The channels whose values come on a port, as from a U-WAVE receiver."""
+    channels = (channel_of(frame) for frame in _heard(port, UwaveGauge.spec.line.baudrate))
+    return tuple(sorted({channel for channel in channels if channel is not None}))
+
+
+def a_number(port: str, baudrate: int) -> str:
+    """A line with a number that comes on a port; empty if none does."""
+    numbers = (frame for frame in _heard(port, baudrate) if NUMBER.fullmatch(frame))
+    return next(numbers, b"").decode("ascii")
+
+
+def _heard(port: str, baudrate: int) -> Iterator[bytes]:
+    """Whole lines: the first may be part of one."""
+    line = SerialPort(port, {"baudrate": baudrate}, threading.Event())
+    with closing(line), suppress(HexacellError):
+        line.open()
+        end_s = line.now() + LISTEN_S
+        while line.now() < end_s:
+            line.listen()
+        yield from (frame.data for frame in line.log.after(1))
+
+
+VISA_TIMEOUT_S = 2.0
+VISA_SEPARATOR = "::"
+"""In every VISA resource, and in no port."""
+
+
+def visa_identification(resource: str) -> str:
+    """What it answers to ``*IDN?``; empty if nothing.
+
+    Raises:
+        HexacellError: PyVISA is not installed, or the resource cannot be opened.
+    """
+    port = VisaPort(resource, {}, threading.Event())
+    with closing(port):
+        port.open()
+        try:
+            answer = port.exchange(IDENTIFY, VisaGauge.terminator, VISA_TIMEOUT_S)
+        except NoAnswer:
+            return ""
+    return answer.decode("ascii", "replace").strip()

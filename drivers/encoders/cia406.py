@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from drivers.encoders.alarm_poll import AlarmPoll
+from drivers.encoders.bank import SampleHistory, ThreadedBank, bus_settings, joint_variables
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand
 from drivers.encoders.electronic_data_sheet import read_data_sheet
@@ -17,15 +17,11 @@ from drivers.encoders.node_identity import (
     detect_nodes,
     read_device_type,
     read_identity,
+    switch_sync_counter_off,
 )
-from drivers.encoders.node_monitor import NodeMonitor, check_nodes
-from drivers.encoders.node_settings import switch_sync_counter_off
+from drivers.encoders.node_monitor import AlarmPoll, NodeMonitor, check_nodes
 from drivers.encoders.object_dictionary import DeviceType
-from drivers.encoders.pdo_configuration import configure_position_tpdo
-from drivers.encoders.plausibility import SampleHistory
-from drivers.encoders.sync_sampling import SyncSampler
-from drivers.encoders.threaded_bank import ThreadedBank
-from drivers.errors import BusError
+from drivers.encoders.sync_sampling import SyncSampler, configure_position_tpdo
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.devices import EncoderSettings
@@ -120,13 +116,6 @@ class EncoderSession:
         return identity
 
 
-def joint_variables(counts: tuple[int, ...], settings: EncoderSettings) -> tuple[float, ...]:
-    """Joint variables q, in their unit: direction x counts x step + offset."""
-    step = settings.step
-    terms = zip(settings.direction, counts, settings.offset, strict=True)
-    return tuple([direction * count * step + offset for direction, count, offset in terms])
-
-
 def _check_all(
     nodes: tuple[EncoderNode, ...], monitors: tuple[NodeMonitor, ...], sampler: SyncSampler
 ) -> None:
@@ -134,15 +123,3 @@ def _check_all(
         node.check_alone()
     check_nodes(monitors)
     sampler.check()
-
-
-def bus_settings(settings: EncoderSettings) -> dict[str, object]:
-    """Those of the cell file for ``can.Bus``; raises ``BusError`` if it has none."""
-    if settings.bus is None:
-        raise BusError(
-            "is not configured in the cell file",
-            subject="encoder bus",
-            action="State `bus` under [encoders], for example "
-            '{ interface = "slcan", channel = "/dev/ttyACM0", bitrate = 500000 }',
-        )
-    return settings.bus

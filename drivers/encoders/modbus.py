@@ -10,11 +10,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from drivers.encoders.cia406 import joint_variables
-from drivers.encoders.modbus_registers import RegisterSpan, counts_in, register_spans
-from drivers.encoders.plausibility import SampleHistory
-from drivers.encoders.threaded_bank import ThreadedBank
+from drivers.encoders.bank import SampleHistory, ThreadedBank, joint_variables
 from drivers.errors import BusError, InvalidSampleError, PortLost, SilentNodeError
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from drivers.serial.adapters import adapter_at
@@ -198,3 +196,58 @@ def _lost(error: PortLost) -> BusError:
         subject="encoders",
         action="Plug its adapter in and open the encoders again; the set that was being measured is void",
     )
+
+
+MAX_REGISTERS = 125
+"""Of an answer (Modbus Application Protocol 6.3)."""
+
+REGISTER_BITS, REGISTER_BYTES = 16, 2
+
+
+@dataclass(frozen=True, slots=True)
+class RegisterSpan:
+    """Registers of one device that one request asks for, and the legs that are in them, from 1."""
+
+    device: int
+    first: int
+    count: int
+    legs: tuple[int, ...]
+
+    @property
+    def subject(self) -> str:
+        """Of messages."""
+        legs = ", ".join(map(str, sorted(self.legs)))
+        named = f"encoder of leg {legs}" if len(self.legs) == 1 else f"encoders of legs {legs}"
+        return f"{named} (device {self.device})"
+
+
+def register_spans(described: ModbusEncoderSettings, *, joined: bool) -> tuple[RegisterSpan, ...]:
+    """The requests for all legs; ``joined``: one for the legs of a device, as far as an answer reaches."""
+    words = described.bits // REGISTER_BITS
+    spans: list[RegisterSpan] = []
+    for (device, register), leg in sorted((place, leg) for leg, place in enumerate(described.places, 1)):
+        last = spans[-1] if spans else None
+        count = register + words - last.first if last else 0
+        if joined and last and last.device == device and count <= MAX_REGISTERS:
+            spans[-1] = RegisterSpan(device, last.first, count, (*last.legs, leg))
+        else:
+            spans.append(RegisterSpan(device, register, words, (leg,)))
+    return tuple(spans)
+
+
+def counts_in(
+    data: bytes, span: RegisterSpan, described: ModbusEncoderSettings, *, signed: bool
+) -> dict[int, int]:
+    """The counts by leg in the registers of a span, each with its high byte first."""
+    size = described.bits // 8
+    starts = {leg: REGISTER_BYTES * (described.registers[leg - 1] - span.first) for leg in span.legs}
+    return {
+        leg: _count(data[start : start + size], described, signed=signed) for leg, start in starts.items()
+    }
+
+
+def _count(data: bytes, described: ModbusEncoderSettings, *, signed: bool) -> int:
+    registers = [data[start : start + REGISTER_BYTES] for start in range(0, len(data), REGISTER_BYTES)]
+    if described.word_order == "little":
+        registers.reverse()
+    return int.from_bytes(b"".join(registers), signed=signed)

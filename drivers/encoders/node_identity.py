@@ -10,19 +10,24 @@ from collections.abc import Sequence
 
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, subject_of
-from drivers.encoders.node_settings import read_settings, read_warnings
 from drivers.encoders.object_dictionary import (
     DEVICE_TYPE,
     ENCODER_PROFILE,
     MEASURING_STEP,
     MEASURING_STEP_SETTING,
+    OFFSET,
+    OPERATING_PARAMETERS,
+    PRESET,
     PRODUCT,
     RESOLUTION,
     REVISION,
     SERIAL_NUMBER,
+    SYNC_COUNTER,
     UNITS_PER_TURN,
     VENDOR,
+    WARNINGS,
     DeviceType,
+    ObjectEntry,
 )
 from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity
@@ -168,3 +173,43 @@ def _device_type_text(value: int) -> str:
     if profile == ENCODER_PROFILE:
         return f"0x{value:08X} (an encoder, but of class {kind}; linear ones are 8 and 10)"
     return f"0x{value:08X} (profile {profile}; encoders are {ENCODER_PROFILE})"
+
+
+REVERSED = 1 << 3
+"""Bit of the operating parameters: counts grow in the other direction (CiA 406)."""
+
+_HALF = 1 << 31
+
+
+def read_settings(node: EncoderNode) -> str:
+    """Direction, preset and offset in words, those that the device has."""
+    words = []
+    parameters = node.read_optional(OPERATING_PARAMETERS)
+    if parameters is not None:
+        direction = "reversed, " if parameters & REVERSED else ""
+        words.append(f"operating parameters {direction}{parameters:#06x}")
+    for name, entry in (("preset", PRESET), ("offset", OFFSET)):
+        value = _signed(node, entry)
+        words += [] if value is None else [f"{name} {value}"]
+    return ", ".join(words)
+
+
+def read_warnings(node: EncoderNode) -> str:
+    """The warnings that the device reports, in words; empty without."""
+    value = node.read_optional(WARNINGS)
+    return f"it reports a warning: {WARNINGS} is {value:#06x}" if value else ""
+
+
+def switch_sync_counter_off(node: EncoderNode) -> None:
+    """Have the node take a SYNC without a counter, as this program sends it.
+
+    Raises:
+        DeviceError: it refuses that.
+    """
+    if node.read_optional(SYNC_COUNTER):
+        node.write(SYNC_COUNTER, 0)
+
+
+def _signed(node: EncoderNode, entry: ObjectEntry) -> int | None:
+    value = node.read_optional(entry)
+    return value if value is None or value < _HALF else value - 2 * _HALF

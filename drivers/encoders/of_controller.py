@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
-from drivers.encoders.cia406 import joint_variables
+from drivers.encoders.bank import joint_variables
 from drivers.errors import NotHomedError
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from hexacell.cell.devices import EncoderSettings

@@ -10,7 +10,7 @@ import re
 from typing import ClassVar
 
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec
-from drivers.gauges.value_only import ValueOnlyGauge
+from drivers.gauges.serial_gauge import ValueOnlyGauge
 from hexacell.errors import DeviceError
 
 VALUE_FRAME = re.compile(rb"([+-]?)(\d{1,5}\.\d{1,6})\r?\n")

@@ -11,7 +11,7 @@ import re
 from typing import ClassVar
 
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
-from drivers.gauges.value_only import ValueOnlyGauge
+from drivers.gauges.serial_gauge import ValueOnlyGauge
 
 VALUE_FRAME = re.compile(rb"([+\- ])(?=.{9}\d )( *\d+\.\d+) ([ \"?])[<>=? ]?([SAGD ]?) {0,2}\r")
 ACTUAL = {b"", b" ", b"A"}

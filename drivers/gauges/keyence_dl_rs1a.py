@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from drivers.errors import EmptyChannel
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
-from drivers.gauges.value_only import ValueOnlyGauge
+from drivers.gauges.serial_gauge import ValueOnlyGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError

@@ -11,7 +11,7 @@ import re
 from typing import ClassVar
 
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec
-from drivers.gauges.value_only import ValueOnlyGauge
+from drivers.gauges.serial_gauge import ValueOnlyGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 

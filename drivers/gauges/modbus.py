@@ -11,7 +11,7 @@ import struct
 from drivers.errors import WrongAnswer
 from drivers.gauges.plausibility import decimals_of
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
-from drivers.gauges.value_only import ValueOnlyGauge
+from drivers.gauges.serial_gauge import ValueOnlyGauge
 from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort
 from drivers.serial.request_port import PortFactory
 from drivers.serial.shared_port import SharedSerialPorts

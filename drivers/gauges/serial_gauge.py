@@ -292,3 +292,14 @@ class SerialGauge(ABC):
 
 def _reading(shown: DisplayedValue) -> GaugeReading:
     return GaugeReading(shown.value, shown.text)
+
+
+class ValueOnlyGauge(SerialGauge):
+    """Its unit, where the value tells it, and its decimals are all that can be checked."""
+
+    async def _read_state(self) -> GaugeState:
+        try:
+            shown = await self._read_value()
+        except GaugeAtEnd:
+            return GaugeState()
+        return GaugeState(unit=shown.apparent_unit, decimals=shown.decimals)

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from drivers.errors import EmptyChannel, GaugeSilent
 from drivers.gauges.protocol import FrameRejected
-from drivers.gauges.value_only import ValueOnlyGauge
+from drivers.gauges.serial_gauge import ValueOnlyGauge
 from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings

@@ -8,9 +8,15 @@ none.
 from __future__ import annotations
 
 import re
+import termios
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import partial
+from typing import Any
 
-from drivers.errors import WrongSetting
+from drivers.errors import PortLost, WrongSetting
 from drivers.gauges.plausibility import decimals_of
 from drivers.gauges.protocol import (
     DisplayedValue,
@@ -21,17 +27,178 @@ from drivers.gauges.protocol import (
     Unit,
 )
 from drivers.gauges.serial_gauge import SerialGauge
-from drivers.gauges.visa_port import VisaPort
-from drivers.serial.request_port import PortFactory
+from drivers.libraries import optional
+from drivers.serial.opening import SLICE_S, lost_port
+from drivers.serial.port import FRAME_LIMIT, NoAnswer
+from drivers.serial.request_port import LibraryPort, PortFactory
 from drivers.serial.shared_port import SharedSerialPorts
+from drivers.wire_trace import TraceRecorder, TrafficDirection
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, FileError
 
+EXTRA = "visa"
+PURE_PYTHON = "@py"
+MS = 1000.0
+SURPLUS_S = 0.002
+FRAME_GAP_S = 0.04
+BYTE_STREAMS = ("::SOCKET", "ASRL")
+SERIAL = "ASRL"
+LINE_ATTRIBUTES = {"baudrate": "baud_rate", "bytesize": "data_bits"}
+PARITIES = {"N": "none", "E": "even", "O": "odd", "M": "mark", "S": "space"}
+STOP_BITS = {1: "one", 1.5: "one_and_a_half", 2: "two"}
 IDENTIFY = b"*IDN?\n"
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[Ee][+-]?\d{1,3})?")
 TEXT = re.compile(rb"[ -~]{1,200}")
 INFINITE = 9.9e37
 NO_NUMBER = 9.91e37
+
+
+class VisaPort(LibraryPort):
+    """One VISA resource; ``settings`` are ``backend`` and, of a serial one, those of the line.
+
+    Sockets and serial lines are read byte by byte, so that closing never waits long, and are silent for
+    ``worst_latency_s`` after a time-out before the next request. Others (USB, LAN, GPIB) carry whole
+    messages: they are read with the time-out at once, and cleared after one.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        settings: Mapping[str, object],
+        closing: threading.Event,
+        recorder: TraceRecorder | None = None,
+        worst_latency_s: float = 2.0,
+    ) -> None:
+        super().__init__(url, settings, closing, recorder, worst_latency_s)
+        self._is_stream = any(word in url.upper() for word in BYTE_STREAMS)
+        self._resource: Any = None
+        self._visa: Any = None
+        self._gap_s = SURPLUS_S
+
+    def open(self) -> int:
+        """Open the resource unless it is open; how often it has been opened.
+
+        Raises:
+            UsageError: PyVISA is not installed.
+            PortLost: the resource cannot be opened.
+        """
+        self.require_not_closed()
+        if self._resource is None:
+            self._visa = optional("pyvisa", EXTRA, self.subject)
+            self._resource = self._opened()
+            self.open_count += 1
+            self._must_clear = False
+        return self.open_count
+
+    def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
+        """Send ``request``; its answer up to ``terminator``.
+
+        Raises:
+            NoAnswer: none came in time.
+            PortLost: the resource is not open, or was lost.
+        """
+        self.require_not_closed()
+        if self._resource is None:
+            raise lost_port(self.subject, self.url, "it is not open", "Connect it")
+        with self._visa_errors():
+            if self._must_clear:
+                self._clear()
+            elif self._is_stream:
+                self._drop_surplus()
+            self._record(TrafficDirection.SENT, request)
+            self._resource.timeout = MS * timeout_s  # of writing too
+            self._resource.write_raw(request)
+            return self._answer(terminator, timeout_s)
+
+    def close(self) -> None:
+        """Close the resource; closing twice is harmless."""
+        resource, self._resource = self._resource, None
+        if resource is not None:
+            with suppress(Exception):  # it may be gone already
+                resource.close()
+
+    def _opened(self) -> Any:  # noqa: ANN401 - of a library that may be missing
+        try:
+            backend = str(self._settings.get("backend", PURE_PYTHON))
+            resource = self._visa.ResourceManager(backend).open_resource(self.url)
+            if self.url.upper().startswith(SERIAL):
+                self._set_line(resource)
+        except Exception as error:  # its backends raise anything, also Exception itself
+            raise PortLost(
+                f"port {self.url} cannot be opened: {error}",
+                subject=self.subject,
+                action="Check the instrument and port in the cell file",
+            ) from error
+        return resource
+
+    def _set_line(self, resource: Any) -> None:  # noqa: ANN401
+        constants = self._visa.constants
+        for name, attribute in LINE_ATTRIBUTES.items():
+            if name in self._settings:
+                setattr(resource, attribute, self._settings[name])
+        if "parity" in self._settings:
+            resource.parity = constants.Parity[PARITIES[str(self._settings["parity"])]]
+        if "stopbits" in self._settings:
+            stop_bits: Any = self._settings["stopbits"]
+            resource.stop_bits = constants.StopBits[STOP_BITS[stop_bits]]
+        resource.end_input = constants.SerialTermination.none
+
+    def _answer(self, terminator: bytes, timeout_s: float) -> bytes:
+        received = b""
+        deadline_s = time.monotonic() + timeout_s
+        while not received.endswith(terminator):
+            if time.monotonic() > deadline_s or len(received) > FRAME_LIMIT:
+                self._must_clear = True
+                raise NoAnswer(received)
+            received += self._some(timeout_s).lstrip(b"\r\n\0" if not received else b"")
+        return received
+
+    def _some(self, timeout_s: float) -> bytes:
+        """A byte of a stream, or a message; nothing if none comes in time."""
+        self.require_not_closed()
+        self._resource.timeout = MS * (min(SLICE_S, timeout_s) if self._is_stream else timeout_s)
+        try:
+            data: bytes = self._resource.read_bytes(1) if self._is_stream else self._resource.read_raw()
+        except self._visa.errors.VisaIOError as error:
+            if error.error_code == self._visa.constants.StatusCode.error_timeout:
+                return b""
+            raise
+        self._record(TrafficDirection.RECEIVED, data)
+        return data
+
+    def _clear(self) -> None:
+        """Let late answers come and go."""
+        if not self._is_stream:
+            self._resource.clear()
+        quiet_from_s = time.monotonic()
+        give_up_s = quiet_from_s + 5 * self._worst_latency_s
+        while self._is_stream and time.monotonic() < quiet_from_s + self._worst_latency_s:
+            if self._some(SLICE_S):
+                quiet_from_s = time.monotonic()
+                self.surplus_count += 1
+            if quiet_from_s > give_up_s:
+                raise DeviceError(f"the device on {self.url} keeps sending unasked", subject=self.subject)
+        self._must_clear = False
+
+    def _drop_surplus(self) -> None:
+        """Drop what came after the last answer.
+
+        After the first such bytes every question waits until the line is silent.
+        """
+        received = False
+        while self._some(self._gap_s):
+            received = True
+        if received and self._gap_s < FRAME_GAP_S:
+            self.surplus_count += 1
+            self._gap_s = FRAME_GAP_S
+
+    @contextmanager
+    def _visa_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, termios.error, self._visa.errors.Error) as error:
+            self.close()
+            raise lost_port(self.subject, self.url, str(error), "Connect it") from error
 
 
 class VisaGauge(SerialGauge):

@@ -14,10 +14,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from drivers.extras import optional
-from drivers.serial.errors import lost_port
+from drivers.libraries import optional
 from drivers.serial.framing import is_copies
-from drivers.serial.opening import opened_port
+from drivers.serial.opening import lost_port, opened_port
 from drivers.serial.port import NoAnswer
 from drivers.serial.request_port import LibraryPort
 from drivers.wire_trace import TraceRecorder, TrafficDirection

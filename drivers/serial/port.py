@@ -17,10 +17,8 @@ from math import inf
 import serial
 
 from drivers.errors import PortLost
-from drivers.serial.errors import lost_port
-from drivers.serial.frame_log import FrameLog
-from drivers.serial.framing import LINE_ENDS, cut_frame, is_copies
-from drivers.serial.opening import opened_port
+from drivers.serial.framing import LINE_ENDS, FrameLog, cut_frame, is_copies
+from drivers.serial.opening import lost_port, opened_port
 from drivers.serial.parity import have_terminal_check, in_software
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from drivers.serial.frame_log import FrameLog
+from drivers.serial.framing import FrameLog
 from drivers.serial.port import WORST_LATENCY_S, SerialPort
 from drivers.serial.request_port import PortFactory
 from drivers.wire_trace import TraceRecorder

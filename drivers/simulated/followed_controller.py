@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+import json
+import subprocess
+import threading
+import time
+from collections import deque
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from shutil import which
+from typing import Any
 
-from drivers.simulated.following_physics import FollowingPhysics
-from drivers.simulated.joint_source import JointSource
-from drivers.simulated.kept_gauges import KeptGauges
-from drivers.simulated.sensors import SimulatedSensors
+import numpy as np
+
+from drivers.simulated.cell import SimulatedSensors
+from drivers.simulated.physics import GaugePlaces, Motion, RobotPhysics
 from drivers.simulated.served_device import Closeable
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
+from hexacell.config.contents import fingerprint
 from hexacell.config.layout import ConfigLayout
-from hexacell.errors import UsageError
+from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.rotations import Array
+from hexacell.storage.atomic_files import write_atomically
 
 
 class FollowedController(Closeable):
@@ -74,3 +85,156 @@ def _require_real(settings: CellSettings, simulation: SimulationSettings) -> Non
     else:
         return
     raise UsageError(f"[simulation] names a joints_command, but {problem}", action=action)
+
+
+LONGEST_STEP_MM = 5.0
+"""Of a joint variable between two solutions of the pose, so that the assembly mode is kept."""
+
+MOVED_MM = 1e-4
+
+
+class FollowingPhysics(RobotPhysics):
+    """Where the joints are is what ``source`` says; before it says anything, at the first point."""
+
+    def __init__(self, source: JointSource, kept: KeptGauges, *arguments: Any) -> None:  # noqa: ANN401 - those of its base
+        super().__init__(*arguments)
+        self._source = source
+        self._kept: KeptGauges | None = kept
+        self._draw_noise()
+
+    def _update(self) -> float:
+        now = self._clock.now()
+        for shown in self._source.passed():
+            self._follow(shown / self._shown_per_mm, now)
+            if (
+                self._kept is not None
+            ):  # before, the ball was at the first point for want of anything better
+                self._kept.restore(self.gauges)
+                self._kept = None
+        return now
+
+    def encoder_positions(self) -> Array:
+        """The joint variables measured by the encoders (6,)."""
+        with self._lock:
+            self._update()
+            return super().encoder_positions()
+
+    def _follow(self, joints: Array, now: float) -> None:
+        step = joints - self._joints
+        largest = float(np.abs(step).max())
+        if largest < MOVED_MM:
+            return
+        if self._motion.end_s < now - RESTING_S:  # it stood, and another move begins
+            self._draw_noise()
+            self.on_motion_start()
+        for share in np.linspace(0.0, 1.0, int(np.ceil(largest / LONGEST_STEP_MM)) + 1)[1:]:
+            self._move_platform(joints - (1.0 - share) * step)
+        self._motion = Motion(np.stack([joints, joints]), now, 0.0)
+
+
+RESTING_S = 0.2
+"""Without a change of the joints for longer, the robot stands."""
+
+
+RESTART_S = 0.5
+"""Pause before the program is started again: it ends whenever the controller does."""
+
+BACKLOG_S = 0.3
+"""In which the program prints what was sampled before it was started; that is not where the joints are."""
+
+KEPT = 10_000
+"""Positions that nobody asked for, of which the oldest are dropped."""
+
+
+class JointSource(Closeable):
+    """Runs ``command`` until it is closed; each line of six numbers is where the joints are, mm.
+
+    A seventh, if any, is 0 where they are not homed; what they are then said to be is no place.
+    """
+
+    def __init__(self, command: Sequence[str]) -> None:
+        self._command = tuple(command)
+        self._passed: deque[Array] = deque(maxlen=KEPT)
+        self._closing = threading.Event()
+        self._process: subprocess.Popen[str] | None = None
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._serve, name="joint source", daemon=True)
+        self._thread.start()
+
+    def passed(self) -> list[Array]:
+        """Where the joints (6,), mm, have been since the last call, in order."""
+        found = []
+        while self._passed:
+            found.append(self._passed.popleft())
+        return found
+
+    def close(self) -> None:
+        """End the program; twice is harmless."""
+        with self._lock:
+            self._closing.set()
+            if self._process is not None:
+                self._process.terminate()
+        self._thread.join()
+
+    def _serve(self) -> None:
+        while not self._closing.is_set():
+            self._read_until_it_ends()
+            self._closing.wait(RESTART_S)
+
+    def _read_until_it_ends(self) -> None:
+        with self._lock:
+            if self._closing.is_set():
+                return
+            self._process = subprocess.Popen(  # noqa: S603 - the owner's own command
+                self._command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                text=True,
+            )
+        begin = time.monotonic() + BACKLOG_S
+        with self._process as process:
+            for line in process.stdout or ():
+                if (joints := joints_in(line)) is not None and time.monotonic() > begin:
+                    self._passed.append(joints)
+
+
+def joints_in(line: str) -> Array | None:
+    """The six numbers of a line; none if there are not six, or a seventh is 0."""
+    try:
+        numbers = np.array([float(word) for word in line.split()])
+    except ValueError:
+        return None
+    if len(numbers) not in {LEGS, LEGS + 1} or not np.isfinite(numbers).all():
+        return None
+    return numbers[:LEGS] if numbers[LEGS:].all() else None
+
+
+class KeptGauges:
+    """The file, beside the controller's config. It holds as long as the config is what it was then.
+
+    With another geometry the same command leads elsewhere, and a person would place the gauges anew.
+    """
+
+    def __init__(self, config: tuple[Path, ...]) -> None:
+        self.path = config[0].with_name(f".{config[0].name}.simulated-gauges")
+        self._config = config
+
+    def restore(self, places: GaugePlaces) -> None:
+        """Put the gauges where they were, if that is known, and note from now on where they are put."""
+        with suppress(OSError, FileError, ValueError, KeyError, TypeError):
+            kept = json.loads(self.path.read_text())
+            if kept["config"] == fingerprint(*self._config):
+                station, triad = np.array(kept["station"], float), np.array(kept["triad"], float)
+                places.stand(station.reshape(3), triad.reshape(3, 3))
+        places.on_placed = self._keep
+
+    def _keep(self, station: Array, triad: Array) -> None:
+        # A folder that cannot be written is no reason to have no gauges.
+        with suppress(FileError):
+            kept = {
+                "config": fingerprint(*self._config),
+                "station": station.tolist(),
+                "triad": triad.tolist(),
+            }
+            write_atomically(self.path, json.dumps(kept).encode())

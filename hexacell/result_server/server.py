@@ -17,7 +17,7 @@ from hexacell.cell.opcua import OpcUaSettings
 from hexacell.errors import DeviceError
 from hexacell.result_server.address_space import MOST_RESULTS, ResultNodes
 from hexacell.result_server.credentials import Reader, allowed_reader, ensure_certificate
-from hexacell.result_server.new_results import NewResults
+from hexacell.result_server.published_result import NewResults
 
 URI = "urn:hexacell:result-server"
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from drivers.controllers.errors import ConnectionLost
 from drivers.errors import (
     BusError,
+    ConnectionLost,
     GaugeSilent,
     PortLost,
     RestartedNodeError,

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from drivers import errors as controller
 from drivers import errors as device
-from drivers.controllers import errors as controller
 from hexacell.cell.recovery import Action, Escalations, FailureKind, RecoverySettings
 from hexacell.errors import AnswerNeeded, DeviceError, FileError, HexacellError, Interruption
 from procedures.calibration.mounting import MountingError

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drivers.controllers.errors import StartupNotPermitted
+from drivers.errors import StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction, StartupActions
 from hexacell.errors import Interruption
 from procedures.guards.guards import Guards

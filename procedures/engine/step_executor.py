@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.controllers.errors import PoseRefused
-from drivers.errors import GaugeAtEnd
+from drivers.errors import GaugeAtEnd, PoseRefused
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock

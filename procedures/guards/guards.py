@@ -17,7 +17,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from drivers.controllers.errors import MotionInterrupted
+from drivers.errors import MotionInterrupted
 from drivers.interfaces import EncoderSample
 from drivers.stop_input import SUBJECT as STOP_LINE
 from hexacell.cell.model import CellSettings

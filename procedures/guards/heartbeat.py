@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from drivers.controllers.errors import ControllerFrozen
+from drivers.errors import ControllerFrozen
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.clock import CellClock
 from procedures.devices.device_set import Devices

@@ -14,8 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.controllers.errors import ControllerFrozen
-from drivers.errors import GaugeAtEnd
+from drivers.errors import ControllerFrozen, GaugeAtEnd
 from drivers.stop_input import SUBJECT as STOP_LINE
 from hexacell.kinematics.mechanism import MechanismWords
 from hexacell.kinematics.rotations import Array

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel
 
-from drivers.encoders.cia406 import joint_variables
+from drivers.encoders.bank import joint_variables
 from hexacell import __version__
 from hexacell.cell.devices import EncoderSettings
 from procedures.devices.settling import trimmed_mean

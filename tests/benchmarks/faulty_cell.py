@@ -13,7 +13,7 @@ from drivers.encoders.cia406 import Cia406Bank
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import simulated_instrument
 from drivers.simulated.gauges.indicator import Indicator
-from drivers.simulated.gauges.line_faults import LineFault
+from drivers.simulated.gauges.server import LineFault
 from drivers.wire_trace import WireTrace
 from hexacell.cell.devices import GaugeSettings, LinearEncoderSettings
 from hexacell.plugins import Group, load

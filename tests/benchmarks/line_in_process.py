@@ -19,7 +19,7 @@ import serial
 
 from drivers.serial import port
 from drivers.simulated.gauges.instruments import Instrument
-from drivers.simulated.gauges.line_faults import LineFaults
+from drivers.simulated.gauges.server import LineFaults
 
 MARK = b"\xff\0"
 """What a terminal puts before a byte of wrong parity."""

@@ -16,7 +16,9 @@ from dataclasses import dataclass
 import can
 import pytest
 
-from drivers.encoders import alarm_poll, can_bus, node_monitor, plausibility
+from drivers.encoders import bank as plausibility
+from drivers.encoders import can_bus, node_monitor
+from drivers.encoders import node_monitor as alarm_poll
 from tests.drivers.encoders.raw_node import (
     HEARTBEAT,
     NMT,

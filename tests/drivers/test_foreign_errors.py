@@ -10,7 +10,7 @@ import serial
 from canopen import SdoCommunicationError
 
 from drivers.errors import GaugeSilent
-from drivers.foreign_errors import translated
+from drivers.libraries import translated
 from hexacell.errors import DeviceError
 
 

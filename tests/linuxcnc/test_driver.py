@@ -7,9 +7,9 @@ from functools import partial
 
 import pytest
 
-from drivers.controllers.errors import MoveRefused, PoseRefused
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.encoders.of_controller import ControllerScales
+from drivers.errors import MoveRefused, PoseRefused
 from drivers.interfaces import StartupAction
 from hexacell.cell.devices import LinearEncoderSettings
 from hexacell.cell.loader import load_cell

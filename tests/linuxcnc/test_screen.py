@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controllers.errors import MoveRefused
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.restart import restart
+from drivers.errors import MoveRefused
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.pose import Pose

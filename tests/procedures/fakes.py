@@ -7,9 +7,8 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from drivers.controllers.errors import PoseRefused, StartupNotPermitted
 from drivers.controllers.linuxcnc.protocol import parse_pose_refusal
-from drivers.errors import GaugeAtEnd
+from drivers.errors import GaugeAtEnd, PoseRefused, StartupNotPermitted
 from drivers.interfaces import (
     ControllerStatus,
     DeviceIdentity,

@@ -20,9 +20,8 @@ from hexacell.screen.app import FirstCell, TechnicianApp
 from hexacell.screen.assistant import FirstCellAssistant
 from hexacell.screen.assistant_screen import AssistantScreen
 from hexacell.screen.session import ScreenSession
-from hexacell.services.devices.device_search import SearchFindings
+from hexacell.services.devices.device_search import SearchFindings, draft_of
 from hexacell.services.devices.first_cell import CellDraft
-from hexacell.services.devices.found_cell import draft_of
 from tests.screen.test_history_screen import WithoutDevices
 from tests.screen.test_job import press, shown, until_shown
 from tests.waiting import until

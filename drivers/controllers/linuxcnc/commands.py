@@ -7,10 +7,15 @@ from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from typing import TypeVar
 
-from drivers.controllers.errors import CommandRefused, ConnectionLost
 from drivers.controllers.linuxcnc.connection import Connection
-from drivers.controllers.linuxcnc.protocol import Response, parse_homed, parse_pose, parse_positions
-from drivers.controllers.linuxcnc.settings import Address
+from drivers.controllers.linuxcnc.protocol import (
+    Address,
+    Response,
+    parse_homed,
+    parse_pose,
+    parse_positions,
+)
+from drivers.errors import CommandRefused, ConnectionLost
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 

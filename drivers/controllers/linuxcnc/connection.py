@@ -7,18 +7,21 @@ import contextlib
 import os
 import re
 from collections import deque
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from typing import Self
 
-from drivers.controllers.errors import ConnectionLost, ResponseTimeout
 from drivers.controllers.linuxcnc.protocol import (
+    Address,
     LineBuffer,
     Response,
+    Timeouts,
     encode_command,
+    loop_time,
     parse_explanation,
     parse_response,
 )
-from drivers.controllers.linuxcnc.settings import Address, Timeouts, loop_time
+from drivers.errors import ConnectionLost, ResponseTimeout
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError, UsageError
 
@@ -258,3 +261,62 @@ async def _connect(
         reason = os.strerror(number) if number > 0 else error.strerror
         problem = f"cannot be reached: {reason or error}"
         raise ConnectionLost(problem, subject=address.name, action=start) from error
+
+
+PARSED_S = 0.02
+
+
+class SendArbiter:
+    """Two locks shared by the connections to one server: the line, and a stop in progress."""
+
+    def __init__(self) -> None:
+        self._line = asyncio.Lock()
+        self._stop = asyncio.Lock()
+
+    @asynccontextmanager
+    async def query_turn(self) -> AsyncIterator[None]:
+        """Send inside; the line is released after ``PARSED_S`` even if the answer is still awaited."""
+        await self._line.acquire()
+        release = _ReleaseOnce(self._line)
+        timer = asyncio.get_running_loop().call_later(PARSED_S, release)
+        try:
+            yield
+        finally:
+            timer.cancel()
+            release()
+
+    @asynccontextmanager
+    async def command_turn(self) -> AsyncIterator[None]:
+        """The same, but not before a stop in progress has ended."""
+        await self.stop_ended()
+        async with self.query_turn():
+            yield
+
+    @asynccontextmanager
+    async def exclusive(self) -> AsyncIterator[None]:
+        """Send inside, however long it takes; no other connection sends meanwhile."""
+        async with self._line:
+            yield
+
+    @asynccontextmanager
+    async def stopping(self) -> AsyncIterator[None]:
+        """Stop the machine inside: no command is sent meanwhile; stops run one after another."""
+        async with self._stop:
+            yield
+
+    async def stop_ended(self) -> None:
+        """Wait until no stop is in progress."""
+        async with self._stop:
+            pass
+
+
+class _ReleaseOnce:
+    """Releases a lock at the first call."""
+
+    def __init__(self, lock: asyncio.Lock) -> None:
+        self._lock: asyncio.Lock | None = lock
+
+    def __call__(self) -> None:
+        lock, self._lock = self._lock, None
+        if lock is not None:
+            lock.release()

@@ -8,7 +8,19 @@ from contextlib import contextmanager, suppress
 from pathlib import PurePath
 
 from drivers.controllers import reload_command
-from drivers.controllers.errors import (
+from drivers.controllers.linuxcnc import startup
+from drivers.controllers.linuxcnc.commands import ControllerCommands
+from drivers.controllers.linuxcnc.protocol import (
+    Address,
+    Timeouts,
+    loop_time,
+    parse_pose_refusal,
+    pose_difference,
+    restoring_block,
+    timed_move,
+)
+from drivers.controllers.linuxcnc.session import Session
+from drivers.errors import (
     CommandRefused,
     ConnectionLost,
     MotionInterrupted,
@@ -17,16 +29,6 @@ from drivers.controllers.errors import (
     ResponseTimeout,
     StartupNotPermitted,
 )
-from drivers.controllers.linuxcnc import startup
-from drivers.controllers.linuxcnc.commands import ControllerCommands
-from drivers.controllers.linuxcnc.protocol import (
-    parse_pose_refusal,
-    pose_difference,
-    restoring_block,
-    timed_move,
-)
-from drivers.controllers.linuxcnc.session import Session
-from drivers.controllers.linuxcnc.settings import Address, Timeouts, loop_time
 from drivers.interfaces import (
     ControllerStatus,
     DeviceIdentity,

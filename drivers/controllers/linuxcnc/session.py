@@ -22,14 +22,13 @@ from __future__ import annotations
 import asyncio
 from enum import Enum, auto
 
-from drivers.controllers.errors import ConnectionLost
 from drivers.controllers.linuxcnc import startup
 from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands, ErrorMessages
-from drivers.controllers.linuxcnc.connection import Connection
-from drivers.controllers.linuxcnc.send_arbiter import SendArbiter
-from drivers.controllers.linuxcnc.settings import Address, Timeouts, loop_time
+from drivers.controllers.linuxcnc.connection import Connection, SendArbiter
+from drivers.controllers.linuxcnc.protocol import Address, Timeouts, loop_time
 from drivers.controllers.linuxcnc.status_channel import StatusConnection
 from drivers.controllers.linuxcnc.stop import stop_in_place
+from drivers.errors import ConnectionLost
 from drivers.interfaces import ControllerStatus
 from drivers.wire_trace import TraceRecorder
 from hexacell.errors import DeviceError

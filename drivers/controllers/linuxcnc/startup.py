@@ -9,10 +9,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
-from drivers.controllers.errors import CommandRefused, MotionInterrupted
 from drivers.controllers.linuxcnc.commands import NO_REASON, ControllerCommands
-from drivers.controllers.linuxcnc.protocol import parse_number, parse_positions
-from drivers.controllers.linuxcnc.settings import Timeouts, loop_time
+from drivers.controllers.linuxcnc.protocol import Timeouts, loop_time, parse_number, parse_positions
+from drivers.errors import CommandRefused, MotionInterrupted
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import asyncio
 from contextlib import nullcontext
 
-from drivers.controllers.errors import ConnectionLost
 from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands, ErrorMessages
-from drivers.controllers.linuxcnc.connection import Connection
-from drivers.controllers.linuxcnc.send_arbiter import SendArbiter
-from drivers.controllers.linuxcnc.settings import Address, Timeouts
+from drivers.controllers.linuxcnc.connection import Connection, SendArbiter
+from drivers.controllers.linuxcnc.protocol import Address, Timeouts
+from drivers.errors import ConnectionLost
 from drivers.interfaces import ControllerStatus
 from drivers.wire_trace import TraceRecorder
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.connection import Connection
-from drivers.controllers.linuxcnc.settings import Address, Timeouts
+from drivers.controllers.linuxcnc.protocol import Address, Timeouts
 from drivers.wire_trace import TraceRecorder
 from hexacell.errors import DeviceError
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from drivers.encoders.dbc_signals import PositionSignal, read_database
+from drivers.encoders.dbc import PositionSignal, read_database
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
 from drivers.simulated.served_device import Closeable, Switch
 from hexacell.cell.described_devices import DbcSettings

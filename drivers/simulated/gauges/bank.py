@@ -6,16 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 
-from drivers.simulated.gauges.described import ByRequest, Streaming
-from drivers.simulated.gauges.displays import DigimaticUsb, HeidenhainNd, IdH, KeyenceDlRs1a
+from drivers.simulated.gauges.described import ByRequest, Scpi, Streaming, visa_resource
+from drivers.simulated.gauges.displays import DigimaticUsb, HeidenhainNd, IdH, KeyenceDlRs1a, Uwave
 from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
 from drivers.simulated.gauges.instruments import INSTRUMENTS as ASKED
 from drivers.simulated.gauges.instruments import Instrument
-from drivers.simulated.gauges.line_faults import LATE_TIMEOUTS, LineFault, LineFaults
 from drivers.simulated.gauges.modbus import Modbus
-from drivers.simulated.gauges.scpi import Scpi, visa_resource
-from drivers.simulated.gauges.server import GaugeLineServer
-from drivers.simulated.gauges.uwave import Uwave
+from drivers.simulated.gauges.server import LATE_TIMEOUTS, GaugeLineServer, LineFault, LineFaults
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.served_device import Closeable, Switch
 from hexacell.cell.described_devices import (

@@ -15,11 +15,15 @@ from hexacell.cli.terminal import is_interactive
 from hexacell.errors import AnswerNeeded, ExitCode, FileError, UsageError
 from hexacell.screen.assistant import FirstCellAssistant
 from hexacell.services.devices.device_diagnosis import diagnose
-from hexacell.services.devices.device_search import SearchFindings, SearchRequest, search_devices
-from hexacell.services.devices.found_cell import draft_of
+from hexacell.services.devices.device_search import SearchFindings, SearchRequest, draft_of, search_devices
 from hexacell.storage.atomic_files import require_creatable
-from hexacell.text.device_diagnosis import diagnosis_document, diagnosis_lines
-from hexacell.text.found_devices import cell_lines, search_document, search_lines
+from hexacell.text.found_devices import (
+    cell_lines,
+    diagnosis_document,
+    diagnosis_lines,
+    search_document,
+    search_lines,
+)
 from hexacell.text.layout import wrapped
 
 TCP_PORTS = 1 << 16

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 
-from drivers.controllers.errors import ConnectionLost
-from drivers.errors import BusError, GaugeSilent, PortLost, SilentNodeError, WrongAnswer
+from drivers.errors import BusError, ConnectionLost, GaugeSilent, PortLost, SilentNodeError, WrongAnswer
 from hexacell.cli.cell_argument import cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.dry_run.quick_level import try_quick_level

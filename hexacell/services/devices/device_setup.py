@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.encoders.of_controller import Zeros
-from drivers.foreign_errors import translated
 from drivers.interfaces import DeviceIdentity
+from drivers.libraries import translated
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.stop_input import stop_input_of
 from drivers.wire_trace import WireTrace

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from drivers.encoders import alarm_poll
-from drivers.encoders.alarm_poll import BUS_SHARE, AlarmPoll
+from drivers.encoders import node_monitor as alarm_poll
 from drivers.encoders.canopen_node import Leg
+from drivers.encoders.node_monitor import BUS_SHARE, AlarmPoll
 from drivers.encoders.object_dictionary import WARNINGS
 from drivers.errors import InvalidSampleError
 

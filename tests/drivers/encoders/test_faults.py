@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from drivers.encoders import alarm_poll, node_monitor
+from drivers.encoders import node_monitor
+from drivers.encoders import node_monitor as alarm_poll
 from drivers.encoders.can_bus import ERROR_FRAMES
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.errors import BusError, InvalidSampleError, RestartedNodeError, SilentNodeError

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.discovery.encoders import search_bus
-from drivers.discovery.frames import MAX_IDENTIFIERS, FoundFrame, OverheardFrames, of_no_node
+from drivers.discovery.encoders import MAX_IDENTIFIERS, FoundFrame, OverheardFrames, of_no_node, search_bus
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
 
 STRANGER, EXTENDED = 0x321, 0x18FF0001

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.encoders.cia406 import joint_variables
+from drivers.encoders.bank import joint_variables
 from drivers.encoders.of_controller import ControllerScales
 from drivers.errors import NotHomedError
 from hexacell.cell.devices import LinearEncoderSettings

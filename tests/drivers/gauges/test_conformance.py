@@ -7,14 +7,13 @@ from typing import Any
 
 from drivers.conformance import GaugeConformance, GaugeTwin, served_twin
 from drivers.gauges.cdi import CdiGauge
+from drivers.gauges.described import RequestGauge, StreamGauge
 from drivers.gauges.digimatic_usb import DigimaticUsbGauge
 from drivers.gauges.heidenhain_nd import HeidenhainGauge
 from drivers.gauges.keyence_dl_rs1a import KeyenceGauge
 from drivers.gauges.mitutoyo_id_h import IdHGauge
 from drivers.gauges.modbus import ModbusGauge
 from drivers.gauges.mux10 import Mux10Gauge
-from drivers.gauges.request import RequestGauge
-from drivers.gauges.stream import StreamGauge
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.gauges.uwave import UwaveGauge
 from drivers.gauges.visa import VisaGauge

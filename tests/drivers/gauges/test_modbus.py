@@ -19,7 +19,7 @@ from drivers.gauges.modbus import ModbusGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_instrument
 from drivers.simulated.gauges.indicator import Indicator
-from drivers.simulated.modbus_frames import crc
+from drivers.simulated.gauges.modbus import crc
 from drivers.wire_trace import WireTrace
 from hexacell.cell.described_devices import ModbusSettings
 from hexacell.cell.devices import GaugeSettings

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from drivers.errors import GaugeAtEnd, WrongAnswer, WrongSetting
-from drivers.gauges.request import RequestGauge
+from drivers.gauges.described import RequestGauge
 from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import simulated_instrument

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer
-from drivers.gauges.stream import StreamGauge
+from drivers.gauges.described import StreamGauge
 from drivers.gauges.streaming import Origin
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import simulated_instrument

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from pydantic import SecretStr
 
-from drivers.controllers.errors import MotionInterrupted, MoveRefused
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.encoders.cia406 import Cia406Bank
+from drivers.errors import MotionInterrupted, MoveRefused
 from drivers.gauges.cdi import CdiGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.sylvac import SylvacGauge

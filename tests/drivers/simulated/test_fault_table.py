@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.encoders import alarm_poll
+from drivers.encoders import node_monitor as alarm_poll
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.dbc import DbcBank
 from drivers.encoders.modbus import ModbusBank

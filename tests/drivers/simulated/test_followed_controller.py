@@ -8,8 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from drivers.simulated.followed_controller import FollowedController
-from drivers.simulated.joint_source import JointSource, joints_in
+from drivers.simulated.followed_controller import FollowedController, JointSource, joints_in
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedFault

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.simulated.gauge_places import GaugePlaces
+from drivers.simulated.physics import GaugePlaces
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.loader import load_cell

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.result_server import new_results
-from hexacell.result_server.new_results import NewResults
-from hexacell.result_server.published_result import ResultEvaluation, ResultState
+from hexacell.result_server import published_result as new_results
+from hexacell.result_server.published_result import NewResults, ResultEvaluation, ResultState
 from hexacell.runs.run_folder import runs_folder
 from hexacell.services.history.history import past_runs
 from hexacell.verdict.decision import Verdict

@@ -7,7 +7,7 @@ It answers ``5 100 200 300 400 500 600``: the number of the request, then the co
 import asyncio
 from itertools import count
 
-from drivers.encoders.cia406 import joint_variables
+from drivers.encoders.bank import joint_variables
 from drivers.errors import BusError, SilentNodeError
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from drivers.wire_trace import TraceRecorder

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused, ResponseTimeout
 from drivers.errors import (
     BusError,
+    ConnectionLost,
     GaugeAtEnd,
     GaugeSilent,
     GaugeUnsteady,
     InvalidSampleError,
+    MotionInterrupted,
+    MoveRefused,
     PortLost,
+    ResponseTimeout,
     RestartedNodeError,
     SilentNodeError,
     WrongSetting,

@@ -15,8 +15,7 @@ from typing import Any
 
 import pytest
 
-from drivers.controllers.errors import MotionInterrupted
-from drivers.errors import GaugeSilent, WrongSetting
+from drivers.errors import GaugeSilent, MotionInterrupted, WrongSetting
 from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading, StartupActions
 from hexacell.cell.measuring import GuardSettings
 from hexacell.errors import DeviceError

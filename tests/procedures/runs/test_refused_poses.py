@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.controllers.errors import PoseRefused
+from drivers.errors import PoseRefused
 from hexacell.campaign import planner
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.simulation import SoftLimits

@@ -10,7 +10,7 @@ from enum import Enum, auto
 import pytest
 
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
-from drivers.controllers.linuxcnc.settings import Timeouts
+from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.wire_trace import WireTrace
 from hexacell.cell.controller import ControllerSettings
 

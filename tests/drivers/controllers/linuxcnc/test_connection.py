@@ -6,8 +6,8 @@ import asyncio
 
 import pytest
 
-from drivers.controllers.errors import MoveRefused, ResponseTimeout
-from drivers.controllers.linuxcnc.settings import Timeouts
+from drivers.controllers.linuxcnc.protocol import Timeouts
+from drivers.errors import MoveRefused, ResponseTimeout
 from hexacell.errors import DeviceError
 from tests.drivers.controllers.linuxcnc.motion_dialogue import (
     ACK,

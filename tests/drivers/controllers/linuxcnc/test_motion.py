@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.controllers.errors import (
+from drivers.errors import (
     CommandRefused,
     ConnectionLost,
     MotionInterrupted,

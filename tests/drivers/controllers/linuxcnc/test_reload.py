@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from drivers.controllers.errors import ConnectionLost, StartupNotPermitted
+from drivers.errors import ConnectionLost, StartupNotPermitted
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
 

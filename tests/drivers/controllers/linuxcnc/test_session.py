@@ -7,10 +7,10 @@ import socket
 
 import pytest
 
-from drivers.controllers.errors import ConnectionLost, ResponseTimeout
 from drivers.controllers.linuxcnc.connection import without_passwords
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
-from drivers.controllers.linuxcnc.settings import Address, Timeouts
+from drivers.controllers.linuxcnc.protocol import Address, Timeouts
+from drivers.errors import ConnectionLost, ResponseTimeout
 from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import WireTrace
 from hexacell.cell.controller import ControllerSettings, RotaryControllerSettings

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.controllers.errors import CommandRefused, MotionInterrupted, MoveRefused, StartupNotPermitted
+from drivers.errors import CommandRefused, MotionInterrupted, MoveRefused, StartupNotPermitted
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose

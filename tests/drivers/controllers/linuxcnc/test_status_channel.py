@@ -6,8 +6,8 @@ import asyncio
 
 import pytest
 
-from drivers.controllers.errors import MotionInterrupted, MoveRefused
-from drivers.controllers.linuxcnc.send_arbiter import PARSED_S, SendArbiter
+from drivers.controllers.linuxcnc.connection import PARSED_S, SendArbiter
+from drivers.errors import MotionInterrupted, MoveRefused
 from drivers.interfaces import ControllerStatus, StartupAction
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from drivers.controllers.errors import MotionInterrupted
+from drivers.errors import MotionInterrupted
 from hexacell.errors import DeviceError
 from tests.drivers.controllers.linuxcnc.motion_dialogue import (
     ACK,

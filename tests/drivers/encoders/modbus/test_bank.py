@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from drivers.encoders import modbus as driver_module
-from drivers.encoders.modbus import ModbusBank
-from drivers.encoders.modbus_registers import RegisterSpan, counts_in, register_spans
+from drivers.encoders.modbus import ModbusBank, RegisterSpan, counts_in, register_spans
 from drivers.errors import BusError, InvalidSampleError, SilentNodeError, WrongSetting
 from drivers.interfaces import DeviceIdentity
 from drivers.serial.modbus_port import RefusedRequest

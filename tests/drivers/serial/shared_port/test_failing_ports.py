@@ -8,7 +8,7 @@ import pytest
 import serial
 
 from drivers.errors import PortLost
-from drivers.serial.errors import opening_errors
+from drivers.serial.opening import opening_errors
 from drivers.serial.shared_port import SharedSerialPort
 from hexacell.errors import DeviceError, ExitCode
 from tests.drivers.serial.shared_port.fake_port import LONG_S, FakePort, opened

@@ -10,7 +10,7 @@ from dataclasses import astuple
 import pytest
 
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
-from drivers.controllers.linuxcnc.settings import Timeouts
+from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.simulated.linuxcnc.server import HOST, SimulatedController
 from drivers.simulated.linuxcnc.state import KinematicsFailure
 from hexacell.cell.controller import ControllerSettings

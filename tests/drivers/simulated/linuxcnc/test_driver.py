@@ -8,7 +8,9 @@ from functools import partial
 
 import pytest
 
-from drivers.controllers.errors import (
+from drivers.controllers.linuxcnc.controller import LinuxcncrshController
+from drivers.controllers.linuxcnc.protocol import Timeouts
+from drivers.errors import (
     ConnectionLost,
     MotionInterrupted,
     MoveRefused,
@@ -16,8 +18,6 @@ from drivers.controllers.errors import (
     ResponseTimeout,
     StartupNotPermitted,
 )
-from drivers.controllers.linuxcnc.controller import LinuxcncrshController
-from drivers.controllers.linuxcnc.settings import Timeouts
 from drivers.interfaces import StartupAction
 from drivers.simulated.linuxcnc.mdi import ModalState
 from drivers.simulated.linuxcnc.server import SimulatedController

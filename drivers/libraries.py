@@ -1,13 +1,33 @@
-"""Errors of other libraries, as errors of the device: a driver from elsewhere may let them through."""
+"""Libraries that only some devices need: imported when a cell has one of these, and named when missing."""
 
 from __future__ import annotations
 
 import functools
 import inspect
 from collections.abc import Awaitable, Callable
+from importlib import import_module
 from typing import Any, TypeVar, cast
 
-from hexacell.errors import DeviceError, HexacellError
+from hexacell.errors import DeviceError, HexacellError, UsageError
+
+PROJECT = "hexacell"
+
+
+def optional(module: str, extra: str, subject: str) -> Any:  # noqa: ANN401 - a module, of whatever type
+    """The module of an optional library.
+
+    Raises:
+        UsageError: it is not installed; the message has the command.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise UsageError(
+            f"needs {module.partition('.')[0]}, which is not installed ({error})",
+            subject=subject,
+            action=f"Type: pip install '{PROJECT}[{extra}]'",
+        ) from error
+
 
 LIBRARIES = frozenset({"serial", "can", "canopen", "termios", "pyvisa", "pymodbus", "cantools"})
 """Modules whose exceptions are about a device."""

@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 
 from drivers.simulated import robot
-from hexacell.campaign import feasibility
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.design.continuous_design import pose_bound
-from procedures.calibration import measuring, workflow
+from hexacell.design.search_effort import SearchEffort
+from hexacell.services import search_effort
 from procedures.run import events
 
 FREE: dict[str, Any] = {
@@ -48,6 +48,10 @@ SMALL: dict[str, Any] = FREE | {
 """As few poses as identify it, by dotted keys of the cell file."""
 
 
+FEW_CHOICES = SearchEffort(candidates=64, held_out_candidates=128, checked_candidates=8, checked_robots=4)
+"""Poses are chosen among few, and a plan is checked on few robots: what is chosen is not under test."""
+
+
 def changed(section: Any, changes: dict[str, Any]) -> Any:
     """A section of the cell file with other values at some dotted keys."""
     for key, value in changes.items():
@@ -58,9 +62,8 @@ def changed(section: Any, changes: dict[str, Any]) -> Any:
 
 
 def choose_among_few(patch: pytest.MonkeyPatch) -> None:
-    """Choose among few poses, and move there in few pieces: what is chosen is not under test."""
-    patch.setattr(workflow, "CANDIDATES", 64)
-    patch.setattr(measuring, "HELD_OUT_CANDIDATES", 128)
+    """Have the program's services choose among few poses, and the simulated robot move in few pieces."""
+    patch.setattr(search_effort, "EFFORT", FEW_CHOICES)
     patch.setattr(robot, "LINE_STEPS", 8)
     bound_roughly(patch)
 
@@ -74,11 +77,9 @@ def bound_roughly(patch: pytest.MonkeyPatch) -> None:
 
 @contextmanager
 def few_candidates() -> Iterator[None]:
-    """The same for a while, with a plan that is checked on few robots and poses."""
+    """The same for a while."""
     with pytest.MonkeyPatch.context() as patch:
         choose_among_few(patch)
-        patch.setattr(feasibility, "CANDIDATES", 8)
-        patch.setattr(feasibility, "ROBOTS", 4)
         yield
 
 

@@ -20,16 +20,10 @@ from hexacell.motion.path_check import is_clear
 from hexacell.robot.pose_limits import broken_limits
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 
-ROBOTS = 32
-"""Number of robots drawn within the tolerances."""
-
 LARGEST_SHARE = 0.5
 """Of these robots, that may be unable to take the reference of a point."""
 
 NAMES_SHOWN = 4
-
-CANDIDATES = 128
-"""Enough to see whether there is any orientation."""
 
 UNDETERMINED_SHARE = 0.25
 """Of all parameters. If fewer stay as uncertain as drawn, the result reports them; if more, the plan is
@@ -128,7 +122,9 @@ def unreachable_share(plan: Plan) -> dict[int, float]:
     Nor do those that would have a passive joint or a leg beyond its limits there.
     """
     references = plan.robot.from_commands([plan.reference_pose(point) for point in plan.points])
-    robots = robots_within_tolerances(plan.robot, ROBOTS, plan.settings.identification.seed)
+    robots = robots_within_tolerances(
+        plan.robot, plan.effort.checked_robots, plan.settings.identification.seed
+    )
     can_stand = np.array([VirtualRobot(plan.robot, truth).can_stand(references) for truth in robots])
     unreachable = 1.0 - can_stand.mean(axis=0)
     return dict(zip(plan.points, unreachable.tolist(), strict=True))
@@ -170,7 +166,8 @@ def _blocked_line(ends: str) -> ReachError:
 
 def _points_without_poses(plan: Plan) -> Iterator[list[HexacellError]]:
     """Points at which no pose is safe: the first ones as known now, the others as known later."""
-    plan = replace(plan, candidates=min(plan.candidates, CANDIDATES))
+    fewer = min(plan.effort.candidates, plan.effort.checked_candidates)
+    plan = replace(plan, effort=replace(plan.effort, candidates=fewer))
     now, later = plan.robot.belief(), plan.predicted_belief()
     failures: dict[int, HexacellError | None] = {}
     for point in plan.points:

@@ -34,8 +34,6 @@ from hexacell.kinematics.rotations import Array
 SET_SIZES = (1, 2, 4, 8, 16, 32)
 """Numbers of records at a point whose gain is compared with their time."""
 
-CANDIDATES = 64
-
 
 @dataclass(frozen=True, slots=True)
 class PointRanking:
@@ -248,12 +246,16 @@ class PlannedInformation:
         return added - self.information(point, before) if before else added
 
 
-def select_sets(drawn: RobotBelief, points: Array, records: int, seed: int) -> tuple[PoseBatch, ...]:
+def select_sets(
+    drawn: RobotBelief, points: Array, records: int, seed: int, candidate_count: int
+) -> tuple[PoseBatch, ...]:
     """Sets of ``records`` poses at ball positions (m, 3), mm, the reference first in each.
 
     In the mechanism's frame convention; empty where the robot cannot go.
     """
-    rotated = candidates.orientations(CANDIDATES, drawn.limits.tilt, seed, most_twist=drawn.limits.turn)
+    rotated = candidates.orientations(
+        candidate_count, drawn.limits.tilt, seed, most_twist=drawn.limits.turn
+    )
     orientations = drawn.limits.orientations(np.concatenate([np.eye(3)[None], rotated]))
     return tuple(_select(drawn, PoseBatch.at(point, orientations), records) for point in points)
 

@@ -27,9 +27,6 @@ FIRST_PILOT = MOST_POSES + 1
 CAUTION = 3.0
 """By how much the noise may exceed what is stated, as far as pilot poses are concerned."""
 
-PILOT_CANDIDATES = 256
-"""Orientations that each is chosen from: with four times as many the records are as good."""
-
 PER_DEPARTURE, MOST_PILOTS = 3, 14
 """Pilot poses before the robot comes back to the reference, and in all."""
 

@@ -27,7 +27,6 @@ from hexacell.campaign.forecast import Forecaster, select_sets
 from hexacell.campaign.pilots import (
     CAUTION,
     FIRST_PILOT,
-    PILOT_CANDIDATES,
     most_pilots,
     pilots_per_departure,
 )
@@ -39,6 +38,7 @@ from hexacell.campaign.recursive_estimator import OnlineEstimate, OnlineEstimato
 from hexacell.campaign.stopping_rules import Goal, StoppingRules
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
+from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.errors import IdentifiabilityError, LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -48,7 +48,6 @@ from hexacell.motion.paths import find_route
 from hexacell.motion.standing import stands_within_limits
 from hexacell.robot.model import Robot
 
-CANDIDATES = 1024
 PROVISIONAL_SIGMA = float(np.radians(2.0))
 """Standard deviation of the platform's orientation, rad, beyond which the controller does not command
 with the estimate: after a whole point it is below one degree, after two records seven."""
@@ -63,7 +62,7 @@ class Plan:
 
     Attributes:
         pose_list: poses to visit; none where they are to be selected.
-        candidates: number of candidate orientations for each record.
+        effort: of the search for poses.
         with_forecast: whether to forecast for every record what it gains at the task poses.
         estimator: of the robot from the records; none for the usual one.
         goal: what the records are for; none to identify the geometry as well as the settings ask for.
@@ -75,7 +74,7 @@ class Plan:
     settings: CellSettings
     robot: Robot
     pose_list: PoseList | None = None
-    candidates: int = CANDIDATES
+    effort: SearchEffort = USUAL_EFFORT
     with_forecast: bool = True
     estimator: RecordEstimator | None = None
     goal: Goal | None = None
@@ -127,14 +126,14 @@ class Plan:
     @cached_property
     def cautious(self) -> Plan:
         """The same before the noise is measured, which may be larger than stated; poses are not listed."""
-        robot = replace(self.robot, noise=self.robot.noise.scaled(CAUTION))
+        robot, effort = replace(self.robot, noise=self.robot.noise.scaled(CAUTION)), self.effort
         listed = self.pose_list.at(self.points[0]) if self.pose_list is not None else ()
         turns = (listed[0].angle_to(pose) for pose in listed)
         return replace(
             self,
             robot=robot,
             pose_list=None,
-            candidates=min(self.candidates, PILOT_CANDIDATES),
+            effort=replace(effort, candidates=min(effort.candidates, effort.pilot_candidates)),
             estimator=None,
             with_forecast=False,
             most_turned=max(turns, default=np.pi),
@@ -230,7 +229,7 @@ class Plan:
             self.robot,
             self.pose_list,
             self.task,
-            self.candidates,
+            self.effort,
             known_then,
             self.most_turned,
         )
@@ -252,7 +251,9 @@ class Plan:
             return tuple(map(self.robot.from_commands, self.pose_list.poses))
         plan = self.settings.identification
         balls = self.robot.from_commands(Pose(*point) for point in plan.points).positions
-        return select_sets(self.robot.belief(), balls, plan.orientations, plan.seed)
+        return select_sets(
+            self.robot.belief(), balls, plan.orientations, plan.seed, self.effort.planned_candidates
+        )
 
     @cached_property
     def forecaster(self) -> Forecaster:

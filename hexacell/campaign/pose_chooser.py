@@ -13,11 +13,11 @@ from hexacell.campaign.pose_list import PoseList, without_visited
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.design import candidates
-from hexacell.design.candidate_refinement import QUICK, THOROUGH, Rounds
 from hexacell.design.candidates import Amplitudes
 from hexacell.design.criteria import D_OPTIMAL, Criterion
 from hexacell.design.pose_selection import SelectedPose, select_from_list, select_pose
 from hexacell.design.predicted_records import GaugeZero
+from hexacell.design.search_effort import SearchEffort
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.identified_zeros import ParameterChoice, zero_columns
@@ -31,9 +31,6 @@ from hexacell.robot.model import Robot
 WELL_KNOWN_SIGMA = np.radians(0.5)
 """Standard deviation of the platform's orientation below which large rotations are safe, and most
 informative."""
-
-LATE_RECORDS = 44
-"""From so many on candidates are refined less, so that a decision with most to fit takes no longer."""
 
 FIRST_TURN = np.radians(0.3)
 """Of the first pose of all, rad. Of robots within the tolerances that can stand at the first reference, two
@@ -50,7 +47,7 @@ class PoseChooser:
     Attributes:
         pose_list: poses to visit; none where they are to be selected.
         task: where the robot has to be accurate.
-        candidates: number of candidate orientations.
+        effort: of the search.
         known_then: gives the covariance (p, p) once all that is planned is measured but the next record,
             which has to gain beside it as soon as the robot is well known; none where the plan may end
             sooner.
@@ -61,7 +58,7 @@ class PoseChooser:
     robot: Robot
     pose_list: PoseList | None
     task: Task
-    candidates: int
+    effort: SearchEffort
     known_then: Callable[[RobotBelief, CampaignState], Array] | None = None
     most_turned: float = np.pi
 
@@ -131,7 +128,8 @@ class PoseChooser:
         most = min(self.most_turned, FIRST_TURN) if is_blind else self.most_turned
         turns = self._turns(belief.limits, state, well_known, most, tilt_share)
         known_then = self.known_then(belief, state) if well_known and self.known_then else None
-        rounds = () if most < np.pi else _rounds(state)  # they would turn candidates further
+        refinement = self.effort.refinement(len(state.measurements))
+        rounds = () if most < np.pi else refinement  # which would turn candidates further
         return select_pose(planner, zero, turns, self._criterion(belief), known_then, rounds)
 
     def _turns(
@@ -139,7 +137,7 @@ class PoseChooser:
     ) -> Array:
         """Candidates (n, 3, 3), relative to the platform's orientation at the reference."""
         # The best are refined: more candidates are needed only where few of them are safe.
-        count = self.candidates // 2 if well_known else self.candidates
+        count = self.effort.candidates // (2 if well_known else 1)
         amplitudes = Amplitudes.MOSTLY_LARGE if well_known else Amplitudes.ALL_SCALES
         tilt, turn = min(tilt_share * limits.tilt, most), min(limits.turn, most)
         turns = candidates.orientations(count, tilt, self._seed(state), amplitudes, turn)
@@ -162,10 +160,6 @@ class PoseChooser:
         point = state.point or 0
         attempt = state.records_at(point) + 100 * state.rejections + 10_000 * len(state.pilots)
         return self.settings.identification.seed + 1000 * point + attempt
-
-
-def _rounds(state: CampaignState) -> Rounds:
-    return QUICK if len(state.measurements) >= LATE_RECORDS else THOROUGH
 
 
 def is_well_known(belief: RobotBelief, zero: GaugeZero) -> bool:

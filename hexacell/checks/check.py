@@ -15,12 +15,13 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.campaign.forecast import PlannedInformation
-from hexacell.campaign.planner import CANDIDATES, Plan
+from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.recursive_estimator import OnlineEstimator, RecordEstimator
 from hexacell.cell.model import CellSettings
 from hexacell.checks.change_alarm import ChangeTest, change_test
 from hexacell.checks.drift_estimator import GUARDED_SCALE, DriftEstimator, ScaledEstimate
+from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record, RecordId
@@ -51,7 +52,7 @@ class Check:
         effects: the systematic ones. A check shares the constant ones with the result before it, so that
             its records do not reduce them.
         earlier: what these did to that result, as errors (p, k) of its free parameters by effect.
-        candidates: number of candidate orientations for each record.
+        effort: of the search for poses.
         left_points: points that are not measured, counted from 1.
     """
 
@@ -63,7 +64,7 @@ class Check:
     listed: PoseList | None = None
     effects: tuple[Effect, ...] = ()
     earlier: Mapping[str, Array] = field(default_factory=dict)
-    candidates: int = CANDIDATES
+    effort: SearchEffort = USUAL_EFFORT
     left_points: frozenset[int] = frozenset()
 
     @cached_property
@@ -74,7 +75,7 @@ class Check:
             check_settings(self.settings, self.budget, len(self.left_points)),
             self.robot if drifting is None else drifting.robot,
             self.listed,
-            self.candidates,
+            self.effort,
             estimator=self._by_drawing if drifting is None else drifting,
             goal=self,
             earlier=self.earlier,

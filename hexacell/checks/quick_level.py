@@ -88,7 +88,7 @@ class QuickLevel:
             check_settings(check.settings, self.budget, len(check.left_points)),
             drifting.robot,
             check.listed,
-            check.candidates,
+            check.effort,
             estimator=drifting,
             goal=self,
             earlier=check.earlier,

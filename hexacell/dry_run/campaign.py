@@ -28,7 +28,6 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 from hexacell.uncertainty.budget import UncertaintyBudget
 
-ROBOTS = 2
 MOST_TRIED = 6
 
 VisitedPose = tuple[int, int, Pose]
@@ -200,12 +199,12 @@ class DryRunResult:
     visited: tuple[VisitedPose, ...] = ()
 
 
-def dry_run(plan: Plan, robots: int = ROBOTS) -> DryRunResult:
+def dry_run(plan: Plan) -> DryRunResult:
     """Carry the plan out on a few robots. Takes a second or two for each."""
     identified: list[_Outcome] = []
     tried = 0
     for truth in robots_within_tolerances(plan.robot, MOST_TRIED, plan.settings.identification.seed):
-        if len(identified) == robots:
+        if len(identified) == plan.effort.dry_run_robots:
             break
         outcome = _carry_out(plan, truth, tried)
         identified += [] if outcome is None else [outcome]

@@ -18,9 +18,6 @@ from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.verdict.decision import ErrorLimits
 
-CANDIDATES = 256
-"""Fewer than a run has: how wide the poses are hardly changes."""
-
 
 def predicted_verdicts(
     plan: Plan, found: Identification, budget: UncertaintyBudget | None
@@ -62,7 +59,10 @@ def with_held_out_records(plan: Plan, found: Identification) -> Identification:
 def _records(plan: Plan, robot: Robot, found: Identification) -> Iterator[Record]:
     settings, belief = plan.settings.verification, robot.belief(found)
     turns = candidates.orientations(
-        CANDIDATES, belief.limits.tilt, settings.seed, most_twist=belief.limits.turn
+        plan.effort.forecast_held_out_candidates,
+        belief.limits.tilt,
+        settings.seed,
+        most_twist=belief.limits.turn,
     )
     first, used = 1 + max(plan.points), found.poses.rotations
     own, held_out = plan.settings.identification.points, settings.points

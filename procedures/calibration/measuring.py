@@ -11,8 +11,6 @@ from procedures.calibration.noise_steps import NoiseSteps
 from procedures.calibration.set_steps import SetSteps
 from procedures.calibration.trial_steps import TrialSteps
 
-HELD_OUT_CANDIDATES = 2048
-
 
 class Measuring:
     """What is measured, for the geometries that command the robot of a plan.
@@ -32,7 +30,7 @@ class Measuring:
         self.points = IdentificationSteps(
             plan, sets, plan.settings.identification.provisional, noise, trials
         )
-        self.held_out_poses = HeldOutPoses(plan.settings, plan.robot, HELD_OUT_CANDIDATES)
+        self.held_out_poses = HeldOutPoses(plan.settings, plan.robot, plan.effort.held_out_candidates)
         self.held_out = HeldOutSteps(len(plan.settings.verification.points), sets, trials)
         fixture = plan.settings.length_check
         self.length = None if fixture is None else LengthSteps(fixture, sets, trials)

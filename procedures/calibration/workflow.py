@@ -24,6 +24,7 @@ from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.cell.model import CellSettings
 from hexacell.checks.check import Check, identified_before
 from hexacell.checks.quick_level import QuickLevel
+from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.errors import HexacellError
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.solver.result import Identification
@@ -42,8 +43,6 @@ from procedures.calibration.measuring import Measuring
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Phase, SixNumbers, Step
-
-CANDIDATES = 1024
 
 
 class Mode(StrEnum):
@@ -66,6 +65,7 @@ class Calibration:
         measured_noise: what settings and robot contain of it; none before it is measured.
         length_check: whether the length scale of a calibration is checked.
         removed: what a person took out of the plan; see :meth:`without`.
+        effort: of the search for poses.
     """
 
     settings: CellSettings
@@ -76,6 +76,7 @@ class Calibration:
     measured_noise: MeasuredNoise | None = None
     length_check: bool = False
     removed: RemovedPoses = NOTHING_REMOVED
+    effort: SearchEffort = USUAL_EFFORT
 
     def __post_init__(self) -> None:
         # Checks, and the quick level that carries one on, have to do with all that may have drifted.
@@ -124,7 +125,7 @@ class Calibration:
             self.listed,
             robot.effects,
             {} if accepted is None else accepted.parameter_columns,
-            CANDIDATES,
+            self.effort,
             frozenset(self.removed.points),
         )
 
@@ -341,7 +342,7 @@ class Calibration:
 
     def _calibrating(self, robot: Robot) -> Plan:
         left_points = frozenset(self.removed.points)
-        return Plan(self.settings, robot, self.listed, CANDIDATES, left_points=left_points)
+        return Plan(self.settings, robot, self.listed, self.effort, left_points=left_points)
 
     @cached_property
     def _with_noise(self) -> dict[MeasuredNoise, Calibration]:

@@ -52,7 +52,7 @@ from procedures.run import events
 from procedures.run.state import RunState, apply, fold
 from procedures.run.steps import Phase, SetKey
 from tests.benchmarks.virtual_calibration import measured_held_out
-from tests.small_cell import SMALL, changed, few_candidates, write_small_cell
+from tests.small_cell import FEW_CHOICES, SMALL, changed, few_candidates, write_small_cell
 
 FIRST_NIGHT = datetime(2026, 3, 1, 2, 30, tzinfo=UTC)
 LIMIT_MM, LIMIT_DEG = 0.25, 0.1
@@ -143,7 +143,7 @@ class Year:
     def true_error_mm(self, number: int) -> float:
         """The largest position error at the task poses with the config of now, best frames taken off."""
         robot = robot_of(self.cell)
-        calibration = Calibration(self.cell.settings, robot, Mode.OPTIMISE)
+        calibration = Calibration(self.cell.settings, robot, Mode.OPTIMISE, effort=FEW_CHOICES)
         jacobian = calibration.plan.task.jacobian(robot.belief())
         assert jacobian is not None
         free = robot.mechanism.convention.free_parameters(self.truth(number))

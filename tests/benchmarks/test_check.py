@@ -22,6 +22,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.checks.check import Check, identified_before
+from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
@@ -41,7 +42,7 @@ LIMIT_MM = LIMITS.position_mm
 DRIFT_MM = 0.02
 BUDGET = 40
 SIGMAS = 3.0
-CANDIDATES = 128
+EFFORT = SearchEffort(candidates=128)
 DIRECTIONS = 8
 ALLOWANCE = 1.5 / RUNS
 """Of every share: one robot more or less is no finding."""
@@ -63,7 +64,7 @@ class Calibrated:
     def check(self) -> Check:
         settings = load_cell(bundled_config("simulated-hexaglide")).settings
         before = identified_before(self.robot, self.covariance, DRIFT_MM)
-        return Check(settings, self.robot, before, LIMITS, BUDGET, candidates=CANDIDATES)
+        return Check(settings, self.robot, before, LIMITS, BUDGET, effort=EFFORT)
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ def calibrated() -> Calibrated:
     assert cell.settings.simulation is not None
     actual = Geometry.of(robot.mechanism.parameters, cell.settings.simulation.geometry.model_dump())
     truth = robot.mechanism.normalize_frames(actual)[0]
-    plan = Plan(cell.settings, robot, candidates=CANDIDATES, with_forecast=False)
+    plan = Plan(cell.settings, robot, effort=EFFORT, with_forecast=False)
     campaign = VirtualCampaign(plan, VirtualRobot(robot, truth, np.random.default_rng(1)))
     campaign.carry_out()
     found = identify(robot.problem(campaign.measurements))

@@ -24,6 +24,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.checks.check import Check, identified_before
 from hexacell.checks.quick_level import QuickLevel
+from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.estimator import identify
@@ -47,7 +48,7 @@ LARGE_MM, SMALL_MM = 0.2, 0.01
 STATED_MM = 0.02
 """What the cell file states a parameter may have drifted, one sigma."""
 
-CANDIDATES = 128
+EFFORT = SearchEffort(candidates=128)
 PARITY = 70
 ALLOWANCE = 1.5 / ROBOTS
 
@@ -63,9 +64,7 @@ class Calibrated:
         settings = bundled().settings
         before = identified_before(self.robot, self.covariance, drift_mm)
         limits = ErrorLimits.of(settings.acceptance)
-        return QuickLevel(
-            Check(settings, self.robot, before, limits, budget, candidates=CANDIDATES), budget
-        )
+        return QuickLevel(Check(settings, self.robot, before, limits, budget, effort=EFFORT), budget)
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ def calibrated() -> Calibrated:
 
 
 def whole_campaign(cell: Cell, robot: Robot, truth: Geometry, seed: int) -> VirtualCampaign:
-    plan = Plan(cell.settings, robot, candidates=CANDIDATES, with_forecast=False)
+    plan = Plan(cell.settings, robot, effort=EFFORT, with_forecast=False)
     campaign = VirtualCampaign(plan, VirtualRobot(robot, truth, np.random.default_rng(seed)))
     campaign.carry_out()
     return campaign

@@ -6,21 +6,20 @@ import os
 import pty
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 
 from hexacell.cli.app import main
-from hexacell.dry_run.campaign import dry_run
+from hexacell.services import search_effort
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from tests.cli.cell_folder import QUICK, SHORT, CellFolder, copy_cell
 from tests.cli.commands import Outcome, Start, run_command, started_in
 from tests.cli.terminal import Terminal
 from tests.made_once import made_once
-from tests.small_cell import bound_roughly
+from tests.small_cell import FEW_CHOICES, bound_roughly
 
 
 @pytest.fixture
@@ -72,7 +71,7 @@ def typed_here(
 @pytest.fixture
 def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     """Predict on a single robot and from few poses: the output is under test, not its quality."""
-    monkeypatch.setattr("hexacell.services.records.offline.dry_run", partial(dry_run, robots=1))
+    monkeypatch.setattr(search_effort, "EFFORT", replace(search_effort.EFFORT, dry_run_robots=1))
 
 
 @pytest.fixture
@@ -84,10 +83,7 @@ def rough_bound(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def few_candidates(monkeypatch: pytest.MonkeyPatch, rough_bound: None) -> None:
     """Choose among few poses in this process, and check the plan on few; neither is under test."""
-    monkeypatch.setattr("hexacell.campaign.feasibility.CANDIDATES", 8)
-    monkeypatch.setattr("hexacell.campaign.feasibility.ROBOTS", 4)
-    monkeypatch.setattr("procedures.calibration.workflow.CANDIDATES", 64)
-    monkeypatch.setattr("procedures.calibration.measuring.HELD_OUT_CANDIDATES", 128)
+    monkeypatch.setattr(search_effort, "EFFORT", FEW_CHOICES)
 
 
 @pytest.fixture

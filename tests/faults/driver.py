@@ -29,8 +29,9 @@ import hexacell.cli.commands.simulate
 from drivers.simulated import cell as simulated_cell
 from drivers.simulated import robot
 from hexacell.cli.app import main
+from hexacell.design.search_effort import SearchEffort
 from hexacell.plugins import Group, load
-from procedures.calibration import measuring, workflow
+from hexacell.services import search_effort
 from procedures.journal import journal
 from tests.faults.interception import Failing, intercepted
 from tests.faults.pulling import pull_out
@@ -89,7 +90,8 @@ def serve() -> None:
         (Group.CONFIG_FORMATS, "toml"),
     ):
         load(group, name)
-    workflow.CANDIDATES, measuring.HELD_OUT_CANDIDATES, robot.LINE_STEPS = 64, 64, 8
+    search_effort.EFFORT = SearchEffort(candidates=64, held_out_candidates=64)
+    robot.LINE_STEPS = 8
     scipy.stats.qmc.Sobol(3).random(2)  # which reads a file that not everybody may read
     print("ready", flush=True)
     for line in sys.stdin:

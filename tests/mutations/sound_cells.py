@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from hexacell.campaign import feasibility
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.certificates import CertificateSettings, ReportSettings
 from hexacell.cell.devices import ThermometerSettings
@@ -48,8 +47,6 @@ def few_choices() -> Iterator[None]:
     """Choose among few poses, without a terminal: what is chosen is not under test."""
     with pytest.MonkeyPatch.context() as patch:
         choose_among_few(patch)
-        patch.setattr(feasibility, "CANDIDATES", 8)
-        patch.setattr(feasibility, "ROBOTS", 4)
         patch.setattr("hexacell.cli.commands.run.is_interactive", lambda: False)
         yield
 

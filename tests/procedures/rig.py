@@ -31,7 +31,7 @@ from procedures.run import events
 from procedures.run.questions import QuestionBroker
 from tests.native_config import NATIVE
 from tests.procedures.fakes import Approver, Bench
-from tests.small_cell import SMALL, changed, history_until
+from tests.small_cell import FEW_CHOICES, SMALL, changed, history_until
 
 
 @dataclass
@@ -73,6 +73,7 @@ class Rig:
             self.mode,
             accepted=self.accepted,
             length_check=self.length_check,
+            effort=FEW_CHOICES,
         )
         self.performer = StepExecutor(
             self.cell, self.calibration, bench.devices, self.clock, self.operator, self.folder

@@ -27,6 +27,7 @@ from hexacell.noise.averaging import WINDOWS, AveragingForecaster, mean_of_indep
 from hexacell.noise.measured_noise import AveragingForecast, with_measured_noise
 from hexacell.robot.model import robot_of
 from hexacell.runs.run_folder import RunFolder
+from hexacell.services import search_effort
 from hexacell.services.recorded.recorded_commands import commanding_geometries, noise_of_run
 from hexacell.services.records.stated_poses import require_points
 from hexacell.verdict.assessment import Assessment, assess
@@ -141,7 +142,8 @@ def plan_of(cell: Cell, removed: RemovedPoses = NOTHING_REMOVED) -> Plan:
     """The plan of a cell; raises ``FileError`` if its config or its list of poses cannot be read."""
     robot = replace(robot_of(cell), refused=removed.refused)
     listed = removed.left_of(pose_list_of(cell))
-    return Plan(cell.settings, robot, listed, left_points=frozenset(removed.points))
+    left = frozenset(removed.points)
+    return Plan(cell.settings, robot, listed, search_effort.EFFORT, left_points=left)
 
 
 def _state_of_records(plan: Plan, measurements: MeasurementSet, rejections: int) -> CampaignState:

@@ -18,6 +18,7 @@ from hexacell.config.current import CurrentConfig
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
 from hexacell.robot.model import config_layout, controller_geometry, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services import search_effort
 from hexacell.services.devices.changed_devices import with_changes
 from hexacell.services.devices.device_setup import Connected, device_addresses, open_devices
 from hexacell.services.recorded.journal_soundness import require_sound
@@ -298,6 +299,7 @@ def calibration_of_run(cell: Cell, started: events.RunStarted) -> Calibration:
         pose_list_of(cell),
         started.accepted,
         length_check=started.length_check,
+        effort=search_effort.EFFORT,
     ).without(started.removed)
 
 
@@ -327,5 +329,11 @@ def new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Ca
             action="Calibrate it with `hexacell run CELL --length-check`, which checks the scale as well",
         )
     return Calibration(
-        cell.settings, robot_of(cell), mode, pose_list_of(cell), accepted, length_check=length_check
+        cell.settings,
+        robot_of(cell),
+        mode,
+        pose_list_of(cell),
+        accepted,
+        length_check=length_check,
+        effort=search_effort.EFFORT,
     )

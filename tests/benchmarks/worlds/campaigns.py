@@ -84,7 +84,7 @@ def setting(number: int) -> Setting:
     ).positions
     random = np.random.default_rng([17, number])
     parts, labels = [], []
-    for point, chosen in enumerate(select_sets(belief, points, RECORDS + 4, 1), start=1):
+    for point, chosen in enumerate(select_sets(belief, points, RECORDS + 4, 1, 64), start=1):
         aimed = chosen.positions + random.uniform(-AIM_MM, AIM_MM, chosen.positions.shape)
         _, commands = reachable(belief, PoseBatch(aimed, chosen.rotations))
         if len(commands) < RECORDS:

@@ -13,12 +13,13 @@ from hexacell.campaign.decisions import CampaignState, Decision, Finished, Finis
 from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
+from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import config_layout, make_robot
 from hexacell.robot.virtual_robot import VirtualRobot
 
-FEW = 64
+FEW = SearchEffort(candidates=64, dry_run_robots=1)
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 MakePlan = Callable[..., Plan]
 

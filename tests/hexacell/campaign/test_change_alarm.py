@@ -11,6 +11,7 @@ from hexacell.campaign.decisions import Finished
 from hexacell.checks.change_alarm import FIRST_RECORDS
 from hexacell.checks.check import Check, identified_before
 from hexacell.checks.check_result import change_alarm, check_result
+from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
@@ -30,7 +31,9 @@ def check(make_plan, paper) -> Check:
     normal, frames = plan.robot.mechanism.normalize_frames(paper.actual)
     robot = replace(plan.robot, controller=normal, frames=frames)
     before = identified_before(robot, SIGMA_MM**2 * np.eye(len(robot.mechanism.parameters)), 0.02)
-    return Check(plan.settings, robot, before, ErrorLimits(0.15, 0.05), 40, candidates=32)
+    return Check(
+        plan.settings, robot, before, ErrorLimits(0.15, 0.05), 40, effort=SearchEffort(candidates=32)
+    )
 
 
 def measured(check: Check, name: str = "", change_mm: float = 0.0, seed: int = 1) -> MeasurementSet:

@@ -12,6 +12,7 @@ import pytest
 from hexacell.campaign.decisions import CampaignState
 from hexacell.checks.check import FEWEST_POINTS, Check, check_settings, identified_before
 from hexacell.checks.drift_estimator import DriftEstimator
+from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
@@ -49,7 +50,7 @@ def make_check(make_plan, paper) -> MakeCheck:
         parameters = len(robot.mechanism.parameters)
         covariance = SIGMA_MM**2 * np.eye(parameters)
         before = identified_before(robot, covariance, 0.02) if calibrated else None
-        return Check(plan.settings, robot, before, LIMITS, budget, candidates=32)
+        return Check(plan.settings, robot, before, LIMITS, budget, effort=SearchEffort(candidates=32))
 
     return make
 

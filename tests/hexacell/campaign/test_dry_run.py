@@ -28,7 +28,7 @@ SMALL = {
 
 @pytest.fixture(scope="module")
 def result(make_plan):
-    return dry_run(make_plan(**SMALL), robots=1)
+    return dry_run(make_plan(**SMALL))
 
 
 def test_the_result_is_that_of_a_campaign(result, campaign, two_points):
@@ -44,13 +44,13 @@ def test_systematic_effects_widen_the_expanded_uncertainty(result, make_plan):
     plan = make_plan(**SMALL)
     stated = plan.settings.model_copy(update={"uncertainty": UncertaintySettings(grade="ordinary")})
     machine = replace(plan.robot, effects=stated_effects(stated))
-    wider = dry_run(replace(plan, settings=stated, robot=machine), robots=1)
+    wider = dry_run(replace(plan, settings=stated, robot=machine))
     assert wider.records == result.records
     assert wider.worst_sigma_mm == result.worst_sigma_mm < result.expanded_mm < wider.expanded_mm
 
 
 def test_the_dry_run_is_repeatable(result, make_plan):
-    assert dry_run(make_plan(**SMALL), robots=1) == result
+    assert dry_run(make_plan(**SMALL)) == result
 
 
 def test_minutes_are_of_everything_that_is_measured(result, make_plan):
@@ -68,7 +68,7 @@ def test_minutes_are_of_everything_that_is_measured(result, make_plan):
 
 def test_robots_that_cannot_be_measured_do_not_count(make_plan):
     plan = make_plan(**SMALL, tolerances__S_mm=200.0)
-    found = dry_run(plan, robots=2)
+    found = dry_run(plan)
     assert found.robots == 0
     assert found.drawn == 6
     assert found.worst_sigma_mm is None

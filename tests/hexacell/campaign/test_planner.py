@@ -100,7 +100,7 @@ def test_poses_and_expectations_are_in_the_controllers_frames(campaign, two_poin
     points = tuple(tuple((turned @ np.array(point)).tolist()) for point in TWO_POINTS)
     identification = two_points.settings.identification.model_copy(update={"points": points})
     settings = two_points.settings.model_copy(update={"identification": identification})
-    plan = Plan(settings, robot, None, two_points.candidates)
+    plan = Plan(settings, robot, None, two_points.effort)
     opening = plan.decide(CampaignState())
     assert isinstance(opening, StartPoint)
     assert opening.pose.as_tuple()[:3] == points[0]

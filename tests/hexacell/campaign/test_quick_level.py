@@ -11,6 +11,7 @@ import pytest
 from hexacell.campaign.decisions import CampaignState
 from hexacell.checks.check import Check, identified_before
 from hexacell.checks.quick_level import AS_ACCURATE, QuickLevel
+from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.dry_run.quick_level import try_quick_level
 from hexacell.identification.estimator import identify
@@ -35,7 +36,9 @@ def make_quick(make_plan, paper) -> MakeQuick:
         robot = replace(plan.robot, controller=normal, frames=frames)
         covariance = calibrated_mm**2 * np.eye(len(robot.mechanism.parameters))
         before = identified_before(robot, covariance, DRIFT_MM)
-        return QuickLevel(Check(plan.settings, robot, before, LIMITS, budget, candidates=32), budget)
+        return QuickLevel(
+            Check(plan.settings, robot, before, LIMITS, budget, effort=SearchEffort(candidates=32)), budget
+        )
 
     return make
 
@@ -84,7 +87,9 @@ def test_few_records_are_worth_half_a_calibration(make_plan, paper) -> None:
     whole.carry_out()
     calibrated = identify(robot.problem(whole.measurements))
     before = identified_before(robot, calibrated.covariance, 0.02)
-    quick = QuickLevel(Check(plan.settings, robot, before, LIMITS, 24, candidates=32), 24)
+    quick = QuickLevel(
+        Check(plan.settings, robot, before, LIMITS, 24, effort=SearchEffort(candidates=32)), 24
+    )
     state, _ = carried_out(quick, drift_mm=0.2)
     said = quick.accuracy(state.measurements)
     assert said is not None

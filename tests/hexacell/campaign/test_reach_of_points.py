@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.campaign.feasibility import ROBOTS, unreachable_share
+from hexacell.campaign.feasibility import unreachable_share
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 from tests.hexacell.campaign.conftest import make
 
@@ -26,7 +26,9 @@ def shares():
 def test_without_cones_only_singularities_count(shares) -> None:
     plan = with_cones(180.0)
     references = plan.robot.from_commands([plan.reference_pose(point) for point in plan.points])
-    robots = robots_within_tolerances(plan.robot, ROBOTS, plan.settings.identification.seed)
+    robots = robots_within_tolerances(
+        plan.robot, plan.effort.checked_robots, plan.settings.identification.seed
+    )
     taken = np.mean([VirtualRobot(plan.robot, truth).can_take(references) for truth in robots], axis=0)
     assert list(shares[180.0].values()) == pytest.approx((1.0 - taken).tolist())
 

@@ -20,6 +20,7 @@ from hexacell.verdict.verification import Verification
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import Journal
 from procedures.run import events
+from tests.small_cell import FEW_CHOICES
 
 MET = AcceptanceGate(name="converged", passed=True, sentence="It converged.")
 
@@ -79,7 +80,7 @@ def _history(
     verdict: Verdict | None,
     verification: dict[str, Any],
 ) -> list[events.Event]:
-    calibration = Calibration(cell.settings, robot_of(cell), Mode.OPTIMISE)
+    calibration = Calibration(cell.settings, robot_of(cell), Mode.OPTIMISE, effort=FEW_CHOICES)
     history: list[events.Event] = [
         events.RunStarted(
             software="hexacell 0",

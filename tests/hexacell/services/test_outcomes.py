@@ -22,6 +22,7 @@ from hexacell.verdict.decision import Verdict
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.run import events
 from procedures.run.steps import Phase
+from tests.small_cell import FEW_CHOICES
 
 DOUBTFUL = AcceptanceGate(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
 FORBIDDEN = AcceptanceGate(name="within tolerance", passed=False, sentence="Beyond: l3 (-13.00 mm).")
@@ -106,7 +107,7 @@ def test_a_run_notes_which_certificates_have_expired_when_it_begins(finished) ->
         gauges = (first.model_copy(update={"certificate": certificate}), *others)
         settings = finished.cell.settings.model_copy(update={"gauges": gauges})
         cell = replace(finished.cell, settings=settings)
-        calibration = Calibration(settings, robot_of(finished.cell), Mode.OPTIMISE)
+        calibration = Calibration(settings, robot_of(finished.cell), Mode.OPTIMISE, effort=FEW_CHOICES)
         assert run_started(cell, calibration, ()).expired == expired
 
 

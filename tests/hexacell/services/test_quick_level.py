@@ -28,7 +28,7 @@ from procedures.run import events
 from procedures.run.commands import CommandQueue, EndAtReference
 from procedures.run.state import RunState, fold
 from tests.hexacell.services.conftest import Finished, maker, order_of
-from tests.small_cell import few_candidates
+from tests.small_cell import FEW_CHOICES, few_candidates
 
 BUDGET = 20
 DRIFT_MM = 0.1
@@ -165,7 +165,7 @@ def test_what_effects_did_to_the_result_before_counts(corrected) -> None:
     assert before is not None
     assert effects is not None
     known = before.model_copy(update={"effects": effects.effects})
-    calibration = Calibration(settings, robot_of(cell), Mode.QUICK, accepted=known)
+    calibration = Calibration(settings, robot_of(cell), Mode.QUICK, accepted=known, effort=FEW_CHOICES)
     robot = calibration.robot_of(state)
     assert robot.known_effects.keys() == {"scale of each encoder"}
     found = identify(robot.problem(state.measurements()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,6 @@ from hexacell.campaign.pose_list import PoseList
 from hexacell.kinematics.pose import Pose
 from procedures.calibration.campaign_state import campaign_state
 from procedures.calibration.expected_records import expected_records
-from procedures.calibration.workflow import Calibration
 from procedures.run import events
 from procedures.run.state import fold
 from procedures.run.steps import CloseSet, Expectation, Move, Phase
@@ -80,7 +80,7 @@ def test_listed_poses_are_run(make_rig, story) -> None:
     rig = make_rig()
     here = tuple(tuple(Pose(*point, n) for n in (0.5, 0.9, 1.2)) for point in ((1.0, 2.0, 500.0),) * 2)
     listed = PoseList(Path("list.csv"), here)
-    calibration = Calibration(rig.cell.settings, rig.calibration.robot, rig.calibration.mode, listed)
+    calibration = replace(rig.calibration, listed=listed)
     step = calibration.next_step(fold([]))
     assert isinstance(step, Move)
     assert step.pose == here[0][0].as_tuple()

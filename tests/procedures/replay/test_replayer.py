@@ -20,7 +20,7 @@ from hexacell.errors import HexacellError, LimitError
 from hexacell.robot.model import robot_of
 from hexacell.services.run.calibration_run import calibration_of_run
 from hexacell.verdict.decision import Verdict
-from procedures.calibration.workflow import Calibration, Mode
+from procedures.calibration.workflow import Mode
 from procedures.journal.journal import read_journal
 from procedures.journal.line_format import Entry
 from procedures.replay.comparison import Aspect, ReplayReport
@@ -78,7 +78,7 @@ def test_a_run_of_before_there_was_a_choice_of_frames_is_reproduced(make_rig, re
     """It wrote its result in frames by the mechanism's convention, and noted nothing of it."""
     rig = make_rig()
     robot = dataclasses.replace(robot_of(rig.cell), taught=None)
-    rig.calibration = Calibration(rig.cell.settings, robot, rig.mode)
+    rig.calibration = dataclasses.replace(rig.calibration, robot=robot)
     rig.performer = dataclasses.replace(rig.performer, calibration=rig.calibration)
     asyncio.run(rig.run())
     new = {"taught", "written", "displacement"}

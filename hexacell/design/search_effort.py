@@ -1,0 +1,51 @@
+"""How much work is put into the search for poses and into trying a plan out before anything moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hexacell.design.candidate_refinement import QUICK, THOROUGH, Rounds
+
+
+@dataclass(frozen=True, slots=True)
+class SearchEffort:
+    """The effort of searching; the defaults are those of the program, tests of other things have less.
+
+    Numbers of candidates are powers of two: a Sobol' sequence is even over no other number.
+
+    Attributes:
+        candidates: orientations that the pose of each record is chosen from.
+        pilot_candidates: orientations that each pilot pose is chosen from; with four times as many the
+            records are as good.
+        held_out_candidates: orientations that the held-out poses are chosen from.
+        planned_candidates: orientations that the sets of a forecast are chosen from.
+        forecast_held_out_candidates: orientations that held-out poses are forecast from; how wide these
+            are hardly changes with more.
+        checked_candidates: orientations among which preflight looks for any safe pose at a point.
+        checked_robots: robots, drawn within the tolerances, of which preflight asks whether they reach
+            the points.
+        dry_run_robots: robots that a plan is carried out on to say what it gives.
+        rounds: in which the best candidates are refined.
+        late_rounds: of the decisions with most records to fit, so that these take no longer.
+        late_records: number of records from which the refinement is that of ``late_rounds``.
+    """
+
+    candidates: int = 1024
+    pilot_candidates: int = 256
+    held_out_candidates: int = 2048
+    planned_candidates: int = 64
+    forecast_held_out_candidates: int = 256
+    checked_candidates: int = 128
+    checked_robots: int = 32
+    dry_run_robots: int = 2
+    rounds: Rounds = THOROUGH
+    late_rounds: Rounds = QUICK
+    late_records: int = 44
+
+    def refinement(self, records: int) -> Rounds:
+        """The rounds of refinement of a decision that is made after some records."""
+        return self.late_rounds if records >= self.late_records else self.rounds
+
+
+USUAL_EFFORT = SearchEffort()
+"""The effort of the program."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 
+from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.pilots import pilots_per_departure
-from hexacell.campaign.speed_limits import speed_limits
 from hexacell.cell.model import CellSettings
+from hexacell.cell.speed import SpeedSettings
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.motion.duration import SpeedLimits
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +19,7 @@ class UsualMoves:
     """What a selected record takes: means over six random robots with 55 records each.
 
     Attributes:
-        moves: waypoints and ways back included.
+        moves: number of moves, waypoints and ways back included.
         joint_mm, edge_mm: how far the fastest joint and the fastest point of the platform would come at
             their largest speed for the duration of a move.
     """
@@ -31,8 +34,11 @@ COMMANDED = UsualMoves(3.3, 48.0, 48.0)
 
 COMMANDED_PROVISIONALLY = UsualMoves(1.3, 166.0, 124.0)
 
+MOST_SHARE = 2
+"""Most records at a point, in multiples of its plan: they hardly take the place of another point."""
+
 MOVE_OVERHEAD_S = 0.3
-"""To speed up, to slow down, and to be acknowledged."""
+"""Time of a move to speed up, to slow down, and to be acknowledged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,17 +53,25 @@ class TimeModel:
         """The durations that a cell file states, with ``moves`` a record, or as many as usual."""
         by_hand = settings.stations.placement == "by-hand"
         stated = settings.identification.seconds_per_record
-        moves = _usual_moves(settings) if moves is None else moves
+        if moves is None:
+            moves = 1.0 if settings.identification.poses is not None else _usual(settings).moves
         usual = moves * usual_move_seconds(settings) + settings.timing.window_s
         return cls(settings.identification.minutes_per_station if by_hand else 0.0, stated or usual)
 
     def minutes(self, records: int, points: int) -> float:
-        """Of some records at some points; at its end each point's reference is read once more."""
+        """Time for some records at some points; at its end each point's reference is read once more."""
         return points * self.point_minutes + (records + points) * self.record_seconds / 60.0
 
 
+def speed_limits(settings: SpeedSettings, *, at_gauges: bool) -> SpeedLimits:
+    """The largest speeds of a move that begins or ends with gauges at the ball, or of one without."""
+    if at_gauges:
+        return SpeedLimits(settings.joint_at_gauges, settings.edge_at_gauges_mm_s)
+    return SpeedLimits(settings.joint, settings.edge_mm_s)
+
+
 def usual_move_seconds(settings: CellSettings) -> float:
-    """Of a move between poses with gauges at the ball, as stated or by its largest speeds."""
+    """Duration of a move between poses with gauges at the ball, as stated or by its largest speeds."""
     if settings.timing.move_s is not None:
         return settings.timing.move_s
     limits, usual = speed_limits(settings.speed, at_gauges=True), _usual(settings)
@@ -80,19 +94,13 @@ def noise_minutes(settings: CellSettings, pilots: int) -> float:
     return (noise.standstill_readings * timing.interval_s + moves + windows) / 60.0
 
 
-def _usual_moves(settings: CellSettings) -> float:
-    if settings.identification.poses is not None:
-        return 1.0
-    return _usual(settings).moves
-
-
 def _usual(settings: CellSettings) -> UsualMoves:
     return COMMANDED_PROVISIONALLY if settings.identification.provisional else COMMANDED
 
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """What may be spent; without a limit where a number is none."""
+    """What may be spent; without a limit where a number is None."""
 
     records: int | None
     minutes: float | None
@@ -121,3 +129,25 @@ class Budget:
         if self.minutes is not None:
             limits.append(f"{self.minutes:g} minutes")
         return " or ".join(limits)
+
+
+def shared_sizes(planned: Mapping[int, int], state: CampaignState, left: Set[int]) -> dict[int, int]:
+    """How many records each point gets at most, so that all points together get as many as planned.
+
+    No point gets fewer than planned, though another one had more while this one seemed out of reach,
+    and none more than ``MOST_SHARE`` times as many.
+
+    Args:
+        planned: how many at each point.
+        state: with the points that are done, whether they got their records or not.
+        left: further points that cannot be measured as far as is known.
+    """
+    waiting = set(planned) - state.done - left
+    if not waiting:
+        return dict(planned)
+    missing = sum(size - state.records_at(point) for point, size in planned.items() if point not in waiting)
+    share = max(0, missing // len(waiting))
+    return {
+        point: min(size + share, MOST_SHARE * size) if point in waiting else size
+        for point, size in planned.items()
+    }

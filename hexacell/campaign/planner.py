@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hexacell.campaign.budget import Budget
+from hexacell.campaign.budget import Budget, shared_sizes
 from hexacell.campaign.decisions import (
     CampaignState,
     Decision,
@@ -24,19 +24,17 @@ from hexacell.campaign.decisions import (
     StartPoint,
 )
 from hexacell.campaign.forecast import Forecaster, select_sets
+from hexacell.campaign.online_estimate import OnlineEstimate, OnlineEstimator, RecordEstimator
 from hexacell.campaign.pilots import (
     CAUTION,
     FIRST_PILOT,
     most_pilots,
     pilots_per_departure,
 )
-from hexacell.campaign.planned_uncertainty import planned_systematic_mm
 from hexacell.campaign.pose_chooser import PoseChooser, is_well_known
 from hexacell.campaign.pose_list import PoseList
-from hexacell.campaign.record_shares import shared_sizes
-from hexacell.campaign.recursive_estimator import OnlineEstimate, OnlineEstimator, RecordEstimator
 from hexacell.campaign.stopping_rules import Goal, StoppingRules
-from hexacell.campaign.task_accuracy import Task
+from hexacell.campaign.task_accuracy import Task, planned_systematic_mm
 from hexacell.cell.model import CellSettings
 from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.errors import IdentifiabilityError, LimitError

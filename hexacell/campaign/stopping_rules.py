@@ -7,8 +7,8 @@ from typing import Protocol
 
 from hexacell.campaign.decisions import CampaignState, MeasurePose
 from hexacell.campaign.forecast import Forecaster
+from hexacell.campaign.online_estimate import RecordEstimator
 from hexacell.campaign.pilots import are_counted
-from hexacell.campaign.recursive_estimator import RecordEstimator
 from hexacell.cell.model import CellSettings
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.measurements.records import MeasurementSet

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hexacell.cell.model import CellSettings
 from hexacell.design.candidates import workspace_poses
+from hexacell.errors import HexacellError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.pose_accuracy import error_jacobian
+from hexacell.identification.estimator import estimate_online
 from hexacell.identification.identified_zeros import HeldParameters, IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
+from hexacell.robot.virtual_robot import exact_records
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.scale_observation import ScaleObservation
@@ -161,3 +165,31 @@ def _are_taken(belief: RobotBelief, poses: PoseBatch) -> Mask:
     """Which of n poses the estimated robot reaches."""
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
     return np.asarray(np.isfinite(joints).all(axis=-1))
+
+
+def planned_systematic_mm(
+    robot: Robot, task: Task, sets: Sequence[PoseBatch], earlier: Mapping[str, Array] | None = None
+) -> float | None:
+    """The standard uncertainty by the systematic effects at the worst task pose, mm.
+
+    It is that of the result of all planned poses, for a robot as its controller has it. Before all of them
+    are measured the noise is larger by far. None where no such robot can be identified.
+
+    Args:
+        robot: with its effects.
+        task: where it counts.
+        sets: planned poses at each point, the reference first, in the convention's frames.
+        earlier: see :meth:`~hexacell.uncertainty.budget.UncertaintyBudget.of`.
+    """
+    effects = [effect for effect in robot.effects if effect.size]
+    if not effects:
+        return 0.0
+    records = [
+        one for point, poses in enumerate(sets, start=1) for one in exact_records(robot, point, poses)
+    ]
+    try:
+        found = estimate_online(robot.problem(MeasurementSet(tuple(records))))
+        budget = task.budget(found, robot.belief(found), effects, earlier)
+    except HexacellError:
+        return None
+    return None if budget is None else budget.systematic_mm

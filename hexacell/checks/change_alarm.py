@@ -11,11 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hexacell.cell.fields import Frozen
+from hexacell.checks.check import Check
 from hexacell.drift.causes import Causes
 from hexacell.drift.leg_evidence import likeliest_leg
 from hexacell.drift.run_evidence import WhitenedRecords, whiten_records
 from hexacell.drift.single_cause import SingleCauseTest, single_cause_test
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
@@ -24,7 +28,36 @@ from hexacell.uncertainty.geometry_drift import IdentifiedBefore
 from hexacell.uncertainty.record_effects import RecordEffects
 
 FIRST_RECORDS = 8
-"""Of a check, references included."""
+"""Number of a check's first records that are tested, references included."""
+
+UM_PER_M = 1e-6
+"""A relative expansion of 1 um/m."""
+
+
+class ChangeAlarm(Frozen):
+    """Whether the first records of a check contradict a robot that has not changed since, by one parameter.
+
+    Attributes:
+        records: that were tested.
+        score: the largest of all parameters; each is standard normal for an unchanged robot.
+        limit: what the largest exceeds in one of a hundred checks of unchanged robots.
+        leg: that changed, if one did, by all records of the check; its likeliest ``parameter``, the
+            ``change`` of that and its standard deviation, if it alone changed.
+    """
+
+    records: int
+    score: float
+    limit: float
+    leg: int
+    parameter: str
+    unit: str
+    change: float
+    sigma: float
+
+    @property
+    def is_raised(self) -> bool:
+        """Whether an unchanged robot is contradicted."""
+        return self.score > self.limit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +71,64 @@ class ChangeTest:
     test: SingleCauseTest
     leg: int
     cause: int
+
+
+def change_alarm_at(check: Check, measurements: MeasurementSet, warmer: Array | None) -> ChangeAlarm | None:
+    """The alarm of a check whose legs were ``warmer`` (n, 6), K, at each record than at the earlier result.
+
+    None where that is not known (NaN), or where no test is possible.
+
+    Raises:
+        IdentifiabilityError: the records do not belong to this robot.
+    """
+    if warmer is None or not warmer.any():
+        return change_alarm(check, measurements)
+    if np.isnan(warmer).any():
+        return None
+    by_kelvin = check.settings.uncertainty.expansion_legs_um_m_k
+    return change_alarm(check, measurements, leg_expansion(check.robot.commanding, by_kelvin, warmer))
+
+
+def change_alarm(
+    check: Check, measurements: MeasurementSet, expansion: Array | None = None
+) -> ChangeAlarm | None:
+    """Whether the first records raise an alarm, and which leg all of them name.
+
+    Records that the others prove false are not tested. ``expansion`` (n, P) is by how much the parameters
+    differ at each record from those of the result before.
+
+    Raises:
+        IdentifiabilityError: the records do not belong to this robot.
+    """
+    false = check.false_records(measurements)
+    sound = [row for row, one in enumerate(measurements.records) if one.id not in false]
+    first, every = (
+        _tested(check, measurements, rows, expansion) for rows in (sound[:FIRST_RECORDS], sound)
+    )
+    if first is None or len(sound) < FIRST_RECORDS:
+        return None
+    assert every is not None  # noqa: S101 - the first records had a test
+    parameter = check.robot.mechanism.parameters.parameters[every.cause]
+    return ChangeAlarm(
+        records=FIRST_RECORDS,
+        score=float(np.abs(first.test.scores).max()),
+        limit=first.test.limit,
+        leg=every.leg,
+        parameter=parameter.name,
+        unit=parameter.kind.unit.value,
+        change=float(every.test.changes[every.cause]),
+        sigma=float(every.test.sigmas[every.cause]),
+    )
+
+
+def _tested(
+    check: Check, measurements: MeasurementSet, rows: list[int], expansion: Array | None
+) -> ChangeTest | None:
+    records = MeasurementSet(tuple(measurements.records[row] for row in rows))
+    if not rows or check.before is None:
+        return None
+    by_row = None if expansion is None else expansion[rows]
+    return change_test(check.robot, check.before, records, check.earlier, by_row)
 
 
 def change_test(
@@ -105,3 +196,13 @@ def _state_covariance(
 
 def _is_shared(effect: Effect) -> bool:
     return bool(effect.size) and not effect.is_estimated and effect.occurrence is Occurrence.CONSTANT
+
+
+def leg_expansion(geometry: Geometry, um_per_m_k: float, warmer: Array) -> Array:
+    """By how much the parameters (n, P) differ where legs are ``warmer`` (n, 6), K, than in a geometry."""
+    parameters = geometry.parameters
+    of_legs = np.array([one.kind.part is MachinePart.LEGS for one in parameters.parameters])
+    legs = np.array([one.leg for one in parameters.parameters])
+    by_kelvin = np.where(of_legs, UM_PER_M * um_per_m_k * geometry.vector, 0.0)
+    expansion: Array = warmer[:, legs - 1] * by_kelvin
+    return expansion

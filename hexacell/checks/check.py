@@ -15,11 +15,10 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.campaign.forecast import PlannedInformation
+from hexacell.campaign.online_estimate import OnlineEstimator, RecordEstimator
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
-from hexacell.campaign.recursive_estimator import OnlineEstimator, RecordEstimator
 from hexacell.cell.model import CellSettings
-from hexacell.checks.change_alarm import ChangeTest, change_test
 from hexacell.checks.drift_estimator import GUARDED_SCALE, DriftEstimator, ScaledEstimate
 from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
@@ -121,17 +120,6 @@ class Check:
             return stated
         further = self._further_records(measurements, effects) if stated.is_consistent else None
         return replace(stated, verdict=Verdict.NOT_EVALUATED, further_records=further)
-
-    def change_test(
-        self, measurements: MeasurementSet, expansion: Array | None = None
-    ) -> ChangeTest | None:
-        """Whether some records contradict an unchanged robot; none where it was not identified before.
-
-        ``expansion`` (n, P) is by how much the parameters differ at each record from those of then.
-        """
-        if self.before is None:
-            return None
-        return change_test(self.robot, self.before, measurements, self.earlier, expansion)
 
     def predicted_error(self, measurements: MeasurementSet) -> float | None:
         """The error predicted at the worst task pose, 1 sigma, mm; none if no task pose can be taken.

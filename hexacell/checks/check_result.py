@@ -7,10 +7,9 @@ from datetime import datetime
 
 import numpy as np
 
-from hexacell.campaign.leg_expansion import leg_expansion
-from hexacell.campaign.recursive_estimator import OnlineEstimate
+from hexacell.campaign.online_estimate import OnlineEstimate
 from hexacell.cell.fields import Frozen
-from hexacell.checks.change_alarm import FIRST_RECORDS, ChangeTest
+from hexacell.checks.change_alarm import ChangeAlarm, change_alarm_at
 from hexacell.checks.check import Check
 from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
 from hexacell.kinematics.rotations import Array
@@ -35,32 +34,6 @@ class ParameterChange(Frozen):
     def significance(self) -> float:
         """The change in standard deviations."""
         return abs(self.change) / self.sigma
-
-
-class ChangeAlarm(Frozen):
-    """Whether the first records of a check contradict a robot that has not changed since, by one parameter.
-
-    Attributes:
-        records: that were tested.
-        score: the largest of all parameters; each is standard normal for an unchanged robot.
-        limit: what the largest exceeds in one of a hundred checks of unchanged robots.
-        leg: that changed, if one did, by all records of the check; its likeliest ``parameter``, the
-            ``change`` of that and its standard deviation, if it alone changed.
-    """
-
-    records: int
-    score: float
-    limit: float
-    leg: int
-    parameter: str
-    unit: str
-    change: float
-    sigma: float
-
-    @property
-    def is_raised(self) -> bool:
-        """Whether an unchanged robot is contradicted."""
-        return self.score > self.limit
 
 
 class CheckResult(Frozen):
@@ -129,57 +102,8 @@ def check_result(
         drift_scale=stated.drift_scale,
         changes=tuple(_changes(stated.estimate)),
         left_out=tuple(sorted(check.false_records(measurements))),
-        alarm=_alarm(check, measurements, warmer),
+        alarm=change_alarm_at(check, measurements, warmer),
     )
-
-
-def _alarm(check: Check, measurements: MeasurementSet, warmer: Array | None) -> ChangeAlarm | None:
-    """The alarm, where it is known how much longer the legs are than at the accepted result."""
-    if warmer is None or not warmer.any():
-        return change_alarm(check, measurements)
-    if np.isnan(warmer).any():
-        return None
-    by_kelvin = check.settings.uncertainty.expansion_legs_um_m_k
-    return change_alarm(check, measurements, leg_expansion(check.robot.commanding, by_kelvin, warmer))
-
-
-def change_alarm(
-    check: Check, measurements: MeasurementSet, expansion: Array | None = None
-) -> ChangeAlarm | None:
-    """Whether the first records raise an alarm, and which leg all of them name.
-
-    Records that the others prove false are not tested. ``expansion`` (n, P) is by how much the parameters
-    differ at each record from those of the result before.
-
-    Raises:
-        IdentifiabilityError: the records do not belong to this robot.
-    """
-    false = check.false_records(measurements)
-    sound = [row for row, one in enumerate(measurements.records) if one.id not in false]
-    first, every = (
-        _tested(check, measurements, rows, expansion) for rows in (sound[:FIRST_RECORDS], sound)
-    )
-    if first is None or len(sound) < FIRST_RECORDS:
-        return None
-    assert every is not None  # noqa: S101 - the first records had a test
-    parameter = check.robot.mechanism.parameters.parameters[every.cause]
-    return ChangeAlarm(
-        records=FIRST_RECORDS,
-        score=float(np.abs(first.test.scores).max()),
-        limit=first.test.limit,
-        leg=every.leg,
-        parameter=parameter.name,
-        unit=parameter.kind.unit.value,
-        change=float(every.test.changes[every.cause]),
-        sigma=float(every.test.sigmas[every.cause]),
-    )
-
-
-def _tested(
-    check: Check, measurements: MeasurementSet, rows: list[int], expansion: Array | None
-) -> ChangeTest | None:
-    records = MeasurementSet(tuple(measurements.records[row] for row in rows))
-    return check.change_test(records, None if expansion is None else expansion[rows]) if rows else None
 
 
 def check_line(result: CheckResult) -> str:

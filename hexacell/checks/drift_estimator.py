@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.campaign.recursive_estimator import OnlineEstimate, OnlineEstimator
+from hexacell.campaign.online_estimate import OnlineEstimate, OnlineEstimator
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.geometry_drift import IdentifiedBefore, log_marginal_likelihood

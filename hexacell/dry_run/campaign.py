@@ -18,8 +18,7 @@ from hexacell.campaign.decisions import (
     StartPoint,
 )
 from hexacell.campaign.planner import Plan
-from hexacell.dry_run.held_out_forecast import predicted_verdicts
-from hexacell.dry_run.verdict_forecast import VerdictForecast
+from hexacell.dry_run.verdict_forecast import VerdictForecast, predicted_verdicts
 from hexacell.errors import HexacellError, ReachError
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.kinematics.geometry import Geometry

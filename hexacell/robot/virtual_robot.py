@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from hexacell.errors import LimitError, ReachError
@@ -196,3 +198,18 @@ def random_robot(
     ball = random.uniform(-tolerances.ball_mm, tolerances.ball_mm, 3) @ parameters.ball_offset
     built = Geometry(parameters, drawing.vector + random.uniform(-widths, widths) + ball)
     return mechanism.normalize_frames(built)[0]
+
+
+def exact_records(robot: Robot, point: int, poses: PoseBatch) -> Iterator[Record]:
+    """The records of a robot that is exactly as its controller has it, without noise.
+
+    Args:
+        robot: what its controller has.
+        point: counted from 1.
+        poses: of the point, in the convention's frames, the reference first.
+    """
+    joints = robot.mechanism.inverse(robot.commanding, robot.branch, poses)
+    shown = (poses.positions - poses.positions[:1]) @ robot.frames.base
+    for row in range(len(poses)):
+        command = robot.to_command(poses.pose(row))
+        yield Record(point, row + 1, command, joints_of(joints[row]), deviation_of(shown[row]))

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from hexacell.study.definition import Study
 from hexacell.study.design_records import OrientationChoice
 from hexacell.study.design_trials import DesignOutcome, DesignTrial, RecordsAccuracy, run_design_trial
+from hexacell.study.tasks import Study
 
 RATED = 100
 """Robots of which the efficiency of the design is computed."""

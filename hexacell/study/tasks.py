@@ -1,19 +1,45 @@
-"""Independent tasks of a study, by any executor: each has its own seed, so it does not matter who does it.
+"""A study: independent tasks, carried out by any executor, and what their results say together.
 
-Where a worker dies, what it and the others had begun is done again; only a task that has ended its worker
-several times is given up.
+Each task has its own seed, so it does not matter who does it. Where a worker dies, what it and the others
+had begun is done again; only a task that has ended its worker several times is given up.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from hexacell.errors import HexacellError
-from hexacell.study.definition import ResultType, TaskType
+
+TaskType = TypeVar("TaskType")
+ResultType = TypeVar("ResultType")
+SummaryType = TypeVar("SummaryType")
 
 MOST_LOSSES = 5
 """Executors that may break in a row without a single result."""
+
+
+@dataclass(frozen=True, slots=True)
+class Study(Generic[TaskType, ResultType, SummaryType]):
+    """Independent tasks, and what their results say together.
+
+    Attributes:
+        name: of its command and its files.
+        unit: what a task is, in the plural.
+        tasks_of: all tasks by their keys, for a number of draws. Each has its own seed.
+        carry_out: a task's result; a function of a module, since other processes import it.
+        result_type: of that, a dataclass, which is kept as JSON.
+        summary: of all tasks and their results, by the same keys.
+    """
+
+    name: str
+    unit: str
+    tasks_of: Callable[[int], Mapping[str, TaskType]]
+    carry_out: Callable[[TaskType], ResultType]
+    result_type: type[ResultType]
+    summary: Callable[[Mapping[str, TaskType], Mapping[str, ResultType]], SummaryType]
 
 
 class WorkersLost(HexacellError):

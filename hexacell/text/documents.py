@@ -8,7 +8,7 @@ from typing import Any
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
-from hexacell.dry_run.quick_level import QuickTrial
+from hexacell.dry_run.checks import QuickTrial
 from hexacell.results.run_comparison import ParameterTrend, RunComparison
 from hexacell.services.history.drift_history import DriftHistory, FoundChange
 from hexacell.services.history.history import PastRun

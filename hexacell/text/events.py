@@ -11,8 +11,7 @@ from hexacell.text.layout import wrapped
 from hexacell.text.length import length_text
 from hexacell.text.measured_noise import noise_and_averaging_text
 from hexacell.text.plan_draft import removed_summary
-from hexacell.text.planning import run_forecast_line
-from hexacell.text.quick_level import quick_accuracy_text, quick_start_text
+from hexacell.text.planning import quick_accuracy_text, quick_start_text, run_forecast_line
 from hexacell.text.verification import check_start_text, check_text, verification_text
 from procedures.run import events
 from procedures.run.state import RunState

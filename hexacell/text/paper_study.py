@@ -1,4 +1,4 @@
-"""The paper's simulations as text and as a document, beside what the paper says of them."""
+"""The paper's simulations and experiment as text, documents and pictures, beside what the paper says."""
 
 from __future__ import annotations
 
@@ -7,9 +7,18 @@ from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
-from hexacell.study.paper_simulation import NOISE_MM
-from hexacell.study.paper_summary import (
+from hexacell.study.paper_experiment import (
+    AMPLITUDE_DEG,
+    ORIENTATIONS,
+    PAPER_REDUCTION,
+    PAPER_REPEATABILITY_MM,
+    ExperimentStudy,
+    Reduction,
+    RepeatabilityRow,
+)
+from hexacell.study.paper_simulation import (
     FIGURES,
+    NOISE_MM,
     PAPER_EXACT_MM,
     PAPER_NOISY_MM,
     PAPER_TABLE_2_MM,
@@ -19,6 +28,7 @@ from hexacell.study.paper_summary import (
     PlannedSet,
 )
 from hexacell.text.layout import wrapped
+from hexacell.text.svg_drawing import AFTER, BEFORE, SMALLEST_MM, as_svg, new_figure
 
 WHAT_THE_PAPER_SAYS = {
     4: f"The paper: one point never; two or more without noise {PAPER_EXACT_MM:g} mm, after a limited "
@@ -138,3 +148,105 @@ def _number(value: float) -> str:
 
 def _deviation(one: PlannedSet) -> str:
     return f"{one.deviation_mm:.0f} mm"
+
+
+def study_picture(study: PaperStudy) -> str:
+    """Figures 4 and 5 beside each other: the largest error of a parameter by the number of points."""
+    places = [(0.10 + 0.47 * place, 0.16, 0.40, 0.70) for place in range(len(study.figures))]
+    figure, both = new_figure((7.0, 3.0), *places)
+    both[0].set_ylabel("largest error of a parameter, mm")
+    for axes, (number, sets) in zip(both, study.figures.items(), strict=True):
+        for estimator, colour, marker in (("paper", BEFORE, "o"), ("ours", AFTER, "s")):
+            for noise, line in (("noisy", "-"), ("exact", ":")):
+                errors = [getattr(getattr(one, noise), f"{estimator}_mm") for one in sets]
+                shown = [
+                    (one.points, max(error, SMALLEST_MM))
+                    for one, error in zip(sets, errors, strict=True)
+                    if isfinite(error)
+                ]
+                name = f"{estimator}, {'0.01 mm of noise' if noise == 'noisy' else 'no noise'}"
+                x, y = zip(*shown, strict=True) if shown else ((), ())
+                axes.semilogy(x, y, marker + line, color=colour, label=name, markersize=4)
+        told = "the paper of figure 4, 5 points, noise"
+        axes.axhline(PAPER_NOISY_MM, color="#888888", linewidth=0.6, label=told)
+        axes.set_xticks(range(1, 6))
+        axes.set_xlim(0.8, 5.2)
+        axes.set_ylim(0.5 * SMALLEST_MM, 100.0)
+        axes.set_xlabel("points")
+        axes.set_title(f"Figure {number}: {FIGURES[number]} orientations", fontsize=9)
+    both[0].legend(frameon=False, fontsize=7)
+    return as_svg(figure)
+
+
+def experiment_lines(study: ExperimentStudy) -> Iterator[str]:
+    """The whole of it, in lines of at most 80 columns."""
+    yield wrapped(
+        "Mean distance of the ball from its first place at a point, mm, and by what share it falls: "
+        f"{ORIENTATIONS} orientations within +-{AMPLITUDE_DEG:g} deg, medians of {study.rows[0].draws} "
+        "draws. P1 to P3 calibrate, P4 to P6 verify. P is the paper's estimator, which ends in so many. "
+        "The robot's geometry is what the paper identified; the first column is its repeatability, the "
+        "standard deviation of each coordinate of the ball."
+    )
+    yield ""
+    yield f"  {'':<11} {'P1 to P3':<32} P4 to P6"
+    head = _columns("before", "P", "ours")
+    yield f"  {'mm':<6} {'ends':<4} {head:<32} {head}".rstrip()
+    for row in study.rows:
+        yield _line(row)
+    yield ""
+    yield wrapped(
+        f"The paper: more than {100 * PAPER_REDUCTION:.0f} percent less, with a repeatability of about "
+        f"{PAPER_REPEATABILITY_MM:g} mm; better with a better one."
+    )
+
+
+def _line(row: RepeatabilityRow) -> str:
+    both = f"{_reduction(row.calibrating):<32} {_reduction(row.verifying)}"
+    return f"  {row.repeatability_mm:<6g} {row.ended:<4} {both}".rstrip()
+
+
+def _reduction(one: Reduction) -> str:
+    return _columns(f"{one.before:.2f}", _after(one.paper, one.before), _after(one.ours, one.before))
+
+
+def _columns(before: str, paper: str, ours: str) -> str:
+    return f"{before:<6} {paper:<12} {ours:<12}"
+
+
+def _after(value: float, before: float) -> str:
+    return f"{value:.3f} -{100 * (1 - value / before):.1f}%" if isfinite(value) else "-"
+
+
+def experiment_document(study: ExperimentStudy) -> dict[str, Any]:
+    """All figures as a JSON document; what is not finite is null."""
+    return {
+        "paper": {"reduction": PAPER_REDUCTION, "repeatability_mm": PAPER_REPEATABILITY_MM},
+        "rows": [
+            asdict(row) | {name: _medians(getattr(row, name)) for name in ("calibrating", "verifying")}
+            for row in study.rows
+        ],
+        "example": asdict(study.example),
+    }
+
+
+def _medians(one: Reduction) -> dict[str, float | None]:
+    return {name: value if isfinite(value) else None for name, value in asdict(one).items()}
+
+
+def experiment_picture(study: ExperimentStudy) -> str:
+    """Figures 8 and 9: each orientation's distance from the first, before and after, in one draw."""
+    places = [(0.09 + 0.48 * place, 0.16, 0.42, 0.70) for place in range(2)]
+    figure, both = new_figure((7.0, 3.0), *places)
+    parts = (
+        ("Figure 8: P1 to P3", study.example.calibrating),
+        ("Figure 9: P4 to P6", study.example.verifying),
+    )
+    for axes, (title, part) in zip(both, parts, strict=True):
+        numbers = range(1, len(part.before) + 1)
+        axes.plot(numbers, part.before, "o", color=BEFORE, label="before", markersize=3)
+        axes.plot(numbers, part.ours, "s", color=AFTER, label="after, ours", markersize=3)
+        axes.set_xlabel("orientation")
+        axes.set_title(title, fontsize=9)
+    both[0].set_ylabel("distance from the first, mm")
+    both[0].legend(frameon=False, fontsize=7)
+    return as_svg(figure)

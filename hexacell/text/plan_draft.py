@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
-from hexacell.dry_run.check import CheckTrial
-from hexacell.dry_run.quick_level import QuickTrial
+from hexacell.dry_run.checks import CheckTrial, QuickTrial
 from hexacell.services.preflight.plan_draft import ModeTrial, PlanDraft, PlanPreview
 from hexacell.services.records.offline import PlanTrial
 from hexacell.text.layout import duration
-from hexacell.text.planning import plan_trial_lines
-from hexacell.text.quick_level import check_trial_text, quick_trial_text
+from hexacell.text.planning import check_trial_text, plan_trial_lines, quick_trial_text
 
 REQUEST = (
     "Type what to take out, or to put back: a point (3), a pose (3.2), one that is out (r1).\n"

@@ -1,16 +1,25 @@
-"""Text for the plan: the devices it needs, what to measure next, and what the remaining records gain."""
+"""Text for plans: what to measure next, what records gain, what a dry run of each mode predicts."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.checks.quick_level import QuickAccuracy
+from hexacell.dry_run.checks import CheckTrial, QuickTrial
+from hexacell.dry_run.verdict_forecast import NOISE, WANTED, VerdictForecast
 from hexacell.measurements.records import RecordId
+from hexacell.results.result import AcceptedResult
 from hexacell.services.records.offline import PlanTrial
-from hexacell.text.layout import duration
+from hexacell.text.layout import duration, wrapped
 from hexacell.text.measured_noise import averaging_lines
-from hexacell.text.verdict_forecast import verdict_forecast_lines
+from hexacell.verdict.decision import Verdict
+
+DIGITS = 2
+"""Of a limit that is proposed."""
 
 TRYING_PLAN = "Trying the plan on simulated robots within the tolerances, some seconds ..."
 
@@ -124,3 +133,111 @@ def preflight_lines(devices: Sequence[DeviceIdentity]) -> Iterator[str]:
         yield f"ok  {device_line(identity)}"
     yield "ok  all points can be reached, all devices answer; nothing was moved"
     yield TRYING_PLAN
+
+
+def verdict_forecast_lines(forecast: VerdictForecast) -> Iterator[str]:
+    """How likely a healthy machine passes; if it is not, why, and what would help."""
+    others = ", ".join(
+        f"{verdict} {_percent(share)}"
+        for verdict, share in forecast.probabilities.items()
+        if verdict is not Verdict.PASS and share >= 0.005
+    )
+    rest = f" ({others})" if others else ""
+    yield (
+        f"A healthy machine of this cell passes with a probability of "
+        f"{_percent(forecast.probabilities[Verdict.PASS])}{rest}."
+    )
+    if not forecast.is_wanted:
+        yield _warning(forecast)
+
+
+def _warning(forecast: VerdictForecast) -> str:
+    limits = " and ".join(_limits(forecast)) or "the limits"
+    part = f"{forecast.largest_part} ({forecast.largest_part_mm:.3f} of {forecast.standard_mm:.3f} mm)"
+    return (
+        f"That is too little: a good machine fails these limits. {WANTED:.0%} would pass {limits} in "
+        f"[acceptance]. The largest part of the uncertainty at the worst task pose is the {part}: "
+        f"{_help(forecast)}."
+    )
+
+
+def _limits(forecast: VerdictForecast) -> Iterator[str]:
+    """The limits that are too small, with the value that would do."""
+    wanted, present = forecast.passing, forecast.limits
+    if wanted.position_mm > present.position_mm:
+        yield f"position_mm = {_rounded_up(wanted.position_mm):g}"
+    if wanted.orientation_deg > present.orientation_deg:
+        yield f"orientation_deg = {_rounded_up(wanted.orientation_deg):g}"
+
+
+def _help(forecast: VerdictForecast) -> str:
+    if forecast.largest_part == NOISE:
+        return "more records, or means of more readings, reduce it"
+    return "have it calibrated, or measure it, and state its size in [uncertainty]"
+
+
+def _rounded_up(limit: float) -> float:
+    step = 10.0 ** (math.floor(math.log10(limit)) - DIGITS + 1)
+    return float(f"{step * math.ceil(limit / step):.{DIGITS}g}")
+
+
+def _percent(share: float) -> str:
+    return f"{share:.0%}" if share < 0.995 else f"{share:.1%}"
+
+
+def quick_start_text(accepted: AcceptedResult | None) -> str | None:
+    """What a quick level starts from."""
+    if accepted is None:
+        return None
+    return f"the quick level starts from the result of {accepted.at:%Y-%m-%d}, {Path(accepted.run).name}"
+
+
+def quick_accuracy_text(found: QuickAccuracy) -> str:
+    """How well the robot is known by it, and what more records would give, in lines."""
+    return wrapped(f"quick level: {quick_accuracy_sentences(found)}", indent=2)
+
+
+def quick_accuracy_sentences(found: QuickAccuracy) -> str:
+    """The same as sentences."""
+    further = ", ".join(f"{one.records} more {one.error_mm:.3f}" for one in found.further)
+    return (
+        f"{found.records} records leave {found.error_mm:.3f} mm at the worst task pose (one sigma), "
+        f"{found.ratio:.2g} times the {found.calibrated_mm:.3f} that the last calibration left. "
+        f"{_to_calibrated(found)} Of more records ([quick] budget_records), {further} would be left."
+    )
+
+
+def _to_calibrated(found: QuickAccuracy) -> str:
+    match found.records_to_calibrated:
+        case None:
+            return "No sensible number of records would leave as little; a calibration would."
+        case 0:
+            return "That is as little."
+        case more:
+            return f"About {more} more would leave as little."
+
+
+def quick_trial_text(trial: QuickTrial) -> str:
+    """What the quick level is expected to give."""
+    if trial.accuracy is None:
+        return "No simulated robot that drifted as stated could be measured: a quick level may fail."
+    return (
+        f"{trial.accuracy.records} records at {trial.points} points, in about {duration(trial.minutes)}, "
+        "and then the held-out poses as after a calibration. Expected of a robot that drifted as "
+        f"drift_per_parameter_mm in [check] states: {quick_accuracy_sentences(trial.accuracy)}"
+    )
+
+
+def check_trial_text(trial: CheckTrial) -> str:
+    """What a check is expected to take and to give."""
+    if not trial.records:
+        return "No simulated robot that drifted as stated could be measured: a check may fail."
+    error = (
+        "" if trial.error_mm is None else f"; {trial.error_mm:.3f} mm at the worst task pose (one sigma)"
+    )
+    measured = f"{trial.records} records at {trial.points} points"
+    return (
+        f"A check: {measured}, in about {duration(trial.minutes)}{error}. That is of a robot "
+        "that drifted as drift_per_parameter_mm in [check] states; it takes more where the error is "
+        "near the limit."
+    )

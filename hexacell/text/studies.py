@@ -6,14 +6,19 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from hexacell.study.definition import Study
 from hexacell.study.design_summary import DESIGN
-from hexacell.study.experiment_summary import EXPERIMENT
-from hexacell.study.paper_summary import PAPER
+from hexacell.study.paper_experiment import EXPERIMENT
+from hexacell.study.paper_simulation import PAPER
+from hexacell.study.tasks import Study
 from hexacell.text.design_study import design_document, design_lines, design_picture
-from hexacell.text.experiment_study import experiment_document, experiment_lines, experiment_picture
-from hexacell.text.paper_figures import study_picture
-from hexacell.text.paper_study import study_document, study_lines
+from hexacell.text.paper_study import (
+    experiment_document,
+    experiment_lines,
+    experiment_picture,
+    study_document,
+    study_lines,
+    study_picture,
+)
 
 SummaryType = TypeVar("SummaryType")
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hexacell.checks.check_result import ChangeAlarm, CheckResult
+from hexacell.checks.change_alarm import ChangeAlarm
+from hexacell.checks.check_result import CheckResult
 from hexacell.results.result import AcceptedResult
 from hexacell.text.layout import wrapped
 from hexacell.text.length import earlier_scale_line, scale_lines

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.campaign.recursive_estimator import OnlineEstimate
+from hexacell.campaign.online_estimate import OnlineEstimate
 from hexacell.campaign.task_accuracy import Task
 from hexacell.design.criteria import add_information
 from hexacell.kinematics.rotations import Array

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hexacell.campaign.speed_limits import speed_limits
+from hexacell.campaign.budget import speed_limits
 from hexacell.cell.model import CellSettings
 from hexacell.config.current import CurrentConfig
 from hexacell.kinematics.pose import Pose

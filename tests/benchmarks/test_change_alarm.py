@@ -18,9 +18,8 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from hexacell.campaign.leg_expansion import leg_expansion
+from hexacell.checks.change_alarm import ChangeAlarm, change_alarm, leg_expansion
 from hexacell.checks.check import Check
-from hexacell.checks.check_result import ChangeAlarm, change_alarm
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry

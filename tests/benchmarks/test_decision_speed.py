@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState, Decision, Finished, MeasurePose
+from hexacell.campaign.online_estimate import OnlineEstimator
 from hexacell.campaign.planner import Plan
-from hexacell.campaign.recursive_estimator import OnlineEstimator
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.dry_run.campaign import VirtualCampaign

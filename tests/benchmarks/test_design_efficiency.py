@@ -12,8 +12,8 @@ import pytest
 
 from hexacell.design.design_efficiency import Efficiency
 from hexacell.services.study.studies import processes, run_study
-from hexacell.study.definition import Study
 from hexacell.study.design_trials import DesignOutcome, DesignTrial, run_design_trial
+from hexacell.study.tasks import Study
 from tests.benchmarks.test_study_speed import every
 
 pytestmark = pytest.mark.benchmark

@@ -33,11 +33,11 @@ from hexacell.limits.limits import Limits
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, controller_geometry, make_robot, robot_of
 from hexacell.study import data_sets
-from hexacell.study.simulated_campaign import SimulatedCampaign
 from procedures.calibration.held_out_poses import HeldOutPoses
 from tests.benchmarks.conftest import Say
 from tests.benchmarks.virtual_calibration import robot_that_reaches, stands_at
 from tests.benchmarks.watched_robot import Seen, WatchedRobot, watch
+from tests.simulated_campaign import SimulatedCampaign
 
 pytestmark = pytest.mark.benchmark
 

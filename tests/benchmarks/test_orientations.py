@@ -28,7 +28,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot, robot_of
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
-from hexacell.study.simulated_campaign import SimulatedCampaign
+from tests.simulated_campaign import SimulatedCampaign
 
 Say = Callable[[str, str, str], None]
 

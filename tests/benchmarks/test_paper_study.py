@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hexacell.services.study.studies import processes, run_study
-from hexacell.study.paper_summary import PAPER, PAPER_EXACT_MM, PAPER_NOISY_MM, PaperStudy
+from hexacell.study.paper_simulation import PAPER, PAPER_EXACT_MM, PAPER_NOISY_MM, PaperStudy
 
 pytestmark = pytest.mark.benchmark
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, root
 
-from hexacell.campaign.recursive_estimator import OnlineEstimator
+from hexacell.campaign.online_estimate import OnlineEstimator
 from hexacell.identification.estimator import estimate_online, identify
 from hexacell.identification.problem.problem import Problem
 from hexacell.kinematics import rotations

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from hexacell.services.study.studies import processes, run_study
-from hexacell.study.paper_summary import PAPER
+from hexacell.study.paper_simulation import PAPER
 
 pytestmark = pytest.mark.benchmark
 

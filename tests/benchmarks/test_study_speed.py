@@ -13,8 +13,8 @@ from collections.abc import Mapping
 import pytest
 
 from hexacell.services.study.studies import processes, run_study
-from hexacell.study.definition import Study
 from hexacell.study.design_trials import DesignOutcome, DesignTrial, run_design_trial
+from hexacell.study.tasks import Study
 
 pytestmark = pytest.mark.benchmark
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from hexacell.checks.check_result import ChangeAlarm, CheckResult
+from hexacell.checks.change_alarm import ChangeAlarm
+from hexacell.checks.check_result import CheckResult
 from hexacell.errors import ExitCode
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.text.run import NOT_REPEATED_ALARM, REPEATED, REPEATED_ALARM

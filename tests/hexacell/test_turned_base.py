@@ -20,7 +20,7 @@ from hexacell.measurements.records import MeasurementSet, deviation_of
 from hexacell.robot.model import Robot, make_robot
 from hexacell.robot.virtual_robot import robots_within_tolerances
 from hexacell.study import data_sets
-from hexacell.study.simulated_campaign import SimulatedCampaign
+from tests.simulated_campaign import SimulatedCampaign
 
 CONFIG = Path(__file__).parents[2] / "configs" / "gough-stewart.toml"
 TURNED = FrameTransform(

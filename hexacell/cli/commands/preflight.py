@@ -8,14 +8,13 @@ import asyncio
 from drivers.errors import BusError, ConnectionLost, GaugeSilent, PortLost, SilentNodeError, WrongAnswer
 from hexacell.cli.cell_argument import cell_with_devices_at
 from hexacell.cli.console import Console
-from hexacell.dry_run.quick_level import try_quick_level
+from hexacell.dry_run.checks import try_quick_level
 from hexacell.errors import ExitCode, HexacellError, flatten_errors
 from hexacell.services.records.offline import try_plan
 from hexacell.services.run.calibration_run import new_calibration, preflight
 from hexacell.text.documents import preflight_document, quick_preflight_document
 from hexacell.text.layout import wrapped
-from hexacell.text.planning import plan_trial_lines, preflight_lines
-from hexacell.text.quick_level import quick_trial_text
+from hexacell.text.planning import plan_trial_lines, preflight_lines, quick_trial_text
 from procedures.calibration.workflow import Mode
 
 MISSING = (PortLost, GaugeSilent, WrongAnswer, BusError, SilentNodeError, ConnectionLost)

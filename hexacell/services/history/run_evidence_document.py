@@ -9,10 +9,9 @@ from typing import Self
 
 import numpy as np
 
-from hexacell.campaign.leg_expansion import leg_expansion
 from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
-from hexacell.checks.change_alarm import machine_records
+from hexacell.checks.change_alarm import leg_expansion, machine_records
 from hexacell.drift.run_evidence import RunEvidence
 from hexacell.errors import HexacellError
 from hexacell.kinematics.parameters import LEGS

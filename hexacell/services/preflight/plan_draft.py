@@ -15,8 +15,7 @@ from hexacell.cell.fields import Frozen, SixNumbers
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.dry_run.campaign import VisitedPose
-from hexacell.dry_run.check import CheckTrial, try_check
-from hexacell.dry_run.quick_level import QuickTrial, try_quick_level
+from hexacell.dry_run.checks import CheckTrial, QuickTrial, try_check, try_quick_level
 from hexacell.errors import UsageError
 from hexacell.kinematics.pose import Pose
 from hexacell.services.records.offline import PlanTrial, try_plan

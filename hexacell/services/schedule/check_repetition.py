@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hexacell.checks.check_result import ChangeAlarm
+from hexacell.checks.change_alarm import ChangeAlarm
 from hexacell.runs.run_folder import new_run
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.verdict.decision import Verdict

@@ -9,12 +9,13 @@ from __future__ import annotations
 import asyncio
 import logging
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from concurrent.futures import BrokenExecutor, Executor, Future
 from concurrent.futures import wait as wait_for
 from contextlib import suppress
 from functools import partial
 from pydoc import locate
+from threading import Thread
 from typing import Any, ParamSpec, TypeVar
 
 import distributed
@@ -24,7 +25,6 @@ from distributed.scheduler import KilledWorker
 
 from hexacell import __version__
 from hexacell.errors import ExitCode, HexacellError, UsageError
-from hexacell.services.study.loop_thread import LoopThread
 from hexacell.services.study.studies import NewExecutor
 
 PATIENCE_S = 30.0
@@ -59,6 +59,33 @@ def dask_cluster(address: str, *, patience_s: float = PATIENCE_S) -> NewExecutor
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # the errors here say it in plain words
     return partial(ClusterExecutor, address, patience_s)
+
+
+class LoopThread:
+    """An event loop in a thread of its own, which the library needs, until it is closed."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.new_event_loop()
+        self._thread = Thread(target=self._run, name="event loop", daemon=True)
+        self._thread.start()
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it can begin nothing any more."""
+        return self._loop.is_closed()
+
+    def begin(self, coroutine: Coroutine[Any, Any, ResultType]) -> Future[ResultType]:
+        """Run a coroutine; cancelling the future cancels it."""
+        return asyncio.run_coroutine_threadsafe(coroutine, self._loop)
+
+    def close(self) -> None:
+        """End the loop and the thread; what is under way is cancelled."""
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+
+    def _run(self) -> None:
+        with asyncio.Runner(loop_factory=lambda: self._loop) as runner:
+            runner.get_loop().run_forever()
 
 
 class ClusterExecutor(Executor):

@@ -15,8 +15,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from hexacell.errors import FileError
 from hexacell.storage import atomic_files
-from hexacell.study.definition import ResultType, Study, SummaryType, TaskType
-from hexacell.study.tasks import results_of
+from hexacell.study.tasks import ResultType, Study, SummaryType, TaskType, results_of
 
 OnProgress = Callable[[int, int], None]
 """Told how many tasks of how many are done."""

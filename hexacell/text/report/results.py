@@ -12,7 +12,7 @@ from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.results.result import IdentificationResult
 from hexacell.services.history.reported_run import ReportedRun
-from hexacell.text.quick_level import quick_accuracy_sentences
+from hexacell.text.planning import quick_accuracy_sentences
 from hexacell.text.report.blocks import Block, Chapter, Paragraph, Table
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 

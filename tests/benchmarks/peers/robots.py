@@ -26,9 +26,9 @@ from hexacell.kinematics.sensitivity import has_singularity_margin
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot.model import Robot, robot_of
 from hexacell.study.data_sets import DataSet, unlimited_travel, within_travel
-from hexacell.study.simulated_campaign import SimulatedCampaign
 from tests.benchmarks.peers.interface import Array, Records
 from tests.benchmarks.virtual_calibration import robot_that_reaches
+from tests.simulated_campaign import SimulatedCampaign
 
 SEED = 18
 HELD_OUT = 100

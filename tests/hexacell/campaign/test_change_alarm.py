@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import Finished
-from hexacell.checks.change_alarm import FIRST_RECORDS
+from hexacell.checks.change_alarm import FIRST_RECORDS, change_alarm
 from hexacell.checks.check import Check, identified_before
-from hexacell.checks.check_result import change_alarm, check_result
+from hexacell.checks.check_result import check_result
 from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.campaign import estimate_chain
-from hexacell.campaign.estimate_chain import SearchInVain, update_estimate
+from hexacell.campaign import online_estimate as estimate_chain
+from hexacell.campaign.online_estimate import SearchInVain, update_estimate
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.data_requirements import is_overdetermined
 from hexacell.identification.solver import multistart

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState, MeasurePose
-from hexacell.campaign.recursive_estimator import OnlineEstimator
+from hexacell.campaign.online_estimate import OnlineEstimator
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet

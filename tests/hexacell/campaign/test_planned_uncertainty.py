@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState
-from hexacell.campaign.exact_records import exact_records
-from hexacell.campaign.planned_uncertainty import planned_systematic_mm
+from hexacell.campaign.task_accuracy import planned_systematic_mm
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.pose import Pose
-from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.robot.virtual_robot import VirtualRobot, exact_records
 
 THREE_POINTS = ((0.0, -200.0, 550.0), (100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 

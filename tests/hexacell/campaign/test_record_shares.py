@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hexacell.campaign.budget import MOST_SHARE, shared_sizes
 from hexacell.campaign.decisions import CampaignState
-from hexacell.campaign.record_shares import MOST, shared_sizes
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
 
@@ -62,7 +62,7 @@ def test_no_point_gets_fewer_than_planned_and_all_together_no_more(
     state = measured(dict(zip(PLANNED, counts, strict=True)), done)
     sizes = shared_sizes(PLANNED, state, left)
     waiting = set(PLANNED) - done - left
-    assert all(PLANNED[point] <= sizes[point] <= MOST * PLANNED[point] for point in PLANNED)
+    assert all(PLANNED[point] <= sizes[point] <= MOST_SHARE * PLANNED[point] for point in PLANNED)
     asked = sum(sizes[point] for point in waiting)
     taken = sum(state.records_at(point) for point in set(PLANNED) - waiting)
     planned = sum(PLANNED[point] for point in waiting)

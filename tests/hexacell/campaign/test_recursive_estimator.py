@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.campaign import recursive_estimator
-from hexacell.campaign.estimate_chain import ChainedEstimate, cost, update_estimate
-from hexacell.campaign.recursive_estimator import OnlineEstimator
+from hexacell.campaign import online_estimate as recursive_estimator
+from hexacell.campaign.online_estimate import ChainedEstimate, OnlineEstimator, cost, update_estimate
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import estimate_online
 from hexacell.measurements.records import MeasurementSet

@@ -9,13 +9,14 @@ import pytest
 
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.dry_run.campaign import VirtualCampaign
-from hexacell.dry_run.held_out_forecast import predicted_verdicts, with_held_out_records
 from hexacell.dry_run.verdict_forecast import (
     NOISE,
     SEED,
     VerdictForecast,
     forecast_verdicts,
+    predicted_verdicts,
     stated_errors,
+    with_held_out_records,
 )
 from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.estimator import identify

@@ -13,8 +13,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.dry_run.campaign import VirtualCampaign
-from hexacell.dry_run.held_out_forecast import predicted_verdicts, with_held_out_records
-from hexacell.dry_run.verdict_forecast import stated_errors
+from hexacell.dry_run.verdict_forecast import predicted_verdicts, stated_errors, with_held_out_records
 from hexacell.identification.estimator import identify
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification

@@ -5,18 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.study.experiment_summary import (
-    REPEATABILITIES_MM,
-    Reduction,
-    experiment_summary,
-    experiments_of,
-)
 from hexacell.study.paper_experiment import (
     CALIBRATING,
     ORIENTATIONS,
+    REPEATABILITIES_MM,
     Differences,
     Experiment,
     ExperimentOutcome,
+    Reduction,
+    experiment_summary,
+    experiments_of,
     run_experiment,
 )
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from math import inf, isnan
 
-from hexacell.study.paper_simulation import Angles, Errors, Outcome
-from hexacell.study.paper_summary import MedianErrors, summary, trials_of
+from hexacell.study.paper_simulation import Angles, Errors, MedianErrors, Outcome, summary, trials_of
 
 
 def errors(paper: float | None, ours: float | None, *steps: float) -> Errors:

@@ -11,8 +11,8 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.identification.estimator import identify
 from hexacell.robot.model import robot_of
-from hexacell.study.simulated_campaign import SimulatedCampaign
 from tests.benchmarks.watched_robot import watch
+from tests.simulated_campaign import SimulatedCampaign
 
 
 @pytest.fixture

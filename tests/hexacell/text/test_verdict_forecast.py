@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hexacell.dry_run.verdict_forecast import NOISE, VerdictForecast
-from hexacell.text.verdict_forecast import verdict_forecast_lines
+from hexacell.text.planning import verdict_forecast_lines
 from hexacell.verdict.decision import ErrorLimits, Verdict
 
 NONE = dict.fromkeys(Verdict, 0.0)

@@ -1,0 +1,269 @@
+"""The estimate while measuring: a chain, each one starting from the one before it.
+
+The estimate of n records is defined as the n-th of this chain, which begins at the drawing. Keeping the
+last one saves its computation and changes nothing: without it the chain is computed again.
+
+One more record changes the estimate little. If its cost is too large for the noise, some records may be
+false, or the solver is in a wrong minimum. Both are searched for: false records first, as soon as the
+others would determine the parameters without them, then other minima, from the drawing and from random
+geometries within the tolerances. A search that explains nothing is remembered: the next one is made when
+there is more to explain or more to explain it by, twice the cost, or half as many records again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from hexacell.campaign.pilots import are_counted
+from hexacell.design.predicted_records import GaugeZero, gauge_zero_at
+from hexacell.errors import LimitError
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.data_faults.hypotheses import record_ids, record_mask
+from hexacell.identification.data_faults.online_rejection import without_gross_errors
+from hexacell.identification.estimator import estimate_online
+from hexacell.identification.problem.data_requirements import is_determined
+from hexacell.identification.problem.problem import Problem
+from hexacell.identification.solver.levenberg_marquardt import COARSE, INCREMENTAL
+from hexacell.identification.solver.multistart import restarts
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.measurements.records import MeasurementSet, Record, RecordId
+from hexacell.robot.model import Robot
+
+IMPLAUSIBLE_COST = 3.0
+"""Cost per residual above which an estimate may be in a local minimum, or of false records."""
+
+FEW_RESIDUALS = 30.0
+"""Added to the number of residuals, since a few of them may be large by chance."""
+
+COST_FACTOR = 2.0
+RECORDS_FACTOR = 1.5
+"""By how much cost or records have grown since a search in vain when the next one is made."""
+
+SAME_MINIMUM = 6
+"""Starts that end in one minimum before it is taken for the only one: half of a whole search."""
+
+SAME_COST = 0.01
+"""Relative difference of cost within which two minima are the same."""
+
+TRIAL = replace(COARSE, iterations=20, searches=12)
+"""Solver options from another start: as many iterations as true records need; more would be in vain."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OnlineEstimate:
+    """The estimate of the robot from the records so far.
+
+    Attributes:
+        identification: the fit; None before the first record.
+        false_records: those that the others prove false; they are not in the identification.
+    """
+
+    belief: RobotBelief
+    identification: Identification | None
+    false_records: frozenset[RecordId] = frozenset()
+
+    def of_records_alone(self) -> Identification | None:
+        """The identification without pilot records, from this one on; None before the first record."""
+        found = self.identification
+        if found is None or (counted := are_counted(found.problem)).all():
+            return found
+        problem, poses = found.problem.subset(counted), found.poses[np.flatnonzero(counted)]
+        return estimate_online(problem.starting_at(found.free, poses))
+
+    def gauge_zero(self, point: int) -> GaugeZero:
+        """Where a point's gauges were zeroed.
+
+        Raises:
+            LimitError: there are no records of the point.
+        """
+        found = self.identification
+        if found is None or point not in found.problem.labels[:, 0]:
+            raise LimitError("the records of this point do not determine the ball's position")
+        return gauge_zero_at(self.belief, found, point)
+
+
+class RecordEstimator(Protocol):
+    """Estimates the robot from any records."""
+
+    def estimate(self, measurements: MeasurementSet) -> OnlineEstimate:
+        """The estimate from some records, in their order.
+
+        Raises:
+            IdentifiabilityError: they do not belong to this robot.
+        """
+        ...
+
+
+class OnlineEstimator:
+    """Estimates from any records, quickly where they continue the last ones asked for.
+
+    With ``tries_other_starts`` false an implausible estimate is kept: the robot is near its prior, or the
+    prior is wrong.
+    """
+
+    def __init__(self, robot: Robot, *, tries_other_starts: bool = True) -> None:
+        self._robot = robot
+        self._tries_other_starts = tries_other_starts
+        self._records: tuple[Record, ...] = ()
+        self._last: ChainedEstimate | None = None
+        self._problem: Problem | None = None
+
+    def estimate(self, measurements: MeasurementSet) -> OnlineEstimate:
+        """The estimate from some records, in their order.
+
+        Raises:
+            IdentifiabilityError: they do not belong to this robot.
+        """
+        records = measurements.records
+        if records[: len(self._records)] != self._records:
+            self._records, self._last, self._problem = (), None, None
+        for count in range(len(self._records) + 1, len(records) + 1):
+            self._problem = self._robot.problem(MeasurementSet(records[:count]), self._problem)
+            self._last = update_estimate(self._problem, self._last, self._tries_other_starts)
+            self._records = records[:count]
+        if self._last is None:
+            return OnlineEstimate(self._robot.belief(), None)
+        found = self._last.identification
+        return OnlineEstimate(self._robot.belief(found), found, self._last.false_records)
+
+
+@dataclass(frozen=True, slots=True)
+class SearchInVain:
+    """A search that found no plausible estimate: the cost that was to be explained, of how many records."""
+
+    cost: float
+    records: int
+
+    def is_outdated(self, present_cost: float, records: int) -> bool:
+        """Whether there is so much more to explain, or to explain it by, that another one may help."""
+        return present_cost >= COST_FACTOR * self.cost or records >= RECORDS_FACTOR * self.records
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChainedEstimate:
+    """An estimate of the chain.
+
+    Attributes:
+        false_records: those that were found false and are left out.
+        in_vain: the last search, if it found no plausible estimate and this one is still implausible.
+    """
+
+    identification: Identification
+    false_records: frozenset[RecordId] = frozenset()
+    in_vain: SearchInVain | None = None
+
+
+def update_estimate(
+    problem: Problem, before: ChainedEstimate | None, tries_others: bool = True
+) -> ChainedEstimate:
+    """The estimate from that of all records but the last; with ``tries_others``, doubted if implausible."""
+    if before is None:
+        return ChainedEstimate(estimate_online(problem))
+    kept = problem.subset(~record_mask(problem, before.false_records))
+    found = _continued(kept, before.identification)
+    if not tries_others or _is_plausible(kept, found):
+        return ChainedEstimate(found, before.false_records)
+    if before.in_vain is not None and not before.in_vain.is_outdated(cost(found), problem.records):
+        return replace(before, identification=found)
+    return _search(problem, _continued(problem, found) if before.false_records else found)
+
+
+def cost(found: Identification) -> float:
+    """What the estimate minimized: squared residuals and distance from the drawing, both by sigma."""
+    return found.chi2 + found.problem.prior.squared_distance(found.free)
+
+
+def _is_plausible(problem: Problem, found: Identification) -> bool:
+    """Whether an estimate is of all records of the problem, with residuals as the noise explains them."""
+    is_small = cost(found) <= IMPLAUSIBLE_COST * found.problem.coordinates + FEW_RESIDUALS
+    return found.converged and found.records == problem.records and is_small
+
+
+def _search(problem: Problem, found: Identification) -> ChainedEstimate:
+    """Another estimate in the place of an implausible one, the most trusting explanation first.
+
+    That some records are false; that the solver is in a wrong minimum; both. If nothing explains the
+    records, the best estimate with a note of what was searched in vain.
+    """
+    if clean := _without_false_records(found):
+        return clean
+    best = _from_other_starts(problem, found)
+    if _is_plausible(problem, best):
+        return ChainedEstimate(best)
+    if clean := _without_false_records(best):
+        return clean
+    # The best one may be of fewer records, and the cost of all of them is what there was to explain.
+    unexplained = max(cost(found), cost(best))
+    return ChainedEstimate(best, in_vain=SearchInVain(unexplained, problem.records))
+
+
+def _without_false_records(found: Identification) -> ChainedEstimate | None:
+    """The plausible estimate from most of the records, if there is one."""
+    for fewer in without_gross_errors(found):
+        if _is_plausible(fewer.problem, fewer):
+            false = frozenset(record_ids(found.problem)) - frozenset(record_ids(fewer.problem))
+            return ChainedEstimate(fewer, false)
+    return None
+
+
+def _from_other_starts(problem: Problem, found: Identification) -> Identification:
+    """The estimate with most records and lowest cost of those from any start.
+
+    The search ends at a plausible one, and when enough starts have led to the same minimum: then that is
+    the only one.
+    """
+    best, same, others = found, 0, _estimates_from_other_starts(problem)
+    while same < SAME_MINIMUM and not _is_plausible(problem, best):
+        other = next(others, None)
+        if other is None:
+            break
+        is_better = (other.records, -cost(other)) > (best.records, -cost(best))
+        if _is_same_minimum(best, other):
+            same += 1
+        elif is_better:
+            same = 0
+        if is_better:
+            best = other
+    return best if best.converged else _continued(problem, best)
+
+
+def _is_same_minimum(found: Identification, other: Identification) -> bool:
+    is_near = abs(cost(other) - cost(found)) <= SAME_COST * cost(found)
+    return other.records == found.records and is_near
+
+
+def _estimates_from_other_starts(problem: Problem) -> Iterator[Identification]:
+    """Estimates from the drawing, and from random geometries within the tolerances.
+
+    With few records, one of them may be beyond a singularity for all robots near the drawing.
+    """
+    yield estimate_online(problem)
+    for restarted in restarts(problem):
+        yield estimate_online(restarted, TRIAL)
+
+
+def _continued(problem: Problem, before: Identification) -> Identification:
+    """The estimate from one of fewer or other records; from the drawing where a pose is not found."""
+    poses = _start_poses(problem, before)
+    if poses is None:
+        return estimate_online(problem)
+    # While the records leave much open, undamped steps may diverge.
+    options = INCREMENTAL if is_determined(problem) else COARSE
+    return estimate_online(problem.starting_at(before.free, poses), options)
+
+
+def _start_poses(problem: Problem, before: Identification) -> PoseBatch | None:
+    """Poses that close the previous estimate, to start the search; None if one is not found."""
+    old = problem.rows_of(before.problem.labels)
+    is_new = np.ones(problem.records, dtype=bool)
+    is_new[old] = False
+    new = np.flatnonzero(is_new)
+    solved = problem.commands[new].solve_poses(before.geometry, problem.joints[new])
+    if not solved.found[problem.has_start_pose[new]].all():
+        return None
+    return problem.commands.poses.with_rows(new, solved.poses).with_rows(old, before.poses)

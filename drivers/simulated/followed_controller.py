@@ -21,8 +21,7 @@ from drivers.simulated.served_device import Closeable
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
-from hexacell.config.contents import fingerprint
-from hexacell.config.layout import ConfigLayout
+from hexacell.config.layout import ConfigLayout, fingerprint
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import LEGS

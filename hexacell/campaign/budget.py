@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.pilots import pilots_per_departure
+from hexacell.cell.limits import SpeedSettings
 from hexacell.cell.model import CellSettings
-from hexacell.cell.speed import SpeedSettings
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.motion.duration import SpeedLimits
 

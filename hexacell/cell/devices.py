@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from hexacell.cell.certificates import CertificateSettings
 from hexacell.cell.described_devices import (
     DbcSettings,
     ModbusEncoderSettings,
@@ -18,6 +17,7 @@ from hexacell.cell.described_devices import (
     VisaSettings,
 )
 from hexacell.cell.fields import (
+    CertificateSettings,
     InRange,
     Name,
     NotNegative,

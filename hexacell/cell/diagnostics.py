@@ -16,8 +16,7 @@ from pydantic import ValidationError
 
 from hexacell.cell.fields import Section
 from hexacell.errors import FileError, did_you_mean
-from hexacell.storage.toml_document import TomlDocument, table_header
-from hexacell.storage.toml_locations import KeyPath
+from hexacell.storage.toml_document import KeyPath, TomlDocument, table_header
 
 
 @dataclass(frozen=True, slots=True)

@@ -134,7 +134,7 @@ class Section(Frozen):
     """A section of the cell file.
 
     A key whose value is in the unit of the joint variables has that unit in its name, and the field has
-    not: ``encoder`` is ``encoder_mm`` in a file, or ``encoder_deg`` (:mod:`hexacell.cell.joint_units`).
+    not: ``encoder`` is ``encoder_mm`` in a file, or ``encoder_deg`` (:mod:`hexacell.cell.by_mechanism`).
     """
 
     model_config = ConfigDict(serialize_by_alias=True)
@@ -163,3 +163,19 @@ def first_mistake(refusal: ValidationError, whole: str) -> str:
 
 GeometryDocument = dict[str, tuple[Finite | tuple[Finite, ...], ...]]
 """The values of a geometry under the symbols of its parameter kinds, as JSON files have them."""
+
+
+class CertificateSettings(Section):
+    """The certificate of an instrument, to which its readings are traceable."""
+
+    number: Text = Field(min_length=1, description="of the certificate, with who issued it")
+    due: Day | None = Field(
+        None, description='day, as "2027-03-31", after which a person must approve what rests on it'
+    )
+    expanded_um: float | None = Field(
+        None, gt=0, le=1000, allow_inf_nan=False, description="expanded uncertainty, k = 2, as certified"
+    )
+
+    def has_expired(self, day: date) -> bool:
+        """Whether it holds no longer on a day."""
+        return self.due is not None and day > self.due

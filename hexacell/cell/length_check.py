@@ -7,8 +7,16 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from hexacell.cell.certificates import CertificateSettings
-from hexacell.cell.fields import InRange, NotNegative, PointInRange, Positive, Section, Text, broken_rule
+from hexacell.cell.fields import (
+    CertificateSettings,
+    InRange,
+    NotNegative,
+    PointInRange,
+    Positive,
+    Section,
+    Text,
+    broken_rule,
+)
 
 MicrometresPerMetreKelvin = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
 COARSEST_SHARE = 1e-3

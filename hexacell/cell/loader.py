@@ -12,19 +12,18 @@ from datetime import date
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
-import tomlkit
 from pydantic import SecretStr, ValidationError
 
+from hexacell.cell.by_mechanism import cell_model
 from hexacell.cell.diagnostics import Diagnosis, ModelLookup
 from hexacell.cell.fields import Section
-from hexacell.cell.model import CellSettings, cell_model
+from hexacell.cell.model import CellSettings
 from hexacell.cell.robot import DEFAULT_MECHANISM
 from hexacell.errors import FileError, UsageError, did_you_mean, joined
 from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text
 from hexacell.storage.secrets import MASK, without_secrets
-from hexacell.storage.toml_document import TomlDocument, is_secret, table_header
-from hexacell.storage.toml_locations import KeyPath
+from hexacell.storage.toml_document import KeyPath, TomlDocument, is_secret, table_header
 
 LARGEST_FILE_BYTES = 500_000
 """Of a cell file, which usually has less than ten thousand."""
@@ -226,6 +225,8 @@ def _setting(name: str, value: object, comment: str | None) -> list[str]:
 
 
 def _value(value: object) -> str:
+    import tomlkit  # noqa: PLC0415 - only where a cell file is printed
+
     if isinstance(value, tuple) and value and all(isinstance(row, tuple) for row in value):
         return "[\n" + "".join(f"  {_value(row)},\n" for row in value) + "]"
     if isinstance(value, dict):

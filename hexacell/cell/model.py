@@ -3,34 +3,25 @@
 from __future__ import annotations
 
 from datetime import date
-from functools import cache
-from typing import Any, Literal, Self, TypeVar
+from typing import Literal, Self, TypeVar
 
-from pydantic import Field, ValidationError, create_model, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 from pydantic_core import InitErrorDetails
 
-from hexacell.cell.archive import ArchiveSettings
-from hexacell.cell.certificates import CertificateSettings, ReportSettings
-from hexacell.cell.controller import ControllerSettings, RotaryControllerSettings
+from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.devices import (
     EncoderSettings,
     GaugeSettings,
-    LinearEncoderSettings,
-    RotaryEncoderSettings,
     ThermometerSettings,
 )
 from hexacell.cell.fields import (
-    GeometrySettings,
-    InRange,
+    CertificateSettings,
     Name,
-    NotNegative,
-    Positive,
     Section,
     broken_rule,
 )
-from hexacell.cell.joint_units import in_joint_unit
 from hexacell.cell.length_check import LengthCheckSettings
-from hexacell.cell.limits import LimitSettings
+from hexacell.cell.limits import LimitSettings, SpeedSettings
 from hexacell.cell.measuring import (
     AcceptanceSettings,
     CheckSettings,
@@ -43,21 +34,22 @@ from hexacell.cell.measuring import (
     TimingSettings,
     VerificationSettings,
 )
-from hexacell.cell.notifications import MOST_NOTIFICATIONS, NotificationSettings
-from hexacell.cell.opcua import OpcUaSettings
+from hexacell.cell.operation import (
+    MOST_NOTIFICATIONS,
+    ArchiveSettings,
+    NotificationSettings,
+    OpcUaSettings,
+    ReportSettings,
+    UnattendedSettings,
+)
 from hexacell.cell.recovery import RecoverySettings
-from hexacell.cell.robot import RobotSettings, mechanism_of
-from hexacell.cell.simulation import SimulatedEncoders, SimulatedMotion, SimulationSettings
-from hexacell.cell.speed import SpeedSettings
-from hexacell.cell.unattended import UnattendedSettings
+from hexacell.cell.robot import RobotSettings
+from hexacell.cell.simulation import SimulationSettings
 from hexacell.cell.uncertainty import (
     CommonUncertaintySettings,
-    LinearUncertaintySettings,
-    RotaryUncertaintySettings,
-    UncertaintySettings,
 )
 from hexacell.kinematics.mechanism import Mechanism
-from hexacell.kinematics.parameters import LEGS, JointUnit, ParameterKind, ParameterSet
+from hexacell.kinematics.parameters import JointUnit
 
 MOST_THERMOMETERS = 100
 
@@ -229,100 +221,3 @@ class CellSettings(Section):
         if refusals:
             raise ValidationError.from_exception_data(self.name, refusals)
         return self
-
-
-def cell_model(mechanism: str, *, encoder_scales: bool = False) -> type[CellSettings]:
-    """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed.
-
-    Each has one model only, however it is asked for: settings of two would never be equal.
-    """
-    return _cell_model(mechanism, encoder_scales)
-
-
-@cache
-def _cell_model(mechanism: str, encoder_scales: bool) -> type[CellSettings]:
-    found = mechanism_of(mechanism, encoder_scales=encoder_scales)
-    parameters = found.parameters
-    geometry, tolerances = geometry_settings(parameters), tolerance_settings(parameters)
-    has_defaults = not any(field.is_required() for field in tolerances.model_fields.values())
-    robot = _derived(RobotSettings, nominal=(geometry, RobotSettings.model_fields["nominal"]))
-    truth = SimulationSettings.model_fields["geometry"]
-    simulated = _in_unit(found, encoders=SimulatedEncoders, motion=SimulatedMotion)
-    simulation = _derived(SimulationSettings, geometry=(geometry, truth), **simulated)
-    uncertainty = uncertainty_settings(found)
-    is_rotary = found.words.joint_unit is JointUnit.DEG
-    encoders = in_joint_unit(
-        RotaryEncoderSettings if is_rotary else LinearEncoderSettings, found.words.joint_unit
-    )
-    return _derived(
-        CellSettings,
-        uncertainty=(uncertainty, uncertainty()),
-        robot=(robot, ...),
-        encoders=(encoders, ...),
-        controller=(RotaryControllerSettings if is_rotary else ControllerSettings, ...),
-        tolerances=(tolerances, tolerances() if has_defaults else ...),
-        simulation=(simulation | None, None),
-        **_in_unit(
-            found,
-            noise=NoiseSettings,
-            limits=LimitSettings,
-            speed=SpeedSettings,
-            timing=TimingSettings,
-            guards=GuardSettings,
-        ),
-    )
-
-
-def uncertainty_settings(mechanism: Mechanism) -> type[CommonUncertaintySettings]:
-    """The section of the effects that a mechanism has."""
-    if mechanism.words.joint_unit is JointUnit.DEG:
-        return RotaryUncertaintySettings
-    return LinearUncertaintySettings if mechanism.words.guide is None else UncertaintySettings
-
-
-def _in_unit(mechanism: Mechanism, **sections: type[Section]) -> dict[str, Any]:
-    """Fields of sections with a default, in the unit of the mechanism's joint variables."""
-    made = {name: in_joint_unit(one, mechanism.words.joint_unit) for name, one in sections.items()}
-    return {name: (one, one()) for name, one in made.items()}
-
-
-def geometry_settings(parameters: ParameterSet) -> type[GeometrySettings]:
-    """The section for a geometry of these parameters."""
-    fields: dict[str, Any] = {
-        kind.symbol: (_array_type(kind), Field(_default(kind), description=kind.meaning))
-        for kind in parameters.kinds
-    }
-    return _derived(GeometrySettings, **fields)
-
-
-def tolerance_settings(parameters: ParameterSet) -> type[ToleranceSettings]:
-    """The section for the tolerances of these parameters."""
-    fields: dict[str, Any] = {
-        kind.tolerance_key: (Positive, _tolerance_field(kind)) for kind in parameters.kinds
-    }
-    kinds = " and ".join(kind.symbol for kind in parameters.kinds if kind.has_ball_offset)
-    description = f"mounting of the ball: an offset common to all {kinds}"
-    fields["ball_mm"] = (NotNegative, Field(0.0, description=description))
-    return _derived(ToleranceSettings, **fields)
-
-
-def _tolerance_field(kind: ParameterKind) -> Any:  # noqa: ANN401 - what pydantic's Field returns
-    default = ... if kind.default_tolerance is None else kind.default_tolerance
-    return Field(default, description=kind.tolerance_meaning)
-
-
-def _default(kind: ParameterKind) -> Any:  # noqa: ANN401 - what pydantic's Field takes
-    return ... if kind.default is None else (kind.default,) * LEGS
-
-
-def _array_type(kind: ParameterKind) -> Any:  # noqa: ANN401 - a type made here
-    made: Any = Positive if kind.is_positive else InRange
-    for length in reversed(kind.shape):
-        made = tuple.__class_getitem__((made,) * length)
-    return made
-
-
-def _derived(base: type[SectionType], /, **fields: Any) -> type[SectionType]:  # noqa: ANN401
-    """A section with the fields that the mechanism decides; each is a type and a default or description."""
-    made: type[SectionType] = create_model(base.__name__, __base__=base, __doc__=base.__doc__, **fields)
-    return made

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hexacell.cell.archive import mistake_in_url
+from hexacell.cell.operation import mistake_in_url
 from hexacell.cli.console import Console
 from hexacell.errors import FileError, UsageError
 from hexacell.services.history.cell_status import CellStatus

@@ -10,10 +10,10 @@ from hexacell.cell.loader import Cell
 from hexacell.cli.archive_argument import publish_or_warn
 from hexacell.cli.console import Console
 from hexacell.services.history.cell_status import cell_status
-from hexacell.services.notify.run_notices import RunEnd, notice_of_end, notice_of_failure
-from hexacell.services.notify.telling_people import tell_people
+from hexacell.services.notify.notice import RunEnd, notice_of_end, notice_of_failure
+from hexacell.services.notify.outbox import notify_all
 from hexacell.services.run.calibration_run import RunRequest
-from hexacell.text.notices import NEXT_TIME, telling_line
+from hexacell.text.notices import NEXT_TIME, notify_line
 
 
 @dataclass
@@ -58,10 +58,10 @@ def _tell(request: RunRequest, console: Console, news: RunNews, error: Exception
             notice = notice_of_end(news.end)
         else:
             return
-        line = telling_line(tell_people(request.cell, notice))
+        line = notify_line(notify_all(request.cell, notice))
     except KeyboardInterrupt:
-        line = f"not told: interrupted ({NEXT_TIME})"
+        line = f"not notified: interrupted ({NEXT_TIME})"
     except Exception as fault:
-        line = f"not told: a fault of the program ({type(fault).__name__})"
+        line = f"not notified: a fault of the program ({type(fault).__name__})"
     if line is not None:
         console.warn(line)

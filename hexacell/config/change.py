@@ -11,8 +11,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import ValidationError, model_validator
 
 from hexacell.cell.fields import Frozen, GeometryDocument, first_mistake
-from hexacell.config.contents import Contents, fingerprint_of, names_of, read_contents
-from hexacell.config.layout import ConfigLayout
+from hexacell.config.layout import ConfigLayout, Contents, fingerprint_of, names_of, read_contents
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.storage import atomic_files
@@ -108,7 +107,7 @@ def propose(
 ) -> ConfigChange:
     """The change that gives the controller the geometry ``after``, mm; nothing is written.
 
-    ``fingerprint_at_start`` is the :func:`~hexacell.config.contents.fingerprint` of the config
+    ``fingerprint_at_start`` is the :func:`~hexacell.config.layout.fingerprint` of the config
     when the run began: the measurements were commanded with that geometry and are meaningless with another.
 
     Raises:

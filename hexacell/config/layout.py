@@ -1,4 +1,4 @@
-"""Which files a controller's geometry is in, and in which format each of them is.
+"""Which files a controller's geometry is in, in which format each of them is, and what they hold now.
 
 Most controllers have it in one file. Of LinuxCNC's ``genhexkins`` base and platform may be in a HAL file
 and the zeros of the legs in the INI file. Each parameter is looked for in every file and must be in one.
@@ -6,7 +6,8 @@ and the zeros of the legs in the INI file. Each parameter is looked for in every
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
@@ -125,3 +126,68 @@ def _not_in_one(name: str, having: Sequence[Path], paths: Sequence[Path]) -> Fil
         subject=paths[0],
         action="Name the file that has it in [[controller.further_files]], or correct config_options",
     )
+
+
+class CurrentConfig:
+    """The config that a controller is to run; parsed again when its content has changed."""
+
+    def __init__(self, paths: tuple[Path, ...], layout: ConfigLayout) -> None:
+        self._paths = paths
+        self._layout = layout
+        self._parsed: tuple[str, ControllerGeometry] | None = None
+
+    @property
+    def path(self) -> Path:
+        """The config, or its first file, which stands for it in messages."""
+        return self._paths[0]
+
+    def geometry(self) -> ControllerGeometry:
+        """The geometry that it states now; raises ``FileError``."""
+        now = fingerprint(*self._paths)
+        if self._parsed is None or self._parsed[0] != now:
+            self._parsed = now, self._layout.read(*self._paths)
+        return self._parsed[1]
+
+
+Contents = tuple[bytes, ...]
+"""Of each file, in the order in which the cell file names them."""
+
+
+def read_contents(paths: Iterable[Path]) -> Contents:
+    """What the files hold now; raises ``FileError``."""
+    return tuple(atomic_files.read_bytes(path) for path in paths)
+
+
+def read_contents_if_present(paths: Iterable[Path]) -> Contents | None:
+    """The same; none if one of the files is not there."""
+    found = [atomic_files.read_if_present(path) for path in paths]
+    there = tuple(data for data in found if data is not None)
+    return there if len(there) == len(found) else None
+
+
+def fingerprint_of(contents: Contents) -> str:
+    """The SHA-256 of a single file; of several that of their SHA-256s, in order, a line each."""
+    each = [atomic_files.sha256(data) for data in contents]
+    if len(each) == 1:
+        return each[0]
+    return atomic_files.sha256("".join(f"{one}\n" for one in each).encode())
+
+
+def fingerprint(*paths: Path) -> str:
+    """That of a config, for the start of a run; raises ``FileError``."""
+    return fingerprint_of(read_contents(paths))
+
+
+def names_of(paths: Sequence[Path]) -> tuple[str, ...]:
+    """What the files are called in text: their names, or more of their paths where these are the same."""
+    names = tuple(path.name for path in paths)
+    if len({*names}) == len(names):
+        return names
+    absolute = [path.absolute() for path in paths]
+    common = os.path.commonpath([path.parent for path in absolute])
+    return tuple(os.path.relpath(path, common) for path in absolute)
+
+
+def are_same_files(some: Sequence[Path], others: Sequence[Path]) -> bool:
+    """Whether two configs are the same files in the same order, links resolved."""
+    return [os.path.realpath(path) for path in some] == [os.path.realpath(path) for path in others]

@@ -5,22 +5,33 @@
     ...
     L6 = 700.0
 
-HAL reads them by ``setp hexaglidekins.s1x [HEXAGLIDE]S1X``. Limits of joints and axes in the
-same file hold as well.
+HAL reads them by ``setp hexaglidekins.s1x [HEXAGLIDE]S1X``. Limits of joints and axes in the same file
+(``[JOINT_0] MIN_LIMIT``, ``[AXIS_X] MAX_LIMIT``) hold as well.
+
+LinuxCNC looks for a variable in the first section of that name alone and takes the first one there; names
+are case-sensitive; what stands behind the number belongs to the value, comments too; a backslash at the end
+of a line, even of a comment, makes the next one a part of it (seen with ``inivar`` of LinuxCNC 2.9). What
+LinuxCNC would not see, or see otherwise than a person, is refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from pydantic import Field
 
-from hexacell.cell.fields import Text
-from hexacell.config.ini_text import IniText
-from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, NumberKeys, options_of
-from hexacell.config.linuxcnc_limits import limits_in
-from hexacell.kinematics.parameters import ParameterSet
+from hexacell.cell.fields import LARGEST_NUMBER, Text
+from hexacell.config.interface import LARGEST_CONFIG_BYTES, ControllerLimits, Range
+from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, NumberKeys, NumberLookup, options_of
+from hexacell.config.number_tokens import NumberToken, number_of, token_error
+from hexacell.errors import FileError
+from hexacell.kinematics.parameters import LEGS, ParameterSet
+from hexacell.storage import atomic_files
 
 
 class LinuxcncIniOptions(KeyedOptions):
@@ -44,3 +55,177 @@ class LinuxcncIni(KeyedConfig):
             options.unit_mm,
             lambda text, path: limits_in(text, path, options.unit_mm),
         )
+
+
+SEPARATOR = "/"
+"""Between a section and a variable in a key; without it the variable is in the section of the options."""
+
+CONTINUED = "\\"
+"""At the end of a line; before a carriage return LinuxCNC takes it for a part of the value."""
+
+_CONTINUATION = "the line before ends with a backslash and goes on in this one", "Remove the backslash"
+_SECOND_SECTION = "it does not look into a second section of that name", "Move it to the first one"
+
+_UNCLOSED = "the line that begins its section has no ']'", "Close it"
+
+# A line that begins with "[" ends the section before it, closed or not.
+_SECTION = re.compile(r"[ \t]*\[(?P<name>[^\]\n]*)(?P<close>\])?")
+# Whatever stands between the name and the first "=" LinuxCNC skips; without one it looks no further.
+_VARIABLE = re.compile(
+    r"[ \t]*(?P<name>[^=\s#;\[][^=\s]*)(?:[ \t][^=\n]*)?(?:=[ \t]*(?P<value>.*?))?[ \t\r]*(?:\n|\Z)"
+)
+_NUMBER_AND_MORE = re.compile(r"(?P<number>[-+.\deE]+)[ \t]+(?P<more>.+)")
+
+
+@dataclass(frozen=True, slots=True)
+class _Variable:
+    """One that a person sees; ``hidden`` is why LinuxCNC does not, and what to do, if so."""
+
+    section: str
+    name: str
+    token: NumberToken
+    hidden: tuple[str, str] | None
+
+
+@dataclass(frozen=True)
+class IniText:
+    """A :class:`~hexacell.config.keyed_config.NumberLookup` in an INI text."""
+
+    text: str
+    source: Path | None
+    section: str
+
+    def number(self, key: str) -> NumberToken:
+        """The value of ``VARIABLE``, or of ``SECTION/VARIABLE``.
+
+        Raises:
+            FileError: LinuxCNC does not find it, or it is there twice, or more than a number.
+        """
+        section, _, name = key.rpartition(SEPARATOR)
+        section = section or self.section
+        found = [one for one in self._variables if (one.section, one.name) == (section, name)]
+        seen = [one.token for one in found if one.hidden is None]
+        if not seen:
+            raise self._missing(section, name, found)
+        if len(seen) > 1:
+            raise self._error(
+                seen[1],
+                f"[{section}] has {name} a second time; LinuxCNC takes the one of line {seen[0].line}",
+                "Remove one",
+            )
+        if more := _NUMBER_AND_MORE.fullmatch(seen[0].text):
+            raise self._error(
+                seen[0],
+                f"behind {name} stands {more['more']!r}, which LinuxCNC takes for a part of the value",
+                "Put it into a line of its own",
+            )
+        return seen[0]
+
+    def has(self, key: str) -> bool:
+        """Whether there is such a variable, wherever."""
+        section, _, name = key.rpartition(SEPARATOR)
+        return any((one.section, one.name) == (section or self.section, name) for one in self._variables)
+
+    def has_section(self, name: str) -> bool:
+        """Whether there is such a section with a variable in it."""
+        return any(one.section == name for one in self._variables)
+
+    def _missing(self, section: str, name: str, found: list[_Variable]) -> FileError:
+        for one in found:
+            if one.hidden is not None:
+                problem, action = one.hidden
+                return self._error(
+                    one.token, f"LinuxCNC does not see [{section}] {name}: {problem}", action
+                )
+        return FileError(
+            f"there is no {name} in a section [{section}]",
+            subject=self.source,
+            action="Name the file that holds it, or correct [controller.config_options]",
+        )
+
+    def _error(self, token: NumberToken, problem: str, action: str) -> FileError:
+        return FileError(problem, subject=self.source, line=token.line, action=action)
+
+    @cached_property
+    def _variables(self) -> tuple[_Variable, ...]:
+        return tuple(self._each_variable())
+
+    def _each_variable(self) -> Iterator[_Variable]:
+        section, seen, start = "", set[str](), 0
+        hidden_by_header: tuple[str, str] | None = None
+        is_continued = False
+        for line, content in enumerate(self.text.split("\n"), start=1):
+            was_continued, is_continued = is_continued, content.endswith(CONTINUED)
+            if variable := _VARIABLE.fullmatch(content):
+                group = "value" if variable["value"] is not None else "name"
+                first, end = (start + place for place in variable.span(group))
+                token = NumberToken(variable[group], first, end, line)
+                hidden = _CONTINUATION if was_continued else hidden_by_header
+                yield _Variable(section, variable["name"], token, hidden)
+            elif (header := _SECTION.match(content)) and not was_continued:
+                section, hidden_by_header = header["name"], _SECOND_SECTION
+                if header["close"] is None:
+                    section, hidden_by_header = section.strip(), _UNCLOSED
+                elif section not in seen:
+                    hidden_by_header = None
+                    seen.add(section)
+            start += len(content) + 1
+
+
+LINEAR, ANGULAR = "XYZ", "ABC"
+ROTARY_JOINT = "ANGULAR"
+
+
+def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
+    """The limits in an INI file, in mm and deg; of axes and joints that are not all there: none.
+
+    ``unit_mm`` is one unit of length of the machine; angles are in degrees on every machine.
+
+    Raises:
+        FileError: the file cannot be read, or a limit is no number, or not above the other.
+    """
+    text = IniText(atomic_files.read_text(path, LARGEST_CONFIG_BYTES), path, "")
+    return limits_in(text, path, unit_mm)
+
+
+def limits_in(ini: NumberLookup, source: Path | None, unit_mm: float) -> ControllerLimits:
+    """The same of a text that was read from ``source``."""
+    joints = [
+        _range(ini, section, 1.0 if _turns(ini, section) else unit_mm, source)
+        for section in (f"JOINT_{leg}" for leg in range(LEGS))
+    ]
+    axes = [
+        *(_range(ini, f"AXIS_{axis}", unit_mm, source) for axis in LINEAR),
+        *(_range(ini, f"AXIS_{axis}", 1.0, source) for axis in ANGULAR),
+    ]
+    stated = [one for one in joints if one is not None]
+    return ControllerLimits(
+        joints=tuple(stated) if len(stated) == LEGS else None, axes=tuple(axes) if any(axes) else None
+    )
+
+
+def _turns(ini: NumberLookup, joint: str) -> bool:
+    """Whether a joint is one of angles; without ``TYPE`` LinuxCNC takes it for one of lengths."""
+    key = f"{joint}/TYPE"
+    return ini.has(key) and ini.number(key).text.upper() == ROTARY_JOINT
+
+
+def _range(ini: NumberLookup, section: str, unit: float, source: Path | None) -> Range | None:
+    """Both limits of a joint or an axis; LinuxCNC takes one that is not there for none."""
+    low, high = (_limit(ini, f"{section}/{name}", source) for name in ("MIN_LIMIT", "MAX_LIMIT"))
+    if low is None and high is None:
+        return None
+    lowest = -LARGEST_NUMBER if low is None else unit * low.value
+    highest = LARGEST_NUMBER if high is None else unit * high.value
+    if low is not None and high is not None and lowest >= highest:
+        problem = f"MAX_LIMIT of [{section}] is not above its MIN_LIMIT, {low.text}"
+        raise token_error(high, problem, source, "Correct one of them")
+    return lowest, highest
+
+
+def _limit(ini: NumberLookup, key: str, source: Path | None) -> NumberToken | None:
+    if not ini.has(key):
+        return None
+    token = ini.number(key)
+    number_of(token, source)
+    return token

@@ -1,24 +1,25 @@
-"""A write of several files at once, noted beside them until it is complete.
+"""The cell held by this process, and writes of several files at once, noted until they are complete.
 
 One file is replaced in one step; several are not. Before the first of them is replaced, a note of what all
 of them hold is written beside them and synced to the disk; it is removed once the last one is replaced and
-read back. If the process is killed in between, the next one that holds the cell finds the note and puts the
-old content back, or, where all files are new already, only removes the note.
+read back. If the process is killed in between, the next one that holds the cell finds the note and restores
+the old content or, where all files are new already, only removes the note.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
 from hexacell.cell.fields import Frozen
 from hexacell.config.change import JsonRecord
-from hexacell.config.contents import Contents, names_of, read_contents
-from hexacell.errors import FileError
+from hexacell.config.layout import Contents, names_of, read_contents
+from hexacell.errors import CellBusy, FileError
+from hexacell.runs.cell_lock import cell_lock
 from hexacell.storage import atomic_files
 
 _AS_TEXT = "latin-1"
@@ -171,3 +172,46 @@ def _readers(path: Path) -> int:
         return path.stat().st_mode & 0o044
     except OSError as error:
         raise atomic_files.os_error_to_file_error("cannot be read", path, error) from error
+
+
+@contextmanager
+def held_config(*paths: Path) -> Iterator[None]:
+    """Hold the cell whose config these files are until the context ends; never waits.
+
+    Raises:
+        CellBusy: another process holds it.
+        FileError: a write of its config was interrupted since the command began. It is settled now.
+    """
+    with cell_lock(*paths):
+        if (settled := settle_interrupted_write(paths)) is not None:
+            raise FileError(interrupted_sentence(settled), subject=paths[0], action="Try again")
+        yield
+
+
+def settle_config(*paths: Path) -> str | None:
+    """Settle what a process that was killed left of a write; what became of it, none if there is nothing.
+
+    Where another process holds the cell, it is left to that one.
+
+    Raises:
+        FileError: a file was edited since, or cannot be written.
+    """
+    if not is_interrupted(paths):
+        return None
+    try:
+        with cell_lock(*paths):
+            settled = settle_interrupted_write(paths)
+    except CellBusy:
+        return None
+    return None if settled is None else interrupted_sentence(settled)
+
+
+def interrupted_sentence(settled: InterruptedWrite) -> str:
+    """What is said of it."""
+    files = " and ".join(settled.files)
+    if settled.is_complete:
+        return f"a write of {files} was interrupted when all of them were new: it is complete"
+    if not settled.restored:
+        return f"a write of {files} was interrupted before any of them was replaced: all are as before"
+    restored = " and ".join(settled.restored)
+    return f"a write of {files} was interrupted between them: {restored} got the old content back"

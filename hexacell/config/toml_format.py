@@ -38,9 +38,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet
 from hexacell.storage import atomic_files
-from hexacell.storage.toml_document import TomlDocument
-from hexacell.storage.toml_edit import replace_numbers
-from hexacell.storage.toml_locations import KeyPath
+from hexacell.storage.toml_document import KeyPath, TomlDocument
 
 
 class NativeToml:
@@ -81,7 +79,7 @@ class NativeToml:
         require_physical(geometry)
         document = TomlDocument.parse(text)
         before = _Content(document, self._parameters).geometry()
-        changed = replace_numbers(document, dict(_changed_tokens(before, geometry)))
+        changed = document.replaced(dict(_changed_tokens(before, geometry)))
         after = _Content(TomlDocument.parse(changed), self._parameters).geometry()
         last_decimal = {kind.symbol: 10.0**-kind.unit.decimals for kind in self._parameters.kinds}
         if (abs(after.vector - geometry.vector) > self._parameters.by_kind(last_decimal)).any():

@@ -19,8 +19,7 @@ from typing import Literal
 from pydantic import TypeAdapter, ValidationError
 
 from hexacell.cell.fields import LONGEST_TEXT, Finite, Frozen, Text
-from hexacell.config.contents import fingerprint
-from hexacell.config.layout import ConfigLayout
+from hexacell.config.layout import ConfigLayout, fingerprint
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.runs.cell_lock import user_name

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from hexacell.cell.fields import LONGEST_TEXT, Password, Section
-from hexacell.cell.opcua import OpcUaSettings
+from hexacell.cell.operation import OpcUaSettings
 from hexacell.cell.passwords import private_content
 from hexacell.errors import UsageError
 from hexacell.storage import atomic_files

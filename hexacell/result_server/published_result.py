@@ -9,7 +9,7 @@ from enum import IntEnum
 
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError
-from hexacell.runs.folder_stamps import folder_stamps
+from hexacell.runs.archived_documents import folder_stamps
 from hexacell.runs.run_folder import runs_folder
 from hexacell.services.history.history import PastRun, past_runs
 from hexacell.verdict.decision import Verdict

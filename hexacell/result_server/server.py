@@ -13,7 +13,7 @@ from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.server import Server
 
 from hexacell.cell.loader import Cell
-from hexacell.cell.opcua import OpcUaSettings
+from hexacell.cell.operation import OpcUaSettings
 from hexacell.errors import DeviceError
 from hexacell.result_server.address_space import MOST_RESULTS, ResultNodes
 from hexacell.result_server.credentials import Reader, allowed_reader, ensure_certificate

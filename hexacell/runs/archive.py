@@ -1,8 +1,8 @@
 """The archive: an index over the run folders of a cell, in SQLite or in a PostgreSQL that cells share.
 
 The folders are the truth. The archive keeps documents that were derived from them, each with the stamp of
-its folder then (:mod:`~hexacell.runs.folder_stamps`); a document whose folder has another stamp now counts
-for nothing. So it may be deleted at any time, and a file that is damaged is replaced by an empty one.
+its folder then (:mod:`~hexacell.runs.archived_documents`); where the folder has another stamp now, the
+document counts for nothing. So it may be deleted at any time; a damaged file is replaced.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import socket
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -222,3 +223,44 @@ def _is_damaged(error: DBAPIError) -> bool:
     """Whether a file of SQLite is none, or has other tables than it should."""
     code = getattr(error.orig, "sqlite_errorcode", None)
     return code is not None and code & 0xFF not in _READ_ONLY_OR_BUSY
+
+
+@dataclass(frozen=True, slots=True)
+class SharedDocument:
+    """A document of one cell; ``place`` is the computer and folder of its runs."""
+
+    place: str
+    cell: str
+    run: str
+    content: bytes
+
+
+def shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]:
+    """All documents of one kind, by cell, place and run; none where no cell has put anything there.
+
+    Raises:
+        ArchiveUnavailable: it cannot be read.
+    """
+    columns = ARCHIVE_TABLE.c
+    query = (
+        select(columns.place, columns.cell, columns.run, columns.content)
+        .where(columns.kind == kind.value)
+        .order_by(columns.cell, columns.place, columns.run)
+    )
+    address = make_url(url)
+    try:
+        engine = open_engine(address)
+        with engine.connect() as connection:
+            if not inspect(connection).has_table(ARCHIVE_TABLE.name):
+                return ()
+            return tuple(SharedDocument(*row) for row in connection.execute(query))
+    except ModuleNotFoundError as error:
+        action = "Install hexacell[postgresql]"
+        raise ArchiveUnavailable(str(error), subject="PostgreSQL", action=action) from error
+    except SQLAlchemyError as error:
+        reason = " ".join(str(getattr(error, "orig", None) or error).split())
+        raise ArchiveUnavailable(
+            f"the archive cannot be read ({reason})",
+            subject=address.render_as_string(),
+            action="Check its address, and that the server runs",
+        ) from error

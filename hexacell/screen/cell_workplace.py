@@ -9,6 +9,7 @@ from pathlib import Path
 from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.passwords import password_warnings
+from hexacell.config.pending_write import settle_config
 from hexacell.errors import UsageError
 from hexacell.run_process.client import connect_to_run, start_host
 from hexacell.run_process.connection import RunConnection
@@ -26,7 +27,6 @@ from hexacell.services.preflight.security_warnings import exposure_warnings
 from hexacell.services.recorded.journal_soundness import require_sound
 from hexacell.services.run.interrupted_runs import LATEST, run_to_resume
 from hexacell.services.write_back.config_rollback import roll_back_config
-from hexacell.services.write_back.held_config import settle_config
 from hexacell.services.write_back.proposals import apply_proposal, approval_question, read_proposal
 from hexacell.text.config_changes import applied_text, rollback_text
 from hexacell.text.history import comparison_text, drift_text

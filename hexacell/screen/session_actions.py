@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import partial
 
-from hexacell.config.three_way import ConfigEditedSince
+from hexacell.config.receipt import ConfigEditedSince
 from hexacell.errors import HexacellError, UsageError
 from hexacell.run_process.connection import RunConnection
 from hexacell.run_process.recorded import RecordedRun

@@ -9,8 +9,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-from hexacell.storage.toml_document import SECRET_WORDS, TomlDocument, is_secret
-from hexacell.storage.toml_locations import KeyPath
+from hexacell.storage.toml_document import SECRET_WORDS, KeyPath, TomlDocument, is_secret
 
 MASK = "***"
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from hexacell.config.contents import names_of
-from hexacell.config.receipt import BEFORE, kept_paths
-from hexacell.config.three_way import ConfigVersions, NumberVersions
+from hexacell.config.layout import names_of
+from hexacell.config.receipt import BEFORE, ConfigVersions, NumberVersions, kept_paths
 from hexacell.config.write_record import WriteKind, WriteRecord
 from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
 from hexacell.services.write_back.config_rollback import ConfigRollback

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hexacell.cell.unattended import UnattendedSettings
+from hexacell.cell.operation import UnattendedSettings
 from hexacell.services.schedule.scheduled_run import ScheduledRun
 from hexacell.services.schedule.schedules import Schedule
 from hexacell.text.layout import wrapped

@@ -10,7 +10,7 @@ from itertools import zip_longest
 from pathlib import Path
 
 from hexacell.config.change import ConfigChange
-from hexacell.config.contents import Contents, fingerprint_of, read_contents
+from hexacell.config.layout import Contents, fingerprint_of, read_contents
 from hexacell.config.receipt import RECEIPT, Receipt
 from hexacell.errors import FileError
 from hexacell.runs.run_folder import RunFolder

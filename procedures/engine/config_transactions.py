@@ -28,7 +28,7 @@ from pathlib import Path
 
 from hexacell.cell.loader import Cell
 from hexacell.config.change import ConfigChange, propose
-from hexacell.config.contents import fingerprint
+from hexacell.config.layout import fingerprint
 from hexacell.config.receipt import RECEIPT, Receipt
 from hexacell.config.write_back import commit, rollback
 from hexacell.config.write_record import THE_RUN, WriteCause, WriteKind, recorded_write

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from hexacell.campaign.budget import speed_limits
 from hexacell.cell.model import CellSettings
-from hexacell.config.current import CurrentConfig
+from hexacell.config.layout import CurrentConfig
 from hexacell.kinematics.pose import Pose
 from hexacell.motion.duration import LineDurations
 from procedures.run.state import RunState

@@ -13,7 +13,7 @@ from drivers.errors import GaugeAtEnd, PoseRefused
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
-from hexacell.config.current import CurrentConfig
+from hexacell.config.layout import CurrentConfig
 from hexacell.errors import HexacellError, consists_only_of
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array

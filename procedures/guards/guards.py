@@ -22,7 +22,7 @@ from drivers.interfaces import EncoderSample
 from drivers.stop_input import SUBJECT as STOP_LINE
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
-from hexacell.config.current import CurrentConfig
+from hexacell.config.layout import CurrentConfig
 from hexacell.kinematics.position_agreement import PositionReports, PositionSource
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.stated_limits import gauge_travel_of

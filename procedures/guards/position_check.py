@@ -14,7 +14,7 @@ from drivers.errors import NotHomedError
 from drivers.interfaces import EncoderSample
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
-from hexacell.config.current import CurrentConfig
+from hexacell.config.layout import CurrentConfig
 from hexacell.kinematics.mechanism import joint_zeros
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.position_agreement import (

@@ -27,7 +27,7 @@ from hexacell.cell.simulation import SimulatedFault
 from hexacell.checks.check_result import check_line, check_result
 from hexacell.cli.app import main
 from hexacell.config.change import propose
-from hexacell.config.contents import fingerprint
+from hexacell.config.layout import fingerprint
 from hexacell.config.write_back import commit, rollback
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.identification.estimator import identify

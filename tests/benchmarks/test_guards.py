@@ -26,7 +26,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.measuring import GuardSettings
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
-from hexacell.config.current import CurrentConfig
+from hexacell.config.layout import CurrentConfig
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.services.devices.device_setup import devices_of
 from procedures.devices.device_set import Devices

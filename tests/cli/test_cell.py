@@ -10,7 +10,8 @@ from contextlib import contextmanager
 
 import pytest
 
-from hexacell.cell.model import CellSettings, cell_model
+from hexacell.cell.by_mechanism import cell_model
+from hexacell.cell.model import CellSettings
 
 CONTROLLER = "simulated-hexaglide.controller.toml"
 

@@ -45,7 +45,7 @@ def test_a_check_tells_its_verdict(typed_here, quick_cell, few_candidates, tmp_p
     assert outcome.document["line"] in told["line"]
     assert server.headers[0]["Authorization"] == f"Bearer {TOKEN}"
     assert [json.loads(payload) for payload in state.retained.values()] == [told]
-    (line,) = [line for line in outcome.err.splitlines() if "not told" in line]
+    (line,) = [line for line in outcome.err.splitlines() if "not notified" in line]
     assert "nobody: Connection refused" in line
     assert "hexacell notify CELL --send" in line
     for path in quick_cell.path.rglob("*"):
@@ -71,12 +71,12 @@ def test_it_changes_nothing_if_telling_has_a_fault(typed_here, quick_cell, monke
     def fail(*_: object) -> None:
         raise RuntimeError(TOKEN)
 
-    monkeypatch.setattr("hexacell.cli.told_afterwards.tell_people", fail)
+    monkeypatch.setattr("hexacell.cli.told_afterwards.notify_all", fail)
     tell(quick_cell, "hall", "http://127.0.0.1:1/")
     with cell_lock(quick_cell.controller):
         outcome = typed_here("run", quick_cell.cell, *CHECK)
     assert outcome.code == 5
-    assert "not told: a fault of the program (RuntimeError)" in outcome.err
+    assert "not notified: a fault of the program (RuntimeError)" in outcome.err
     assert TOKEN not in outcome.err
 
 
@@ -90,10 +90,10 @@ def test_who_is_told_can_be_tried_and_sent_to_later(typed_here, quick_cell, tmp_
         assert (tried.code, tried.document["told"][0]["problem"]) == (3, "the server answers 503")
         server.statuses = [204]
         server.bodies.clear()
-        assert typed_here("notify", quick_cell.cell, "--test").out == "hall: told (1)\n"
+        assert typed_here("notify", quick_cell.cell, "--test").out == "hall: notified (1)\n"
         assert json.loads(server.bodies[-1])["occasions"] == ["test"]
         sent = typed_here("notify", quick_cell.cell, "--send")
-        assert (sent.code, sent.out) == (0, "hall: told (1)\n")
+        assert (sent.code, sent.out) == (0, "hall: notified (1)\n")
         assert json.loads(server.bodies[-1])["occasions"] == ["failure"]
         assert typed_here("notify", quick_cell.cell, "--send").out == "nothing waits\n"
 
@@ -119,7 +119,7 @@ def test_a_password_in_clear_is_warned_of(typed_here, quick_cell, url, is_warned
 
 
 def test_nobody_to_tell(typed_here, quick_cell) -> None:
-    assert "nobody is told" in typed_here("notify", quick_cell.cell).out
+    assert "nobody is notified" in typed_here("notify", quick_cell.cell).out
     outcome = typed_here("notify", quick_cell.cell, "--test")
     assert outcome.code == 2
     assert "[[notifications]]" in outcome.err
@@ -145,7 +145,7 @@ def test_killed_while_it_is_sent_it_is_sent_later(typed_here, start, quick_cell)
         quick_cell.cell.write_text(
             refused.replace(refused.rpartition('url = "')[2].split('"')[0], server.url)
         )
-        assert typed_here("notify", quick_cell.cell, "--send").out == "hall: told (1)\n"
+        assert typed_here("notify", quick_cell.cell, "--send").out == "hall: notified (1)\n"
     assert json.loads(server.bodies[0])["occasions"] == ["failure"]
 
 
@@ -153,9 +153,9 @@ def test_a_stop_signal_while_it_is_told_leaves_the_exit_code(typed_here, quick_c
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hexacell.cli.told_afterwards.tell_people", stopped)
+    monkeypatch.setattr("hexacell.cli.told_afterwards.notify_all", stopped)
     tell(quick_cell, "hall", "http://127.0.0.1:1/")
     with cell_lock(quick_cell.controller):
         outcome = typed_here("run", quick_cell.cell, *CHECK)
     assert outcome.code == 5
-    assert "not told: interrupted" in outcome.err
+    assert "not notified: interrupted" in outcome.err

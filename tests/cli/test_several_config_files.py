@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from hexacell.cell.loader import Cell
-from hexacell.config.contents import Contents, read_contents
+from hexacell.config.layout import Contents, read_contents
 from tests.cli.commands import surroundings
 from tests.hexacell.services.proposed_runs import ProposedRun, propose_run
 from tests.several_config_files import hexapod_cell

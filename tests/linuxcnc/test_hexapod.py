@@ -15,7 +15,7 @@ from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import load_cell
 from hexacell.config.change import propose
-from hexacell.config.contents import fingerprint
+from hexacell.config.layout import fingerprint
 from hexacell.config.write_back import commit
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros

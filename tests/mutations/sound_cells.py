@@ -11,13 +11,11 @@ from typing import Any
 import pytest
 
 from hexacell.cell.bundled import bundled_config
-from hexacell.cell.certificates import CertificateSettings, ReportSettings
 from hexacell.cell.devices import ThermometerSettings
+from hexacell.cell.fields import CertificateSettings
 from hexacell.cell.loader import dump, load_cell
 from hexacell.cell.model import CellSettings
-from hexacell.cell.notifications import NotificationSettings
-from hexacell.cell.opcua import OpcUaSettings
-from hexacell.cell.unattended import UnattendedSettings
+from hexacell.cell.operation import NotificationSettings, OpcUaSettings, ReportSettings, UnattendedSettings
 from hexacell.cli.app import main
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode

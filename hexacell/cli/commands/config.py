@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import TerminalOperator, is_interactive
-from hexacell.config.three_way import ConfigEditedSince
+from hexacell.config.pending_write import settle_config
+from hexacell.config.receipt import ConfigEditedSince
 from hexacell.errors import ExitCode
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.write_back.config_rollback import roll_back_config
-from hexacell.services.write_back.held_config import settle_config
 from hexacell.services.write_back.proposals import apply_proposal, read_proposal
 from hexacell.text.config_changes import applied_text, rollback_text, versions_text
 from hexacell.text.documents import applied_document, rollback_document

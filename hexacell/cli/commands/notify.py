@@ -8,18 +8,18 @@ from hexacell.cell.loader import Cell
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
-from hexacell.services.notify.run_notices import notice_of_test
-from hexacell.services.notify.telling_people import (
-    TellingOutcome,
+from hexacell.services.notify.notice import notice_of_test
+from hexacell.services.notify.outbox import (
+    NotifyOutcome,
+    notify_test,
     send_waiting,
-    tell_test,
     waiting_notices,
 )
 from hexacell.text.notices import (
     notifications_document,
     notifications_text,
-    telling_document,
-    telling_text,
+    notify_document,
+    notify_text,
 )
 
 
@@ -32,10 +32,11 @@ def main(options: argparse.Namespace) -> ExitCode:
     return _told(send_waiting(cell), console) if options.send else _list(cell, console)
 
 
-def _tested(cell: Cell) -> TellingOutcome:
+def _tested(cell: Cell) -> NotifyOutcome:
     if not cell.settings.notifications:
-        raise UsageError("nobody is told of its runs", subject=cell.path, action="Write [[notifications]]")
-    return tell_test(cell, notice_of_test(cell))
+        action = "Write [[notifications]]"
+        raise UsageError("nobody is notified of its runs", subject=cell.path, action=action)
+    return notify_test(cell, notice_of_test(cell))
 
 
 def _list(cell: Cell, console: Console) -> ExitCode:
@@ -45,7 +46,7 @@ def _list(cell: Cell, console: Console) -> ExitCode:
     return ExitCode.DONE
 
 
-def _told(outcome: TellingOutcome, console: Console) -> ExitCode:
-    console.document(telling_document(outcome))
-    console.print(telling_text(outcome))
-    return ExitCode.DONE if outcome.are_all_told else ExitCode.HARDWARE
+def _told(outcome: NotifyOutcome, console: Console) -> ExitCode:
+    console.document(notify_document(outcome))
+    console.print(notify_text(outcome))
+    return ExitCode.DONE if outcome.are_all_sent else ExitCode.HARDWARE

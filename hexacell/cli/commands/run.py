@@ -25,13 +25,17 @@ from hexacell.cli.unattended_start import begun_in_window
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.run_process.run_device_watch import RunDeviceWatch
 from hexacell.runs.run_folder import new_run
-from hexacell.services.notify.run_notices import RunEnd
+from hexacell.services.notify.notice import RunEnd
 from hexacell.services.run.calibration_run import RunRequest, calibrate, is_unverified
 from hexacell.services.run.demo import prepare_demo
 from hexacell.services.run.event_stream import EventStream
 from hexacell.services.run.interrupted_runs import run_to_resume
-from hexacell.services.schedule.check_repetition import raised_alarm, repetition
-from hexacell.services.schedule.unattended_runs import ended_in_time, note_unreadable_cell
+from hexacell.services.schedule.unattended_runs import (
+    ended_in_time,
+    note_unreadable_cell,
+    raised_alarm,
+    repetition,
+)
 from hexacell.text.documents import run_document
 from hexacell.text.line_face import LETTERS
 from hexacell.text.run import (

@@ -9,7 +9,7 @@ from hexacell.cell.loader import Cell
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
-from hexacell.services.schedule.crontab import crontab_line
+from hexacell.services.schedule.scheduled_run import crontab_line
 from hexacell.services.schedule.schedules import (
     Schedule,
     ScheduleRequest,

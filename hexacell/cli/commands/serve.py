@@ -9,7 +9,7 @@ import sys
 
 from drivers.listening_ports import is_loopback
 from hexacell.cell.loader import Cell
-from hexacell.cell.opcua import OpcUaSettings
+from hexacell.cell.operation import OpcUaSettings
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError

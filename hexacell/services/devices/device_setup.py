@@ -19,12 +19,12 @@ from hexacell.cell.measuring import NoiseSettings
 from hexacell.cell.model import CellSettings
 from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
-from hexacell.config.current import CurrentConfig
+from hexacell.config.layout import CurrentConfig
 from hexacell.errors import FileError, HexacellError
 from hexacell.kinematics.mechanism import joint_zeros
 from hexacell.plugins import Group, load
 from hexacell.robot.model import config_layout
-from hexacell.storage.toml_locations import KeyPath
+from hexacell.storage.toml_document import KeyPath
 from procedures.calibration.preflight import raise_all
 from procedures.devices.device_set import Devices, MountedGauge, Thermometers
 from procedures.run.cancellation import shielded

@@ -12,8 +12,8 @@ from typing import Any
 import tomlkit
 
 from hexacell.cell.bundled import bundled_config
+from hexacell.cell.by_mechanism import cell_model
 from hexacell.cell.loader import load_cell, validated
-from hexacell.cell.model import cell_model
 from hexacell.cell.robot import DEFAULT_MECHANISM
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, flatten_errors
@@ -22,8 +22,7 @@ from hexacell.plugins import Group, load, names
 from hexacell.services.records.offline import plan_of
 from hexacell.services.records.stated_poses import require_stated_poses
 from hexacell.storage.atomic_files import write_atomically
-from hexacell.storage.toml_document import TomlDocument
-from hexacell.storage.toml_locations import KeyPath
+from hexacell.storage.toml_document import KeyPath, TomlDocument
 
 HEADER = "# Made from a few answers. `hexacell cell show` prints it with every default.\n\n"
 KEPT_SECTIONS = ("robot", "limits", "speed")

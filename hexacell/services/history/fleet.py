@@ -18,7 +18,7 @@ from hexacell.services.history.history import RunSummary
 from hexacell.verdict.decision import Verdict
 
 if TYPE_CHECKING:
-    from hexacell.runs.shared_archive import SharedDocument
+    from hexacell.runs.archive import SharedDocument
 
 OF_THE_CELL = ""
 """Stands for a run's name where a document is of the cell itself."""
@@ -134,7 +134,7 @@ def is_overdue_now(cell: FleetCell) -> bool:
 
 
 def _shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]:
-    from hexacell.runs.shared_archive import shared_documents  # noqa: PLC0415 - SQLAlchemy only where used
+    from hexacell.runs.archive import shared_documents  # noqa: PLC0415 - SQLAlchemy only where used
 
     return shared_documents(url, kind)
 

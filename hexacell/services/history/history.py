@@ -11,14 +11,13 @@ from datetime import datetime
 
 from hexacell.cell.fields import Frozen
 from hexacell.cell.loader import Cell
-from hexacell.config.contents import fingerprint
+from hexacell.config.layout import fingerprint
 from hexacell.config.receipt import RECEIPT, Receipt
 from hexacell.errors import HexacellError, UsageError
 from hexacell.results.result import IdentificationResult
 from hexacell.results.run_comparison import ParameterTrend, RunComparison, compare_results, trends
 from hexacell.runs.archived_documents import DocumentKind
-from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
-from hexacell.runs.start_attempts import StartAttempts, read_attempts
+from hexacell.runs.run_folder import RunFolder, StartAttempts, find_run, read_attempts, runs_folder
 from hexacell.services.history.run_index import RunIndex
 from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import Verdict

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hexacell.config.change import ConfigChange
-from hexacell.config.contents import fingerprint_of
+from hexacell.config.layout import fingerprint_of
 from hexacell.config.receipt import AFTER, BEFORE, RECEIPT
 from hexacell.errors import FileError, UsageError
 from hexacell.runs.run_folder import CELL_FILE, MEASUREMENTS, RESULT, RunFolder

@@ -13,8 +13,12 @@ from typing import TYPE_CHECKING, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from hexacell.cell.loader import Cell
-from hexacell.runs.archived_documents import ArchiveUnavailable, DocumentKind, StampedDocument
-from hexacell.runs.folder_stamps import folder_stamps
+from hexacell.runs.archived_documents import (
+    ArchiveUnavailable,
+    DocumentKind,
+    StampedDocument,
+    folder_stamps,
+)
 from hexacell.runs.run_folder import RunFolder, runs_folder
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
 from hexacell.cell.fields import LONGEST_TEXT, Password, Section
-from hexacell.cell.notifications import NotificationSettings
+from hexacell.cell.operation import NotificationSettings
 from hexacell.cell.passwords import private_content
 from hexacell.errors import UsageError
 from hexacell.storage.secrets import MASK

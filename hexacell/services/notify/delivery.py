@@ -1,19 +1,22 @@
-"""Telling one notice to one address: by what its scheme says, tried again after pauses, in bounded time."""
+"""Delivery of a notice to one address: by webhook, MQTT or apprise, with retries, in bounded time."""
 
 from __future__ import annotations
 
+import ssl
 import threading
 import time
+import urllib.error
+import urllib.request
+from base64 import b64encode
 from collections.abc import Callable
+from http.client import HTTPException
 from queue import SimpleQueue
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote, urlsplit
 
-from hexacell.cell.notifications import BROKERS, WEBHOOKS, scheme_of
+from hexacell.cell.operation import BROKERS, WEBHOOKS, Occasion, scheme_of
 from hexacell.services.notify.address import NoticeAddress
-from hexacell.services.notify.apprise_services import send_by_apprise
-from hexacell.services.notify.mqtt import publish_by_mqtt
-from hexacell.services.notify.notice import Notice
-from hexacell.services.notify.undelivered import NoticeUndelivered
-from hexacell.services.notify.webhook import post_to_webhook
+from hexacell.services.notify.notice import Notice, NoticeUndelivered
 
 PAUSES_S = (1.0, 4.0)
 """Before another attempt: a service that is just being restarted is back after them."""
@@ -75,3 +78,176 @@ def _sender(address: NoticeAddress) -> Sender:
     if scheme in WEBHOOKS:
         return post_to_webhook
     return publish_by_mqtt if scheme in BROKERS else send_by_apprise
+
+
+def post_to_webhook(address: NoticeAddress, notice: Notice, timeout_s: float) -> None:
+    """POST it; ``Idempotency-Key`` has its id, by which a second delivery is told from a second run.
+
+    Raises:
+        NoticeUndelivered: it was not taken.
+    """
+    try:
+        with _opener(address).open(_request(address, notice), timeout=timeout_s):
+            return
+    except urllib.error.HTTPError as error:
+        error.close()
+        raise NoticeUndelivered(f"the server answers {error.code}") from error
+    except urllib.error.URLError as error:
+        raise NoticeUndelivered(address.masked(_words(error.reason))) from error
+    except (OSError, HTTPException, ValueError) as error:
+        raise NoticeUndelivered(address.masked(_words(error))) from error
+
+
+def _opener(address: NoticeAddress) -> urllib.request.OpenerDirector:
+    """Follows no redirection: another address must not get the password of this one."""
+    trusted = None if address.ca_file is None else str(address.ca_file)
+    opener = urllib.request.OpenerDirector()
+    for handler in (
+        urllib.request.ProxyHandler(),
+        urllib.request.HTTPHandler(),
+        urllib.request.HTTPSHandler(context=ssl.create_default_context(cafile=trusted)),
+        urllib.request.HTTPErrorProcessor(),
+        urllib.request.HTTPDefaultErrorHandler(),
+    ):
+        opener.add_handler(handler)
+    return opener
+
+
+def _request(address: NoticeAddress, notice: Notice) -> urllib.request.Request:
+    headers = {"Content-Type": "application/json", "Idempotency-Key": notice.id, "User-Agent": "hexacell"}
+    if address.token is not None:
+        headers["Authorization"] = f"Bearer {address.token}"
+    elif address.user is not None:
+        login = f"{address.user}:{address.password or ''}".encode()
+        headers["Authorization"] = f"Basic {b64encode(login).decode()}"
+    # Only http and https come here: the scheme chose this sender.
+    return urllib.request.Request(address.url, notice.model_dump_json().encode(), headers)  # noqa: S310
+
+
+def _words(reason: object) -> str:
+    if isinstance(reason, TimeoutError):
+        return "the server does not answer"
+    return (reason.strerror if isinstance(reason, OSError) else None) or str(reason)
+
+
+if TYPE_CHECKING:
+    from paho.mqtt.client import Client
+
+PORTS = {"mqtt": 1883, "mqtts": 8883}
+AT_LEAST_ONCE = 1
+
+
+def publish_by_mqtt(address: NoticeAddress, notice: Notice, timeout_s: float) -> None:
+    """Publish to ``TOPIC/state``, retained; a test to ``TOPIC/test``, which leaves the state alone.
+
+    Raises:
+        NoticeUndelivered: the broker did not acknowledge it, or paho-mqtt is not installed.
+    """
+    client, answered, answer = _client(address, timeout_s)
+    url = urlsplit(address.url)
+    is_test = Occasion.TEST in notice.occasions
+    try:
+        client.connect(url.hostname or "", url.port or PORTS[url.scheme])
+        client.loop_start()
+        if not answered.wait(timeout_s):
+            raise NoticeUndelivered("the broker does not answer")
+        if answer:
+            raise NoticeUndelivered(f"the broker refuses the connection: {answer[0]}")
+        topic = f"{address.topic}/{'test' if is_test else 'state'}"
+        sent = client.publish(topic, notice.model_dump_json(), AT_LEAST_ONCE, retain=not is_test)
+        sent.wait_for_publish(timeout_s)
+        if not sent.is_published():
+            raise NoticeUndelivered("the broker does not acknowledge it")
+    except (OSError, ValueError, RuntimeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise NoticeUndelivered(address.masked(reason)) from error
+    finally:
+        client.disconnect()
+        client.loop_stop()
+
+
+def _client(address: NoticeAddress, timeout_s: float) -> tuple[Client, threading.Event, list[str]]:
+    """A client, what is set when the broker has answered, and why it refused, if it did."""
+    try:
+        from paho.mqtt.client import Client, MQTTv311  # noqa: PLC0415 - an optional extra
+        from paho.mqtt.enums import CallbackAPIVersion  # noqa: PLC0415 - likewise
+    except ImportError as error:
+        raise NoticeUndelivered("paho-mqtt is not installed: install hexacell[mqtt]") from error
+    answered, answer = threading.Event(), list[str]()
+
+    def heard(_client: Client, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:  # noqa: ANN401
+        if reason.is_failure:
+            answer.append(str(reason))
+        answered.set()
+
+    client = Client(CallbackAPIVersion.VERSION2, protocol=MQTTv311, reconnect_on_failure=False)
+    client.connect_timeout = timeout_s
+    client.on_connect = heard
+    if address.user is not None:
+        client.username_pw_set(address.user, address.password)
+    if urlsplit(address.url).scheme == "mqtts":
+        try:
+            client.tls_set_context(
+                ssl.create_default_context(cafile=None if address.ca_file is None else str(address.ca_file))
+            )
+        except OSError as error:
+            raise NoticeUndelivered(f"{address.ca_file}: {error.strerror or error}") from error
+    return client, answered, answer
+
+
+_LONGEST_REASON = 200
+
+
+def send_by_apprise(address: NoticeAddress, notice: Notice, timeout_s: float) -> None:
+    """One line as the message; with mail, the JSON as an attachment.
+
+    Raises:
+        NoticeUndelivered: the service did not take it, or apprise is not installed.
+    """
+    try:
+        import apprise  # noqa: PLC0415 - an optional extra
+    except ImportError as error:
+        raise NoticeUndelivered("apprise is not installed: install hexacell[notify]") from error
+    log_of: Any = apprise.LogCapture  # which has no types
+    with log_of(level=apprise.logging.WARNING, fmt="%(message)s") as log:
+        # Not through Apprise.notify, whose pool of threads would keep this process from ending.
+        service = apprise.Apprise.instantiate(_with_timeout(_with_login(address), timeout_s))
+        if service is None:
+            raise NoticeUndelivered("apprise does not know this kind of address; see its documentation")
+        attached = _attachment(notice) if address.url.startswith("mailto") else None
+        taken = service.notify(notice.line, title=notice.title, notify_type=_kind(notice), attach=attached)
+        said = " ".join(log.getvalue().split())
+    if not taken:
+        raise NoticeUndelivered(address.masked(said)[:_LONGEST_REASON] or "the service did not take it")
+
+
+def _attachment(notice: Notice) -> Any:  # noqa: ANN401 - as apprise's
+    from apprise import AppriseAttachment  # noqa: PLC0415 - an optional extra
+    from apprise.attachment import memory  # noqa: PLC0415 - likewise
+
+    attachment: Any = memory.AttachMemory  # which has no types
+    document = attachment(
+        notice.model_dump_json(indent=1), name="hexacell.json", mimetype="application/json"
+    )
+    return AppriseAttachment([document])
+
+
+def _kind(notice: Notice) -> str:
+    if Occasion.PASS in notice.occasions:
+        return "success"
+    if Occasion.FAILURE in notice.occasions:
+        return "failure"
+    return "info" if Occasion.TEST in notice.occasions else "warning"
+
+
+def _with_login(address: NoticeAddress) -> str:
+    if address.user is None:
+        return address.url
+    scheme, _, rest = address.url.partition("://")
+    password = "" if address.password is None else f":{quote(address.password, safe='')}"
+    return f"{scheme}://{quote(address.user, safe='')}{password}@{rest}"
+
+
+def _with_timeout(url: str, timeout_s: float) -> str:
+    """Apprise has its own words for it, and leaves those away that it does not know."""
+    return f"{url}{'&' if '?' in url else '?'}rto={timeout_s:g}&cto={timeout_s:g}"

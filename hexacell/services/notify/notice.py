@@ -1,23 +1,34 @@
-"""What is told of a run that nobody watched."""
+"""The notice of a run that nobody watched: of its end, or of the failure that ended it."""
 
 from __future__ import annotations
 
-from datetime import datetime
+import socket
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from hashlib import sha256
 from typing import Literal
 
 from hexacell.cell.fields import Frozen, Name, Text
-from hexacell.cell.notifications import Occasion
+from hexacell.cell.loader import Cell
+from hexacell.cell.operation import Occasion
+from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, HexacellError
+from hexacell.services.history.cell_status import next_calibration_due
+from hexacell.services.history.history import judged_accuracy, past_runs
+from hexacell.services.run.calibration_run import RunRequest
+from hexacell.services.schedule.unattended_runs import raised_alarm
 from hexacell.verdict.decision import Verdict
+from procedures.run import events
+from procedures.run.state import RunState
 
 
 class Notice(Frozen):
-    """One run, as others are told of it; has no secret. Lengths in mm.
+    """One run, as a notice reports it, without secrets; lengths in mm.
 
     Attributes:
         version: of this document; keys are only added within one.
-        id: the same each time that the same end of the same run is told, so that who has it can tell.
+        id: equal for every notice of one end of one run, so that a recipient recognises a repetition.
         host: the computer that the cell is run from.
-        run: the name of the run folder; none where none began.
+        run: the name of the run folder; None where none began.
         at: when the run ended, UTC.
         line: everything in one line.
         changed_leg: the leg that an alarm names.
@@ -48,7 +59,124 @@ class Notice(Frozen):
 
 
 class PendingNotice(Frozen):
-    """A notice, and the name of whom it is still to be told."""
+    """A notice, and the name of the recipient who does not have it yet."""
 
     to: Name
     notice: Notice
+
+
+class NoticeUndelivered(DeviceError):
+    """A recipient did not take a notice; the message has no secret."""
+
+
+def notice_id(*parts: str) -> str:
+    """An id that follows from the words of a notice: equal words, equal id."""
+    return sha256("\0".join(parts).encode()).hexdigest()[:32]
+
+
+TEST_LINE = "a test: notifications of this cell arrive here"
+
+
+@dataclass(frozen=True, slots=True)
+class RunEnd:
+    """How a run ended that could be carried out to its end."""
+
+    request: RunRequest
+    ended: events.Ended
+    state: RunState
+
+
+def notice_of_end(end: RunEnd) -> Notice:
+    """The notice of a run with a verdict, or with a question that nobody answered."""
+    cell, state = end.request.cell, end.state
+    judged = state.judged
+    accuracy = judged_accuracy(judged)
+    alarm = raised_alarm(state)
+    occasions = _occasions(end)
+    name = end.request.folder.path.name
+    return Notice(
+        id=notice_id(cell.settings.name, name, *occasions),
+        cell=cell.settings.name,
+        host=socket.gethostname(),
+        run=name,
+        mode=end.request.mode.value,
+        at=_now(),
+        occasions=occasions,
+        exit_code=end.ended.exit_code,
+        line=f"{cell.settings.name}: {end.ended.line}",
+        verdict=None if judged is None else judged.verdict,
+        position_mm=None if accuracy is None else accuracy.position.value,
+        expanded_mm=None if accuracy is None else accuracy.position.expanded,
+        limit_mm=None if accuracy is None else accuracy.position.limit,
+        changed_leg=None if alarm is None else alarm.leg,
+        due_at=_due_at(cell),
+    )
+
+
+def notice_of_failure(request: RunRequest, error: Exception) -> Notice:
+    """The notice of a run that did not begin, or did not come to its end."""
+    text, code = _failure(error)
+    name, cell = request.folder.path.name, request.cell.settings.name
+    occasion = Occasion.ANSWER_NEEDED if isinstance(error, AnswerNeeded) else Occasion.FAILURE
+    at = _now()
+    return Notice(
+        id=notice_id(cell, occasion, text, at.date().isoformat()),  # tried again, it is the same failure
+        cell=cell,
+        host=socket.gethostname(),
+        run=name if request.folder.journal.is_file() else None,
+        mode=request.mode.value,
+        at=at,
+        occasions=(occasion,),
+        exit_code=int(code),
+        line=f"{cell}: {text}",
+    )
+
+
+def notice_of_test(cell: Cell) -> Notice:
+    """The notice that shows whether everybody can be notified."""
+    name, at = cell.settings.name, _now()
+    return Notice(
+        id=notice_id(name, Occasion.TEST, at.isoformat()),
+        cell=name,
+        host=socket.gethostname(),
+        run=None,
+        mode=Occasion.TEST,
+        at=at,
+        occasions=(Occasion.TEST,),
+        exit_code=0,
+        line=f"{name}: {TEST_LINE}",
+    )
+
+
+def _failure(error: Exception) -> tuple[str, ExitCode]:
+    """The error in one line, and the exit code; the text of a fault is for its report alone."""
+    if isinstance(error, HexacellError):
+        return " ".join(str(error).split()), error.exit_code
+    return f"a fault of the program: {type(error).__name__}", ExitCode.FAULT
+
+
+def _occasions(end: RunEnd) -> tuple[Occasion, ...]:
+    judged, code = end.state.judged, end.ended.exit_code
+    has_passed = judged is not None and judged.verdict is Verdict.PASS
+    found = {
+        Occasion.PASS: has_passed and code == ExitCode.DONE,
+        Occasion.NO_PASS: judged is not None and not has_passed,
+        Occasion.ALARM: raised_alarm(end.state) is not None,
+        Occasion.ANSWER_NEEDED: code == ExitCode.ANSWER_NEEDED,
+    }
+    return tuple(one for one, is_so in found.items() if is_so) or (Occasion.FAILURE,)
+
+
+def _due_at(cell: Cell) -> datetime | None:
+    """When the next calibration is due; None where the config or the runs cannot be read."""
+    if cell.settings.acceptance.valid_days is None:
+        return None
+    try:
+        in_force = next((run for run in past_runs(cell) if run.is_in_controller), None)
+    except HexacellError:
+        return None
+    return next_calibration_due(cell, in_force)
+
+
+def _now() -> datetime:
+    return datetime.now(UTC)

@@ -1,23 +1,31 @@
-"""Notices that are still to be told, one file each: what was kept survives a power cut.
+"""Notices kept on the disk until each address has them, and sent: now, or at the next run.
 
-A notice is removed once who is told has taken it, so that one is told twice after a power cut in between,
-with the same ``id``. The files have no address and no secret.
+Every notice is in a file of its own before it is sent. Whatever is not delivered is sent the next time.
+Nothing here fails a run: what went wrong is in the outcome of each address.
 """
 
 from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Iterator
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from datetime import datetime, timedelta
-from hashlib import sha256
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from threading import Thread
 
 from pydantic import ValidationError
 
-from hexacell.errors import FileError
-from hexacell.services.notify.notice import PendingNotice
+from hexacell.cell.loader import Cell
+from hexacell.cell.operation import NotificationSettings
+from hexacell.errors import FileError, HexacellError
+from hexacell.runs.run_folder import runs_folder
+from hexacell.services.notify.address import NoticeAddress, resolved_address
+from hexacell.services.notify.delivery import deliver
+from hexacell.services.notify.notice import Notice, PendingNotice, notice_id
 from hexacell.storage import atomic_files
 
 FOLDER = ".outbox"
@@ -35,7 +43,7 @@ class NoticeOutbox:
         self._folder = folder / FOLDER
 
     def keep(self, pending: PendingNotice) -> None:
-        """Keep a notice until it is told; the same one again changes nothing.
+        """Keep a notice until it is delivered; keeping the same one again changes nothing.
 
         Raises:
             FileError: it cannot be kept, as on a full disk.
@@ -44,10 +52,10 @@ class NoticeOutbox:
         atomic_files.write_atomically(self._file(pending), pending.model_dump_json().encode() + b"\n")
 
     def forget(self, pending: PendingNotice) -> None:
-        """It has been told.
+        """Remove a notice that was delivered.
 
         Raises:
-            FileError: it cannot be removed; it will be told once more.
+            FileError: it cannot be removed; it will be sent once more.
         """
         path = self._file(pending)
         try:
@@ -59,7 +67,7 @@ class NoticeOutbox:
             raise atomic_files.os_error_to_file_error("cannot be removed", path, error) from error
 
     def pending(self) -> tuple[PendingNotice, ...]:
-        """What is still to be told, the oldest first; what no program can read is left out.
+        """The notices not delivered yet, the oldest first; unreadable files are left out.
 
         Raises:
             FileError: the folder cannot be read.
@@ -113,11 +121,6 @@ class NoticeOutbox:
         return self._folder / f"{notice_id(pending.notice.id, pending.to)}.json"
 
 
-def notice_id(*parts: str) -> str:
-    """A name for what these words tell, the same each time."""
-    return sha256("\0".join(parts).encode()).hexdigest()[:32]
-
-
 def _locked(descriptor: int) -> bool:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -131,3 +134,142 @@ def _read(path: Path) -> PendingNotice | None:
         return PendingNotice.model_validate_json(atomic_files.read_text(path, LARGEST_NOTICE_BYTES))
     except (FileError, ValidationError):
         return None
+
+
+Deliver = Callable[[NoticeAddress, Notice], None]
+
+LONGEST_NOTIFYING_S = 60.0
+"""Longest time that a run waits for its notices, s; what is not delivered then waits for the next run."""
+
+OTHER_PROCESS = "another process is sending at this moment"
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """What became of the notices to one recipient.
+
+    Attributes:
+        sent: how many were taken.
+        wait: how many still wait.
+        problem: why some wait; None if all were taken.
+    """
+
+    name: str
+    sent: int
+    wait: int
+    problem: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NotifyOutcome:
+    """What became of all notices; ``dropped`` is how many were too old, or too many, to be kept."""
+
+    deliveries: tuple[Delivery, ...]
+    dropped: int = 0
+
+    @property
+    def are_all_sent(self) -> bool:
+        """Whether nothing waits."""
+        return not any(one.problem for one in self.deliveries)
+
+
+def notify_all(cell: Cell, notice: Notice, send: Deliver = deliver) -> NotifyOutcome:
+    """Send a notice to all who want such runs, and whatever waits from earlier ones."""
+    outbox = NoticeOutbox(runs_folder(cell))
+    wanted = [one for one in cell.settings.notifications if not set(notice.occasions).isdisjoint(one.on)]
+    unkept: list[PendingNotice] = []
+    for one in wanted:
+        pending = PendingNotice(to=one.name, notice=notice)
+        try:
+            outbox.keep(pending)
+        except HexacellError:
+            unkept.append(pending)
+    return _send_all(cell, outbox, send, unkept)
+
+
+def send_waiting(cell: Cell, send: Deliver = deliver) -> NotifyOutcome:
+    """Send what waits from earlier runs."""
+    return _send_all(cell, NoticeOutbox(runs_folder(cell)), send, ())
+
+
+def notify_test(cell: Cell, notice: Notice, send: Deliver = deliver) -> NotifyOutcome:
+    """Send a notice to everybody now; what is not taken is not kept."""
+    queues = {one.name: [PendingNotice(to=one.name, notice=notice)] for one in cell.settings.notifications}
+    sent = _in_parallel(cell, queues, lambda address, pending: send(address, pending.notice))
+    return NotifyOutcome(tuple(Delivery(name, done, 0, problem) for name, (done, problem) in sent.items()))
+
+
+def waiting_notices(cell: Cell) -> tuple[PendingNotice, ...]:
+    """The notices not delivered yet; raises ``FileError``."""
+    return NoticeOutbox(runs_folder(cell)).pending()
+
+
+def _send_all(
+    cell: Cell, outbox: NoticeOutbox, send: Deliver, unkept: Sequence[PendingNotice]
+) -> NotifyOutcome:
+    """Send what waits, and what could not be kept."""
+
+    def act(address: NoticeAddress, pending: PendingNotice) -> None:
+        send(address, pending.notice)
+        if pending not in unkept:
+            outbox.forget(pending)
+
+    known = {one.name for one in cell.settings.notifications}
+    queues: defaultdict[str, list[PendingNotice]] = defaultdict(list)
+    try:
+        with outbox.held() as is_ours:
+            if not is_ours:
+                return NotifyOutcome((Delivery("the outbox", 0, 0, OTHER_PROCESS),))
+            for pending in (*outbox.pending(), *unkept):
+                if pending.to in known:  # others are no longer notified; theirs wait until they are too old
+                    queues[pending.to].append(pending)
+            sent = _in_parallel(cell, queues, act)
+            dropped = outbox.drop_old(datetime.now(UTC))
+    except HexacellError as error:
+        return NotifyOutcome((Delivery("the outbox", 0, 0, str(error)),))
+    deliveries = (
+        Delivery(name, done, len(queues[name]) - done, problem) for name, (done, problem) in sent.items()
+    )
+    return NotifyOutcome(tuple(deliveries), dropped)
+
+
+def _in_parallel(
+    cell: Cell,
+    queues: Mapping[str, Sequence[PendingNotice]],
+    act: Callable[[NoticeAddress, PendingNotice], None],
+) -> dict[str, tuple[int, str | None]]:
+    """How many each recipient took, and the problem; one that does not answer delays no other.
+
+    The threads end with the process: neither a stop signal nor the end of a run waits for a slow server.
+    """
+    settings = {one.name: one for one in cell.settings.notifications}
+    sent: dict[str, tuple[int, str | None]] = {}
+
+    def send_queue(name: str) -> None:
+        sent[name] = _one_queue(cell, settings[name], queues[name], act)
+
+    threads = {name: Thread(target=send_queue, args=(name,), daemon=True) for name in queues}
+    for thread in threads.values():
+        thread.start()
+    until = time.monotonic() + LONGEST_NOTIFYING_S
+    for thread in threads.values():
+        thread.join(max(0.0, until - time.monotonic()))
+    return {name: sent.get(name, (0, f"not finished within {LONGEST_NOTIFYING_S:g} s")) for name in queues}
+
+
+def _one_queue(
+    cell: Cell,
+    settings: NotificationSettings,
+    queue: Iterable[PendingNotice],
+    act: Callable[[NoticeAddress, PendingNotice], None],
+) -> tuple[int, str | None]:
+    """In order: after one that is not taken the others wait, so that no older state comes last."""
+    sent = 0
+    try:
+        address = resolved_address(settings, cell.settings.name, cell.path.parent)
+        for pending in queue:
+            act(address, pending)
+            sent += 1
+    except HexacellError as error:
+        return sent, str(error)
+    return sent, None

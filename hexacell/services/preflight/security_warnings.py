@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 
 from drivers.listening_ports import accepts_from_network, is_loopback
 from hexacell.cell.loader import Cell
-from hexacell.cell.notifications import scheme_of
+from hexacell.cell.operation import scheme_of
 
 IN_CLEAR = ("http", "mqtt")
 

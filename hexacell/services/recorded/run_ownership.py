@@ -14,8 +14,8 @@ import numpy as np
 
 from hexacell.cell.loader import Cell
 from hexacell.config.change import ConfigChange
-from hexacell.config.contents import are_same_files, fingerprint_of, read_contents_if_present
 from hexacell.config.interface import ControllerGeometry, ControllerLimits
+from hexacell.config.layout import are_same_files, fingerprint_of, read_contents_if_present
 from hexacell.config.receipt import BEFORE, RECEIPT, Receipt, kept_paths
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry

@@ -10,7 +10,7 @@ from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.errors import FileError, HexacellError, joined
 from hexacell.kinematics.pose import Pose
-from hexacell.storage.toml_locations import KeyPath
+from hexacell.storage.toml_document import KeyPath
 
 StatedPose = tuple[KeyPath, str, Pose]
 """Where a pose is in the cell file, what it is for, and the pose itself."""

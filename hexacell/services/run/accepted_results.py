@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
-from hexacell.config.contents import fingerprint
+from hexacell.config.layout import fingerprint
 from hexacell.config.receipt import Receipt
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify

@@ -13,8 +13,8 @@ from hexacell import __version__
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses, require_enough
 from hexacell.cell.loader import Cell
-from hexacell.config.contents import fingerprint
-from hexacell.config.current import CurrentConfig
+from hexacell.config.layout import CurrentConfig, fingerprint
+from hexacell.config.pending_write import held_config
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
 from hexacell.robot.model import config_layout, controller_geometry, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
@@ -25,7 +25,6 @@ from hexacell.services.recorded.journal_soundness import require_sound
 from hexacell.services.recorded.run_ownership import require_own_run
 from hexacell.services.recorded.started_robot import started_robot
 from hexacell.services.run.accepted_results import last_accepted_result
-from hexacell.services.write_back.held_config import held_config
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
 from procedures.calibration.preflight import (
     device_failures,

@@ -7,12 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from hexacell.cell.by_mechanism import geometry_settings
 from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.measuring import IdentificationSettings
-from hexacell.cell.model import CellSettings, geometry_settings
+from hexacell.cell.model import CellSettings
 from hexacell.config.change import ConfigChange
-from hexacell.config.contents import Contents, fingerprint_of, read_contents_if_present
+from hexacell.config.layout import Contents, fingerprint_of, read_contents_if_present
 from hexacell.config.receipt import BEFORE, kept_paths
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.runs.run_folder import CELL_FILE, RunFolder

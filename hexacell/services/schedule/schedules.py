@@ -14,10 +14,16 @@ from math import ceil
 from pathlib import Path
 
 from hexacell.cell.loader import Cell
-from hexacell.cell.unattended import DAY_MINUTES
+from hexacell.cell.operation import DAY_MINUTES
 from hexacell.errors import FileError, UsageError
-from hexacell.services.schedule.scheduled_run import MOST_MINUTES, ScheduledRun, time_of_day
-from hexacell.services.schedule.systemd_units import cell_of, service_text, timer_text
+from hexacell.services.schedule.scheduled_run import (
+    MOST_MINUTES,
+    ScheduledRun,
+    cell_of,
+    service_text,
+    time_of_day,
+    timer_text,
+)
 from hexacell.storage import atomic_files
 
 SYSTEM_UNITS = Path("/etc/systemd/system")

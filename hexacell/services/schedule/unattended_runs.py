@@ -1,21 +1,31 @@
-"""Runs without a person: refused in quiet hours, tried again for a while, ended when their time is over."""
+"""Runs without a person: quiet hours, retries, checks repeated after an alarm, the longest time."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from hexacell.cell.model import CellSettings
+from hexacell.cell.operation import UnattendedSettings
+from hexacell.checks.change_alarm import ChangeAlarm
 from hexacell.errors import ExitCode, HexacellError, OutOfTime
-from hexacell.runs.run_folder import new_run_in, runs_folder_of_unreadable
-from hexacell.runs.start_attempts import StartAttempt, StartAttempts, note_attempt
+from hexacell.runs.run_folder import (
+    StartAttempt,
+    StartAttempts,
+    new_run,
+    new_run_in,
+    note_attempt,
+    runs_folder_of_unreadable,
+)
 from hexacell.services.run.calibration_run import RunRequest
-from hexacell.services.schedule.quiet_hours import next_quiet, quiet_until
+from hexacell.verdict.decision import Verdict
+from procedures.calibration.workflow import Mode
 from procedures.run.commands import CommandQueue, EndAtReference
+from procedures.run.state import RunState
 
 MAY_PASS = frozenset({ExitCode.HARDWARE, ExitCode.BUSY, ExitCode.OUT_OF_TIME})
 """Of refusals that another try may not meet: device, stop line, full disk; the lock; quiet hours."""
@@ -110,3 +120,56 @@ def ended_in_time(request: RunRequest, queue: CommandQueue) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
+
+
+WEEKDAYS = ("mon", "tue", "wed", "thu", "fri", "sat", "sun")
+DAYS_AHEAD = 8
+
+
+def quiet_until(settings: UnattendedSettings, at: datetime) -> datetime | None:
+    """When the quiet hours end in which a moment lies; none if it lies in none.
+
+    Where one ends as another begins, the end of the latter.
+    """
+    end: datetime | None = None
+    for begin, until in sorted(_spans(settings, at)):
+        if begin <= (end or at) < until:
+            end = until
+    return end
+
+
+def next_quiet(settings: UnattendedSettings, at: datetime) -> datetime | None:
+    """When quiet hours begin after a moment; the moment itself if it lies in some; none without any."""
+    if quiet_until(settings, at) is not None:
+        return at
+    return min((begin for begin, _ in _spans(settings, at) if begin > at), default=None)
+
+
+def _spans(settings: UnattendedSettings, at: datetime) -> Iterator[tuple[datetime, datetime]]:
+    """Begin and end of all from the day before a moment to a week after it, in its time zone."""
+    midnight = at.replace(hour=0, minute=0, second=0, microsecond=0)
+    for number in range(-1, DAYS_AHEAD):
+        day = midnight + timedelta(days=number)
+        if WEEKDAYS[day.weekday()] in settings.quiet_days:
+            for begin, length in settings.quiet_spans:
+                start = day + timedelta(minutes=begin)
+                yield start, start + timedelta(minutes=length)
+
+
+def raised_alarm(state: RunState) -> ChangeAlarm | None:
+    """The alarm that a check raised; none if it raised none."""
+    check = None if state.judged is None else state.judged.check
+    alarm = None if check is None else check.alarm
+    return alarm if alarm is not None and alarm.is_raised else None
+
+
+def repetition(request: RunRequest, state: RunState) -> RunRequest | None:
+    """The check to be made once more after one that nobody watched; none where there is no need.
+
+    One that failed is not repeated: it has found what an alarm only suspects.
+    """
+    is_check = request.unattended and request.mode is Mode.CHECK
+    if not is_check or raised_alarm(state) is None:
+        return None
+    has_failed = state.judged is not None and state.judged.verdict is Verdict.FAIL
+    return None if has_failed else replace(request, folder=new_run(request.cell), resume=False)

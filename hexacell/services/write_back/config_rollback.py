@@ -8,9 +8,9 @@ from pathlib import Path
 
 from hexacell.cell.loader import Cell
 from hexacell.config.change import diff_of_files
-from hexacell.config.contents import Contents, are_same_files, fingerprint_of, read_contents
-from hexacell.config.receipt import AFTER, BEFORE, Receipt
-from hexacell.config.three_way import ConfigEditedSince, compare_versions
+from hexacell.config.layout import Contents, are_same_files, fingerprint_of, read_contents
+from hexacell.config.pending_write import held_config
+from hexacell.config.receipt import AFTER, BEFORE, ConfigEditedSince, Receipt, compare_versions
 from hexacell.config.write_back import restore
 from hexacell.config.write_record import (
     Recording,
@@ -22,7 +22,6 @@ from hexacell.config.write_record import (
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
-from hexacell.services.write_back.held_config import held_config
 from hexacell.services.write_back.proposals import COMMAND
 from procedures.engine.config_transactions import holds_provisional
 from procedures.journal.line_format import RESTORE

@@ -9,9 +9,9 @@ from typing import ClassVar
 
 from hexacell.cell.loader import load_cell
 from hexacell.config.change import ConfigChange, JsonRecord
-from hexacell.config.contents import are_same_files, fingerprint
-from hexacell.config.layout import ConfigLayout
-from hexacell.config.three_way import ConfigEditedSince, compare_versions
+from hexacell.config.layout import ConfigLayout, are_same_files, fingerprint
+from hexacell.config.pending_write import held_config
+from hexacell.config.receipt import ConfigEditedSince, compare_versions
 from hexacell.config.write_back import commit
 from hexacell.config.write_record import WriteCause, WriteKind, recorded_write, stated_reason
 from hexacell.errors import FileError, LimitError, UsageError
@@ -20,7 +20,6 @@ from hexacell.kinematics.parameters import ParameterSet
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
-from hexacell.services.write_back.held_config import held_config
 from hexacell.verdict.acceptance import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from procedures.engine.config_transactions import holds_provisional

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import date
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.cell.certificates import CertificateSettings
+from hexacell.cell.fields import CertificateSettings
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.text.events import set_name
 from hexacell.text.measured_noise import measured_noise_lines

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from hexacell.cell.archive import ArchiveSettings
+from hexacell.cell.operation import ArchiveSettings
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.cell import controller, devices, limits, measuring, model, simulation
+from hexacell.cell.by_mechanism import cell_model
 from hexacell.cell.loader import describe, dump, schema
 from hexacell.cell.robot import DEFAULT_MECHANISM
 
@@ -24,7 +25,7 @@ anything = st.recursive(
     scalars, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(texts, inner, max_size=3)
 )
 tables = st.dictionaries(texts, anything, max_size=3)
-MODEL = model.cell_model("hexaglide")
+MODEL = cell_model("hexaglide")
 ROBOT: Any = MODEL.model_fields["robot"].annotation
 SIMULATION: Any = get_args(MODEL.model_fields["simulation"].annotation)[0]
 geometries = st.builds(

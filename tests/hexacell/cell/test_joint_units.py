@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from hexacell.cell.by_mechanism import in_joint_unit
 from hexacell.cell.devices import LinearEncoderSettings, RotaryEncoderSettings
-from hexacell.cell.joint_units import in_joint_unit
+from hexacell.cell.limits import SpeedSettings
 from hexacell.cell.loader import describe, load_cell
 from hexacell.cell.measuring import NoiseSettings
-from hexacell.cell.speed import SpeedSettings
 from hexacell.errors import FileError
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.robot.stated_effects import stated_effects

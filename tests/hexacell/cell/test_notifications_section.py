@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import dump, load_cell
-from hexacell.cell.notifications import USUAL_OCCASIONS, NotificationSettings, Occasion, OccasionWord
+from hexacell.cell.operation import USUAL_OCCASIONS, NotificationSettings, Occasion, OccasionWord
 from hexacell.errors import FileError
 from hexacell.storage.secrets import without_secrets
 

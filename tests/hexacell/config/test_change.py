@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.config.change import ConfigChange, diff, propose
-from hexacell.config.contents import fingerprint
+from hexacell.config.layout import fingerprint
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.storage import atomic_files

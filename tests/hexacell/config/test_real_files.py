@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 
 from hexacell.cell.loader import load_cell
 from hexacell.config.change import propose
-from hexacell.config.contents import fingerprint
-from hexacell.config.layout import ConfigLayout
+from hexacell.config.layout import ConfigLayout, fingerprint
 from hexacell.config.write_back import commit, rollback
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry

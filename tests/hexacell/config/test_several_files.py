@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hexacell.config.change import ConfigChange, propose
-from hexacell.config.contents import Contents, fingerprint, read_contents
+from hexacell.config.layout import Contents, fingerprint, read_contents
 from hexacell.config.pending_write import (
     is_interrupted,
     note_path,

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.config import toml_format
 from hexacell.config.interface import ConfigFormat
 from hexacell.config.number_tokens import write_number
 from hexacell.config.toml_format import NativeToml
@@ -17,7 +16,7 @@ from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.parameters import ParameterUnit
-from hexacell.storage.toml_edit import replace_numbers
+from hexacell.storage.toml_document import TomlDocument
 
 FORMAT: ConfigFormat = NativeToml(HEXAGLIDE_PARAMETERS)
 HALF_A_NANOMETRE = 5e-7
@@ -313,9 +312,8 @@ def test_a_leg_too_short_for_six_decimals_is_refused(geometry: Geometry) -> None
 def test_a_geometry_that_does_not_read_back_is_never_written(
     config: Path, geometry: Geometry, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        toml_format, "replace_numbers", lambda *args: replace_numbers(*args).replace("700.", "70.")
-    )
+    replaced = TomlDocument.replaced
+    monkeypatch.setattr(TomlDocument, "replaced", lambda *args: replaced(*args).replace("700.", "70."))
     with pytest.raises(FileError, match="reads back with different numbers"):
         FORMAT.rewrite(config.read_text(), geometry)
 

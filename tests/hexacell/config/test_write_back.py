@@ -4,9 +4,10 @@ from typing import Any
 
 import pytest
 
-from hexacell.config import replacement, write_back
+from hexacell.config import write_back
+from hexacell.config import write_back as replacement
 from hexacell.config.change import ConfigChange, propose
-from hexacell.config.contents import fingerprint
+from hexacell.config.layout import fingerprint
 from hexacell.config.receipt import Receipt
 from hexacell.config.toml_format import NativeToml
 from hexacell.config.write_back import commit, rollback

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from hexacell.config.change import ConfigChange, propose
-from hexacell.config.contents import fingerprint
+from hexacell.config.layout import fingerprint
 from hexacell.config.receipt import Receipt
 from hexacell.config.write_back import commit, rollback
 from hexacell.errors import FileError, WriteBackUndone

@@ -23,7 +23,7 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from hexacell.cell.loader import Cell
-from hexacell.cell.opcua import OpcUaSettings
+from hexacell.cell.operation import OpcUaSettings
 from hexacell.errors import DeviceError, FileError, UsageError
 from hexacell.result_server.address_space import MOST_RESULTS, NAMESPACE
 from hexacell.result_server.credentials import ensure_certificate

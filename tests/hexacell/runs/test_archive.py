@@ -12,8 +12,12 @@ from pathlib import Path
 import pytest
 
 from hexacell.runs.archive import INDEX, Archive
-from hexacell.runs.archived_documents import ArchiveUnavailable, DocumentKind, StampedDocument
-from hexacell.runs.folder_stamps import folder_stamps
+from hexacell.runs.archived_documents import (
+    ArchiveUnavailable,
+    DocumentKind,
+    StampedDocument,
+    folder_stamps,
+)
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.atomic_files import write_atomically
 

@@ -10,7 +10,7 @@ from typing import Any
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.change import ConfigChange, propose
-from hexacell.config.contents import fingerprint
+from hexacell.config.layout import fingerprint
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import config_layout, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder

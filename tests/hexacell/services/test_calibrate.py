@@ -11,7 +11,7 @@ import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.config.change import ConfigChange
-from hexacell.config.contents import fingerprint
+from hexacell.config.layout import fingerprint
 from hexacell.config.receipt import Receipt
 from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
 from hexacell.measurements.csv_file import read_measurements

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.cell.certificates import CertificateSettings
+from hexacell.cell.fields import CertificateSettings
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.config.change import ConfigChange
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, FileError, LimitError, WriteBackUndone

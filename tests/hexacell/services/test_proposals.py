@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from hexacell.cell.loader import Cell
-from hexacell.config.receipt import Receipt
-from hexacell.config.three_way import ConfigEditedSince
+from hexacell.config.receipt import ConfigEditedSince, Receipt
 from hexacell.errors import (
     AnswerNeeded,
     CellBusy,

@@ -12,7 +12,7 @@ import pytest
 
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
-from hexacell.config.contents import fingerprint
+from hexacell.config.layout import fingerprint
 from hexacell.errors import ExitCode, OutOfTime, UsageError
 from hexacell.identification.estimator import identify
 from hexacell.results.result import AcceptedResult

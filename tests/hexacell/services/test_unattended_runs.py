@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.cell.unattended import UnattendedSettings
+from hexacell.cell.operation import UnattendedSettings
 from hexacell.errors import (
     CellBusy,
     DeviceError,
@@ -20,8 +20,7 @@ from hexacell.errors import (
     WriteBackUndone,
 )
 from hexacell.measurements.csv_file import read_measurements
-from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
-from hexacell.runs.start_attempts import read_attempts
+from hexacell.runs.run_folder import RunFolder, find_run, read_attempts, runs_folder
 from hexacell.services.history.history import past_runs
 from hexacell.services.history.retention import reason_to_keep
 from hexacell.services.run.calibration_run import RunRequest, calibrate

@@ -7,7 +7,7 @@ import tomlkit
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.storage.toml_locations import KeyPath, locate
+from hexacell.storage.toml_document import KeyPath, locate
 from tests.hexacell.storage.toml_texts import FIRST_MARK, documents, leaves
 
 TRICKY = r'''

@@ -5,7 +5,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from hexacell.storage.toml_locations import KeyPath
+from hexacell.storage.toml_document import KeyPath
 
 DECOYS = ["", "# [x] = {", "  # '''", '# """', "\t"]
 TEXTS = ["'[a]'", '"}#\\""', "'''\n]\n[[b]]\n'''", '"""\n k = 1 \\"""\n"""', "''", '""']

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hexacell.cell.model import geometry_settings, tolerance_settings
+from hexacell.cell.by_mechanism import geometry_settings, tolerance_settings
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.identification.diagnostics.frame_choice import choose_frames

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Any
 
-from hexacell.cell.notifications import Occasion
+from hexacell.cell.operation import Occasion
 from hexacell.services.notify.address import NoticeAddress
 from hexacell.services.notify.notice import Notice
 

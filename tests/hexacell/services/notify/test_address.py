@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.cell.notifications import NotificationSettings
+from hexacell.cell.operation import NotificationSettings
 from hexacell.errors import FileError, UsageError
 from hexacell.services.notify.address import NoticeAddress, resolved_address, variable
 

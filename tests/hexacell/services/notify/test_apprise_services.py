@@ -10,7 +10,7 @@ from email import policy
 import pytest
 
 from hexacell.services.notify.delivery import deliver
-from hexacell.services.notify.undelivered import NoticeUndelivered
+from hexacell.services.notify.notice import NoticeUndelivered
 from tests.hexacell.services.notify.local_servers import closed_port, mail_server
 from tests.hexacell.services.notify.notices import a_notice, an_address
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.cell.notifications import Occasion
+from hexacell.cell.operation import Occasion
 from hexacell.services.notify.delivery import deliver
-from hexacell.services.notify.notice import Notice
-from hexacell.services.notify.undelivered import NoticeUndelivered
+from hexacell.services.notify.notice import Notice, NoticeUndelivered
 from tests.hexacell.services.notify.local_servers import (
     broker,
     closed_port,

@@ -8,9 +8,8 @@ import pytest
 
 from hexacell.services.notify import delivery
 from hexacell.services.notify.delivery import LONGEST_ATTEMPT_S, PAUSES_S, deliver
-from hexacell.services.notify.notice import Notice
-from hexacell.services.notify.telling_people import LONGEST_TELLING_S
-from hexacell.services.notify.undelivered import NoticeUndelivered
+from hexacell.services.notify.notice import Notice, NoticeUndelivered
+from hexacell.services.notify.outbox import LONGEST_NOTIFYING_S
 from tests.hexacell.services.notify.local_servers import (
     closed_port,
     make_certificate,
@@ -54,7 +53,7 @@ def test_a_refusal_is_tried_again_after_pauses_that_grow(monkeypatch) -> None:
 
 
 def test_all_attempts_fit_into_what_a_run_waits_for_them() -> None:
-    assert (len(PAUSES_S) + 1) * LONGEST_ATTEMPT_S + sum(PAUSES_S) < LONGEST_TELLING_S
+    assert (len(PAUSES_S) + 1) * LONGEST_ATTEMPT_S + sum(PAUSES_S) < LONGEST_NOTIFYING_S
 
 
 def test_what_is_taken_at_once_pauses_for_nothing() -> None:

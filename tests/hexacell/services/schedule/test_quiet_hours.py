@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from hexacell.cell.unattended import UnattendedSettings
-from hexacell.services.schedule.quiet_hours import next_quiet, quiet_until
+from hexacell.cell.operation import UnattendedSettings
+from hexacell.services.schedule.unattended_runs import next_quiet, quiet_until
 
 MONDAY = datetime(2026, 3, 2, tzinfo=UTC)
 

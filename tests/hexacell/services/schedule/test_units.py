@@ -13,9 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.errors import UsageError
-from hexacell.services.schedule.crontab import crontab_line
-from hexacell.services.schedule.scheduled_run import ScheduledRun, time_of_day
-from hexacell.services.schedule.systemd_units import cell_of, service_text, timer_text
+from hexacell.services.schedule.scheduled_run import (
+    ScheduledRun,
+    cell_of,
+    crontab_line,
+    service_text,
+    time_of_day,
+    timer_text,
+)
 
 PRINTABLE = st.text(
     st.characters(categories=["L", "N", "P", "S", "Zs"], exclude_characters="/"), min_size=1, max_size=20

@@ -13,14 +13,18 @@ from typing import Any
 import pytest
 
 from hexacell.cell.loader import Cell
-from hexacell.cell.notifications import NotificationSettings, Occasion
+from hexacell.cell.operation import NotificationSettings, Occasion
 from hexacell.errors import FileError
 from hexacell.runs.run_folder import runs_folder
 from hexacell.services.notify.address import NoticeAddress
-from hexacell.services.notify.notice import Notice
-from hexacell.services.notify.outbox import NoticeOutbox
-from hexacell.services.notify.telling_people import send_waiting, tell_people, tell_test, waiting_notices
-from hexacell.services.notify.undelivered import NoticeUndelivered
+from hexacell.services.notify.notice import Notice, NoticeUndelivered
+from hexacell.services.notify.outbox import (
+    NoticeOutbox,
+    notify_all,
+    notify_test,
+    send_waiting,
+    waiting_notices,
+)
 from tests.hexacell.services.notify.notices import a_notice
 from tests.hexacell.services.proposed_runs import a_cell
 from tests.waiting import wait_until
@@ -65,9 +69,9 @@ def test_each_is_told_of_what_the_cell_says(tmp_path, post) -> None:
         person("alarms", on=(Occasion.ALARM,)),
         person("bad"),
     )
-    tell_people(cell, now_notice(1, occasions=(Occasion.PASS,)), post)
+    notify_all(cell, now_notice(1, occasions=(Occasion.PASS,)), post)
     assert post.taken == [("all", "1")]
-    tell_people(cell, now_notice(2, occasions=(Occasion.PASS, Occasion.ALARM)), post)
+    notify_all(cell, now_notice(2, occasions=(Occasion.PASS, Occasion.ALARM)), post)
     assert sorted(post.taken[1:]) == [("alarms", "2"), ("all", "2"), ("bad", "2")]
     assert waiting_notices(cell) == ()
 
@@ -75,15 +79,15 @@ def test_each_is_told_of_what_the_cell_says(tmp_path, post) -> None:
 def test_who_is_absent_is_told_later_in_order_and_once(tmp_path, post) -> None:
     cell = told_cell(tmp_path)
     post.absent = {"two"}
-    outcome = tell_people(cell, now_notice(1), post)
-    problems = {one.name: (one.told, one.wait, one.problem) for one in outcome.people}
+    outcome = notify_all(cell, now_notice(1), post)
+    problems = {one.name: (one.sent, one.wait, one.problem) for one in outcome.deliveries}
     assert problems == {"one": (1, 0, None), "two": (0, 1, "does not answer")}
-    tell_people(cell, now_notice(2), post)
+    notify_all(cell, now_notice(2), post)
     assert post.taken == [("one", "1"), ("one", "2")]
     post.absent = set()
-    assert send_waiting(cell, post).are_all_told
+    assert send_waiting(cell, post).are_all_sent
     assert post.taken[2:] == [("two", "1"), ("two", "2")]
-    assert send_waiting(cell, post).people == ()
+    assert send_waiting(cell, post).deliveries == ()
 
 
 def test_after_a_power_cut_between_telling_and_forgetting_it_is_told_again_with_its_id(
@@ -96,8 +100,8 @@ def test_after_a_power_cut_between_telling_and_forgetting_it_is_told_again_with_
 
     with monkeypatch.context() as patch:
         patch.setattr(NoticeOutbox, "forget", cut)
-        tell_people(cell, now_notice(1), post)
-    assert send_waiting(cell, post).are_all_told
+        notify_all(cell, now_notice(1), post)
+    assert send_waiting(cell, post).are_all_sent
     assert sorted(post.taken) == [("one", "1")] * 2 + [("two", "1")] * 2
     assert waiting_notices(cell) == ()
 
@@ -113,8 +117,8 @@ def test_who_is_slow_is_waited_for_only_so_long_and_delays_nobody(tmp_path, post
         else:
             post(address, notice)
 
-    monkeypatch.setattr("hexacell.services.notify.telling_people.LONGEST_TELLING_S", 0.2)
-    problems = {one.name: one.problem for one in tell_people(cell, now_notice(1), slow).people}
+    monkeypatch.setattr("hexacell.services.notify.outbox.LONGEST_NOTIFYING_S", 0.2)
+    problems = {one.name: one.problem for one in notify_all(cell, now_notice(1), slow).deliveries}
     assert problems == {"one": "not finished within 0.2 s", "two": None}
     assert [one.to for one in waiting_notices(cell)] == ["one"]
     answer.set()
@@ -126,7 +130,7 @@ def test_the_same_end_told_again_is_one_notice(tmp_path, post) -> None:
     cell = told_cell(tmp_path)
     post.absent = {"one", "two"}
     for _ in range(2):
-        tell_people(cell, now_notice(1), post)
+        notify_all(cell, now_notice(1), post)
     assert len(waiting_notices(cell)) == 2
 
 
@@ -143,19 +147,19 @@ def test_on_a_full_disk_it_is_told_all_the_same(tmp_path, post, monkeypatch) -> 
     with monkeypatch.context() as patch:
         patch.setattr("hexacell.storage.atomic_files.write_atomically", full)
         patch.setattr(Path, "unlink", read_only)
-        assert tell_people(cell, now_notice(1), post).are_all_told
+        assert notify_all(cell, now_notice(1), post).are_all_sent
         post.absent = {"one"}
-        (told, untold) = sorted(tell_people(cell, now_notice(2), post).people, key=lambda one: -one.told)
+        (told, untold) = sorted(notify_all(cell, now_notice(2), post).deliveries, key=lambda one: -one.sent)
     assert (told.name, untold.name, untold.problem) == ("two", "one", "does not answer")
     assert waiting_notices(cell) == ()
 
 
 def test_who_is_told_no_longer_keeps_nobody_else_waiting(tmp_path, post) -> None:
     post.absent = {"one", "two"}
-    tell_people(told_cell(tmp_path), now_notice(1), post)
+    notify_all(told_cell(tmp_path), now_notice(1), post)
     post.absent = set()
     fewer = told_cell(tmp_path, person("two"))
-    assert send_waiting(fewer, post).are_all_told
+    assert send_waiting(fewer, post).are_all_sent
     assert post.taken == [("two", "1")]
     assert [one.to for one in waiting_notices(fewer)] == ["one"]
 
@@ -164,14 +168,14 @@ def test_what_is_too_old_is_tried_once_more_and_then_given_up(tmp_path, post) ->
     cell = told_cell(tmp_path)
     old = a_notice(1, at=datetime.now(UTC) - timedelta(days=30))
     post.absent = {"one"}
-    outcome = tell_people(cell, old, post)
+    outcome = notify_all(cell, old, post)
     assert (outcome.dropped, post.taken) == (1, [("two", "1")])
     assert waiting_notices(cell) == ()
 
 
 def test_a_notification_without_its_password_file_is_a_problem_of_its_own(tmp_path, post) -> None:
     cell = told_cell(tmp_path, person("one", password_file="none.toml"), person("two"))
-    outcome = {one.name: one.problem for one in tell_people(cell, now_notice(1), post).people}
+    outcome = {one.name: one.problem for one in notify_all(cell, now_notice(1), post).deliveries}
     assert outcome["two"] is None
     assert "none.toml" in str(outcome["one"])
 
@@ -179,10 +183,10 @@ def test_a_notification_without_its_password_file_is_a_problem_of_its_own(tmp_pa
 def test_two_processes_do_not_send_at_once(tmp_path, post) -> None:
     cell = told_cell(tmp_path)
     post.absent = {"one", "two"}
-    tell_people(cell, now_notice(1), post)
+    notify_all(cell, now_notice(1), post)
     post.absent = set()
     with NoticeOutbox(runs_folder(cell)).held():
-        (problem,) = send_waiting(cell, post).people
+        (problem,) = send_waiting(cell, post).deliveries
     assert problem.problem == "another process is sending at this moment"
     assert post.taken == []
 
@@ -190,6 +194,6 @@ def test_two_processes_do_not_send_at_once(tmp_path, post) -> None:
 def test_a_test_is_not_kept(tmp_path, post) -> None:
     cell = told_cell(tmp_path)
     post.absent = {"two"}
-    outcome = tell_test(cell, a_notice(1, occasions=(Occasion.TEST,)), post)
-    assert [one.problem for one in outcome.people] == [None, "does not answer"]
+    outcome = notify_test(cell, a_notice(1, occasions=(Occasion.TEST,)), post)
+    assert [one.problem for one in outcome.deliveries] == [None, "does not answer"]
     assert waiting_notices(cell) == ()

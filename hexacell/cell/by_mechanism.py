@@ -1,0 +1,164 @@
+"""The model of the cell files of one mechanism: keys of its parameters, and units of its joint variables.
+
+A field whose alias ends in the unit of the joint variables is in that unit: ``encoder`` is the key
+``encoder_mm`` where joints slide, and ``encoder_deg`` where they turn. The sections are written for mm;
+here they are derived for deg, with other keys and defaults, and nothing else changes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from copy import copy
+from functools import cache
+from typing import Any, TypeVar
+
+from pydantic import Field, create_model
+
+from hexacell.cell.controller import ControllerSettings, RotaryControllerSettings
+from hexacell.cell.devices import LinearEncoderSettings, RotaryEncoderSettings
+from hexacell.cell.fields import GeometrySettings, InRange, NotNegative, Positive, Section
+from hexacell.cell.limits import LimitSettings, SpeedSettings
+from hexacell.cell.measuring import GuardSettings, NoiseSettings, TimingSettings
+from hexacell.cell.model import CellSettings, ToleranceSettings
+from hexacell.cell.robot import RobotSettings, mechanism_of
+from hexacell.cell.simulation import SimulatedEncoders, SimulatedMotion, SimulationSettings
+from hexacell.cell.uncertainty import (
+    CommonUncertaintySettings,
+    LinearUncertaintySettings,
+    RotaryUncertaintySettings,
+    UncertaintySettings,
+)
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.parameters import LEGS, JointUnit, ParameterKind, ParameterSet
+
+SectionType = TypeVar("SectionType", bound=Section)
+
+IN_DEG: Mapping[type[Section], Mapping[str, float]] = {
+    LimitSettings: {"joint_min": -180.0, "joint_max": 180.0},
+    NoiseSettings: {"encoder": 0.003},
+    SpeedSettings: {"joint": 30.0, "joint_at_gauges": 7.5},
+    TimingSettings: {"spread_encoder": 0.02},
+    GuardSettings: {"following": 0.3},
+    SimulatedEncoders: {"noise": 0.003, "flicker": 0.0003},
+    SimulatedMotion: {"speed": 30.0},
+}
+"""Defaults for joints that turn: what the defaults in mm are at a radius of some 200 mm."""
+
+OF_MM = re.compile(r"_mm(?=$|_s$)")
+
+
+def in_joint_unit(section: type[SectionType], unit: JointUnit) -> type[SectionType]:
+    """The section whose keys and defaults are for joint variables of a unit."""
+    if unit is JointUnit.MM:
+        return section
+    defaults = next((found for of, found in IN_DEG.items() if issubclass(section, of)), {})
+    fields: dict[str, Any] = {}
+    for name, of_mm in section.model_fields.items():
+        if of_mm.alias is None:
+            continue
+        field = copy(of_mm)
+        field.alias = field.validation_alias = field.serialization_alias = OF_MM.sub("_deg", of_mm.alias)
+        field.default = defaults.get(name, of_mm.default)
+        fields[name] = (of_mm.annotation, field)
+    made: type[SectionType] = create_model(
+        section.__name__, __base__=section, __doc__=section.__doc__, **fields
+    )
+    return made
+
+
+def cell_model(mechanism: str, *, encoder_scales: bool = False) -> type[CellSettings]:
+    """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed.
+
+    Each has one model only, however it is asked for: settings of two would never be equal.
+    """
+    return _cell_model(mechanism, encoder_scales)
+
+
+@cache
+def _cell_model(mechanism: str, encoder_scales: bool) -> type[CellSettings]:
+    found = mechanism_of(mechanism, encoder_scales=encoder_scales)
+    parameters = found.parameters
+    geometry, tolerances = geometry_settings(parameters), tolerance_settings(parameters)
+    has_defaults = not any(field.is_required() for field in tolerances.model_fields.values())
+    robot = _derived(RobotSettings, nominal=(geometry, RobotSettings.model_fields["nominal"]))
+    truth = SimulationSettings.model_fields["geometry"]
+    simulated = _in_unit(found, encoders=SimulatedEncoders, motion=SimulatedMotion)
+    simulation = _derived(SimulationSettings, geometry=(geometry, truth), **simulated)
+    uncertainty = uncertainty_settings(found)
+    is_rotary = found.words.joint_unit is JointUnit.DEG
+    encoders = in_joint_unit(
+        RotaryEncoderSettings if is_rotary else LinearEncoderSettings, found.words.joint_unit
+    )
+    return _derived(
+        CellSettings,
+        uncertainty=(uncertainty, uncertainty()),
+        robot=(robot, ...),
+        encoders=(encoders, ...),
+        controller=(RotaryControllerSettings if is_rotary else ControllerSettings, ...),
+        tolerances=(tolerances, tolerances() if has_defaults else ...),
+        simulation=(simulation | None, None),
+        **_in_unit(
+            found,
+            noise=NoiseSettings,
+            limits=LimitSettings,
+            speed=SpeedSettings,
+            timing=TimingSettings,
+            guards=GuardSettings,
+        ),
+    )
+
+
+def uncertainty_settings(mechanism: Mechanism) -> type[CommonUncertaintySettings]:
+    """The section of the effects that a mechanism has."""
+    if mechanism.words.joint_unit is JointUnit.DEG:
+        return RotaryUncertaintySettings
+    return LinearUncertaintySettings if mechanism.words.guide is None else UncertaintySettings
+
+
+def _in_unit(mechanism: Mechanism, **sections: type[Section]) -> dict[str, Any]:
+    """Fields of sections with a default, in the unit of the mechanism's joint variables."""
+    made = {name: in_joint_unit(one, mechanism.words.joint_unit) for name, one in sections.items()}
+    return {name: (one, one()) for name, one in made.items()}
+
+
+def geometry_settings(parameters: ParameterSet) -> type[GeometrySettings]:
+    """The section for a geometry of these parameters."""
+    fields: dict[str, Any] = {
+        kind.symbol: (_array_type(kind), Field(_default(kind), description=kind.meaning))
+        for kind in parameters.kinds
+    }
+    return _derived(GeometrySettings, **fields)
+
+
+def tolerance_settings(parameters: ParameterSet) -> type[ToleranceSettings]:
+    """The section for the tolerances of these parameters."""
+    fields: dict[str, Any] = {
+        kind.tolerance_key: (Positive, _tolerance_field(kind)) for kind in parameters.kinds
+    }
+    kinds = " and ".join(kind.symbol for kind in parameters.kinds if kind.has_ball_offset)
+    description = f"mounting of the ball: an offset common to all {kinds}"
+    fields["ball_mm"] = (NotNegative, Field(0.0, description=description))
+    return _derived(ToleranceSettings, **fields)
+
+
+def _tolerance_field(kind: ParameterKind) -> Any:  # noqa: ANN401 - what pydantic's Field returns
+    default = ... if kind.default_tolerance is None else kind.default_tolerance
+    return Field(default, description=kind.tolerance_meaning)
+
+
+def _default(kind: ParameterKind) -> Any:  # noqa: ANN401 - what pydantic's Field takes
+    return ... if kind.default is None else (kind.default,) * LEGS
+
+
+def _array_type(kind: ParameterKind) -> Any:  # noqa: ANN401 - a type made here
+    made: Any = Positive if kind.is_positive else InRange
+    for length in reversed(kind.shape):
+        made = tuple.__class_getitem__((made,) * length)
+    return made
+
+
+def _derived(base: type[SectionType], /, **fields: Any) -> type[SectionType]:  # noqa: ANN401
+    """A section with the fields that the mechanism decides; each is a type and a default or description."""
+    made: type[SectionType] = create_model(base.__name__, __base__=base, __doc__=base.__doc__, **fields)
+    return made

@@ -1,0 +1,236 @@
+"""Sections of the cell file on operation: archive, OPC UA, reports, unattended runs, notifications."""
+
+from __future__ import annotations
+
+import re
+from enum import StrEnum
+from typing import Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from hexacell.cell.fields import Name, NotNegative, Positive, Section, Text, broken_rule
+from hexacell.storage.secrets import MASK
+
+_POSTGRESQL = re.compile(r"postgresql://(?P<login>[^/@]*@)?[^/@]*/[^/?]+(?P<query>\?.*)?")
+
+
+class ArchiveSettings(Section):
+    """The index over the cell's runs; the runs themselves are in their folders."""
+
+    url: Text | None = Field(
+        None,
+        description="postgresql://user@host/database, which several cells may share; without it, a file "
+        "beside the runs. A password belongs in the user's ~/.pgpass",
+    )
+
+    @field_validator("url")
+    @classmethod
+    def _names_a_database_and_no_password(cls, url: str | None) -> str | None:
+        mistake = None if url is None else mistake_in_url(url)
+        if mistake is not None:
+            raise broken_rule(*mistake)
+        return url
+
+
+def mistake_in_url(url: str) -> tuple[str, str] | None:
+    """What is wrong with the address of a shared archive, and what to do; none if nothing is."""
+    found = _POSTGRESQL.fullmatch(url)
+    if found is None:
+        return "this is no address of a PostgreSQL database", "Write postgresql://user@host/database"
+    if ":" in (found["login"] or "") or "password" in (found["query"] or ""):
+        return "a password does not belong here", "Put it into ~/.pgpass, and remove it"
+    return None
+
+
+class OpcUaSettings(Section):
+    """The server that ``hexacell serve`` starts; its messages are always signed and encrypted."""
+
+    host: Text = Field("127.0.0.1", min_length=1, description="address it listens at")
+    port: int = Field(4840, ge=1, le=65535, description="TCP port")
+    folder: Text = Field(
+        "opcua",
+        min_length=1,
+        description="for its certificate and private key, relative to the cell file; made where absent",
+    )
+    password_file: Text | None = Field(
+        None,
+        min_length=1,
+        description="TOML file with user and password of who may read, relative to the cell file, which "
+        "others must not be able to read. HEXACELL_OPCUA_USER and HEXACELL_OPCUA_PASSWORD in the "
+        "environment take precedence",
+    )
+    anonymous: bool = Field(False, description="whether anybody may read, without a password")
+    poll_s: float = Field(
+        2.0, ge=0.05, le=3600, allow_inf_nan=False, description="between looks for new runs"
+    )
+
+
+class ReportSettings(Section):
+    """What a report of a run says beside what was measured; all of it may be left out."""
+
+    machine: Text = Field("", description="maker and model of the robot")
+    serial_number: Text = Field("", description="of the robot")
+    laboratory: Text = Field("", description="who calibrates, with the address")
+    country: Text = Field(
+        "", pattern="^([A-Z]{2})?$", description="of the laboratory, ISO 3166: two letters, as DE"
+    )
+    customer: Text = Field("", description="for whom, with the address")
+    place: Text = Field("", description="where the robot stands")
+    authorised_by: Text = Field("", description="who answers for reports of this cell")
+
+
+DAY_MINUTES = 24 * 60
+_SPAN = re.compile(r"([01]\d|2[0-3]):([0-5]\d)-([01]\d|2[0-3]):([0-5]\d)")
+
+Weekday = Literal["mon", "tue", "wed", "thu", "fri", "sat", "sun"]
+
+
+class UnattendedSettings(Section):
+    """Runs without a person: check, quick level or calibration, from a schedule or typed."""
+
+    quiet_hours: tuple[Text, ...] = Field(
+        (),
+        max_length=20,
+        description="when none may begin and one that goes on ends, as 05:30-22:00, in the computer's time "
+        "zone; past midnight as 22:00-06:00",
+    )
+    quiet_days: tuple[Weekday, ...] = Field(
+        ("mon", "tue", "wed", "thu", "fri", "sat", "sun"),
+        description="on which quiet hours begin",
+    )
+    window_minutes: NotNegative = Field(
+        0.0,
+        le=DAY_MINUTES,
+        description="so long after its time a run that could not begin is tried again; 0: not at all",
+    )
+    retry_minutes: Positive = Field(10.0, le=DAY_MINUTES, description="between two tries")
+    longest_minutes: Positive | None = Field(
+        None,
+        description="a run that lasts longer goes back to its reference and ends; it can be resumed",
+    )
+
+    @field_validator("quiet_hours")
+    @classmethod
+    def _are_spans_of_a_day(cls, spans: tuple[str, ...]) -> tuple[str, ...]:
+        for span in spans:
+            if _SPAN.fullmatch(span) is None or span[:5] == span[6:]:
+                raise broken_rule(f"'{span}' is no span of a day", "Write it as 05:30-22:00")
+        return spans
+
+    @property
+    def quiet_spans(self) -> tuple[tuple[int, int], ...]:
+        """Begin and length of the quiet hours, minutes, from midnight."""
+        found = (_SPAN.fullmatch(span) for span in self.quiet_hours)
+        clocks = [tuple(int(number) for number in one.groups()) for one in found if one is not None]
+        begins_ends = [(60 * a + b, 60 * c + d) for a, b, c, d in clocks]
+        return tuple((begin, (end - begin) % DAY_MINUTES) for begin, end in begins_ends)
+
+
+MOST_NOTIFICATIONS = 10
+
+
+class Occasion(StrEnum):
+    """What a run without a person may be worth telling for; one run may be of several."""
+
+    PASS = "pass"  # noqa: S105 - a verdict
+    NO_PASS = "no-pass"  # noqa: S105 - likewise
+    ALARM = "alarm"
+    ANSWER_NEEDED = "answer-needed"
+    FAILURE = "failure"
+    TEST = "test"
+
+
+OccasionWord = Literal["pass", "no-pass", "alarm", "answer-needed", "failure"]
+"""Each of them but a test, as a cell file has it."""
+
+USUAL_OCCASIONS: tuple[OccasionWord, ...] = ("no-pass", "alarm", "answer-needed", "failure")
+
+WEBHOOKS = ("http", "https")
+BROKERS = ("mqtt", "mqtts")
+WITHOUT_TOKENS = (*WEBHOOKS, *BROKERS, "mailto", "mailtos", "json", "jsons")
+"""Addresses that may stand in a cell file; those of chat services have a token in them."""
+
+_ADDRESS = re.compile(r"(?P<scheme>[a-z][a-z0-9+.-]*)://(?P<login>[^/?#@]*@)?[^/?#@]+[^#]*")
+_SECRET_QUERY = re.compile(r"[?&][^=&]*(?:pass|token|secret|key|auth)[^=&]*=", re.IGNORECASE)
+_WILD = re.compile(r"[#+\0]")
+
+
+class NotificationSettings(Section):
+    """Somebody who is told of runs without a person; several may be."""
+
+    name: Name = Field(description="who or what is told")
+    url: Text | None = Field(
+        None,
+        description="https://host/path (webhook, JSON), mqtts://host (MQTT), mailto://host?from=...&to=... "
+        "or a chat service's address as apprise has it. One with a token in it belongs in password_file",
+    )
+    on: tuple[OccasionWord, ...] = Field(
+        USUAL_OCCASIONS,
+        description="the runs that are told; no-pass are those with another verdict than a pass, failure "
+        "those without one",
+    )
+    topic: Text | None = Field(
+        None, min_length=1, description="MQTT: below which state is kept; by default hexacell/NAME-OF-CELL"
+    )
+    ca_file: Text | None = Field(
+        None,
+        min_length=1,
+        description="certificates (PEM) that must have signed a webhook's or broker's, relative to the "
+        "cell file; by default those that the computer trusts",
+    )
+    password_file: Text | None = Field(
+        None,
+        min_length=1,
+        description="TOML file with any of url, user, password and token, relative to the cell file, which "
+        "others must not be able to read. HEXACELL_NOTIFY_NAME_URL, ..._USER, ..._PASSWORD and ..._TOKEN "
+        "in the environment take precedence",
+    )
+
+    @field_validator("url")
+    @classmethod
+    def _has_no_secret(cls, url: str | None) -> str | None:
+        mistake = None if url is None else mistake_in_address(url)
+        if mistake is not None:
+            raise broken_rule(*mistake)
+        return url
+
+    @field_validator("on")
+    @classmethod
+    def _tells_something(cls, on: tuple[OccasionWord, ...]) -> tuple[OccasionWord, ...]:
+        if not on:
+            raise broken_rule("nothing is told", "Name an occasion, or remove the section")
+        return on
+
+    @field_validator("topic")
+    @classmethod
+    def _names_one_topic(cls, topic: str | None) -> str | None:
+        if topic is not None and (_WILD.search(topic) or topic.startswith("$")):
+            raise broken_rule("this is no topic to publish to", "Leave #, + and a first $ away")
+        return topic
+
+    @model_validator(mode="after")
+    def _of_a_broker(self) -> NotificationSettings:
+        if self.topic is not None and self.url is not None and scheme_of(self.url) not in BROKERS:
+            raise broken_rule("only MQTT has topics", "Remove topic, or write mqtts://host as the url")
+        return self
+
+
+def scheme_of(url: str) -> str:
+    """What stands before ``://`` in an address."""
+    return url.partition("://")[0].lower()
+
+
+def mistake_in_address(url: str) -> tuple[str, str] | None:
+    """What is wrong with an address in a cell file, and what to do; none if nothing is."""
+    found = _ADDRESS.fullmatch(url)
+    if found is None:
+        return "this is no address", "Write https://host/path, mqtts://host or mailto://host?to=..."
+    login = found["login"] or ""
+    if (":" in login and not login.endswith(f":{MASK}@")) or _SECRET_QUERY.search(url):
+        return "a password does not belong here", "Move it to a file of mode 600, and name it password_file"
+    if found["scheme"] not in WITHOUT_TOKENS:
+        return (
+            f"an address of {found['scheme']} may have a token in it",
+            "Move url to a file of mode 600, and name it password_file",
+        )
+    return None

@@ -20,7 +20,7 @@ from hexacell.errors import HexacellError
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.services.history.reported_run import ReportedRun, reported_run
-from hexacell.services.records.offline import NextPose, fit_measurements, next_pose
+from hexacell.services.offline import NextPose, fit_measurements, next_pose
 from hexacell.verdict.assessment import Assessment
 
 __all__ = [

@@ -14,12 +14,11 @@ from hexacell.checks.check import Check
 from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, RecordId
-from hexacell.results.length_result import LengthResult
-from hexacell.results.result import AcceptedResult
+from hexacell.results.result import AcceptedResult, LengthResult
 from hexacell.uncertainty.effects import Effect
 from hexacell.verdict.check_statement import CheckStatement
-from hexacell.verdict.decision import Verdict
-from hexacell.verdict.verification import JudgedError, VerifiedAccuracy, outcome_of
+from hexacell.verdict.decision import JudgedError, Verdict
+from hexacell.verdict.verification import VerifiedAccuracy, outcome_of
 
 
 class ParameterChange(Frozen):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from hexacell.cell.operation import mistake_in_url
 from hexacell.cli.console import Console
 from hexacell.errors import FileError, UsageError
-from hexacell.services.history.cell_status import CellStatus
-from hexacell.services.history.fleet import publish_status
+from hexacell.services.history.cell_status import CellStatus, publish_status
 
 
 def archive_url(url: str) -> str:

@@ -25,7 +25,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Deviation, RecordId
-from hexacell.results.length_result import LengthResult
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 
 class OutlierRecord(Frozen):
@@ -149,6 +149,54 @@ class ExpectedImprovement(Frozen):
 
     now_mm: float
     expanded_mm: float
+
+
+class LengthSource(Frozen):
+    """A line of the budget of a length check: one standard deviation of the scale."""
+
+    name: str
+    um_m: float
+
+
+class LengthResult(Frozen):
+    """What a length check says of the scale common to all encoders.
+
+    Attributes:
+        distance_mm: certified, at the temperature of the fixture.
+        length_mm: by the robot.
+        long_um_m: by how much the encoders show more than that; negative if they show less.
+        expanded_um_m: its expanded uncertainty U, k = 2.
+        stated_um_m: one standard deviation of the scale by the cell file.
+        sources: what the uncertainty consists of.
+        is_consistent: whether the records agree with each other; otherwise the check says nothing.
+        reason: why they do not, empty if they do.
+    """
+
+    distance_mm: float
+    length_mm: float
+    long_um_m: float
+    expanded_um_m: float
+    stated_um_m: float
+    sources: tuple[LengthSource, ...]
+    is_consistent: bool
+    reason: str = ""
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether the encoders are certainly not true to scale."""
+        return self.is_consistent and abs(self.long_um_m) > self.expanded_um_m
+
+    @property
+    def replaces_stated(self) -> bool:
+        """Whether the check says more than the cell file: it is finer, or it contradicts it."""
+        sigma = self.expanded_um_m / COVERAGE_FACTOR
+        contradicts = abs(self.long_um_m) > COVERAGE_FACTOR * np.hypot(sigma, self.stated_um_m)
+        return self.is_consistent and bool(contradicts or sigma < self.stated_um_m)
+
+    @property
+    def factor(self) -> float:
+        """What the scale factor of all encoders must be multiplied by."""
+        return 1.0 / (1.0 + 1e-6 * self.long_um_m)
 
 
 class AcceptedResult(Frozen):

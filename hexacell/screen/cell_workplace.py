@@ -21,16 +21,16 @@ from hexacell.runs.run_folder import find_run, new_run
 from hexacell.screen.backend import RESUME, WITH_LENGTH
 from hexacell.screen.child_process import run_child
 from hexacell.screen.workplace import Preflight, TriedPlan
-from hexacell.services.history.history import PastRun, compare_runs, parameter_trends, past_runs
+from hexacell.services.history.past_runs import PastRun, compare_runs, parameter_trends, past_runs
 from hexacell.services.preflight.plan_draft import PlanPreview
 from hexacell.services.preflight.security_warnings import exposure_warnings
 from hexacell.services.recorded.journal_soundness import require_sound
-from hexacell.services.run.interrupted_runs import LATEST, run_to_resume
+from hexacell.services.recorded.resumption import LATEST, run_to_resume
 from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, approval_question, read_proposal
 from hexacell.text.config_changes import applied_text, rollback_text
 from hexacell.text.history import comparison_text, drift_text
-from hexacell.text.screens.past import history_entries
+from hexacell.text.screens.reviewing import history_entries
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
 from procedures.calibration.workflow import Mode
 from procedures.journal.journal import read_journal

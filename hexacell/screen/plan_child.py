@@ -10,8 +10,8 @@ from typing import Any
 from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import load_cell
 from hexacell.errors import HexacellError
+from hexacell.services.offline import try_plan
 from hexacell.services.preflight.plan_draft import preview_of
-from hexacell.services.records.offline import try_plan
 from hexacell.text.planning import plan_trial_lines
 
 

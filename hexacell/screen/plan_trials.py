@@ -9,7 +9,7 @@ from hexacell.errors import UsageError
 from hexacell.screen.workplace import TriedPlan, Workplace
 from hexacell.services.preflight.plan_draft import PlanDraft
 from hexacell.text.plan_draft import removed_text
-from hexacell.text.screens.checklists import TRYING
+from hexacell.text.screens.live import TRYING
 
 
 class PlanTrials:

@@ -12,7 +12,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.errors import HexacellError
 from hexacell.services.run.calibration_run import preflight
 from hexacell.text.planning import device_line
-from hexacell.text.screens.checklists import failed_items, passed_items
+from hexacell.text.screens.live import failed_items, passed_items
 from hexacell.text.screens.views import ChecklistItem
 from procedures.calibration.workflow import Mode
 

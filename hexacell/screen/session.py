@@ -13,15 +13,12 @@ from hexacell.screen.device_watcher import DeviceWatcher
 from hexacell.screen.run_follower import RunFollower
 from hexacell.screen.session_actions import SessionActions
 from hexacell.screen.workplace import Workplace
-from hexacell.text.screens.checklists import RUNNING, STARTING, checklist_view
-from hexacell.text.screens.faults import fault_view
 from hexacell.text.screens.headers import header_view
-from hexacell.text.screens.live import live_view
-from hexacell.text.screens.measuring import measure_view
-from hexacell.text.screens.past import PROPOSAL_WAITS, history_view, rollback_question
+from hexacell.text.screens.live import RUNNING, STARTING, checklist_view, live_view
+from hexacell.text.screens.measuring import fault_view, measure_view
 from hexacell.text.screens.planned_poses import plan_view
 from hexacell.text.screens.questions import question_view
-from hexacell.text.screens.reviewing import review_view
+from hexacell.text.screens.reviewing import PROPOSAL_WAITS, history_view, review_view, rollback_question
 from hexacell.text.screens.views import (
     CellView,
     ChecklistView,

@@ -12,7 +12,7 @@ from hexacell.services.write_back.config_history import ConfigHistory, ConfigWri
 from hexacell.services.write_back.config_rollback import ConfigRollback
 from hexacell.services.write_back.proposals import AppliedProposal
 from hexacell.text.layout import wrapped
-from hexacell.text.teaching import teaching_line
+from hexacell.text.verdict import teaching_line
 
 RELOAD = "Restart or reload the controller before it moves: until then it has the geometry of before."
 

@@ -11,16 +11,16 @@ from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPo
 from hexacell.dry_run.checks import QuickTrial
 from hexacell.results.run_comparison import ParameterTrend, RunComparison
 from hexacell.services.history.drift_history import DriftHistory, FoundChange
-from hexacell.services.history.history import PastRun
+from hexacell.services.history.past_runs import PastRun
 from hexacell.services.history.retention import Retention
-from hexacell.services.records.offline import NextPose, PlanTrial
+from hexacell.services.offline import NextPose, PlanTrial
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.services.schedule.schedules import Schedule
 from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
 from hexacell.services.write_back.config_rollback import ConfigRollback
 from hexacell.services.write_back.proposals import AppliedProposal
 from hexacell.text.run_story import run_story
-from hexacell.text.teaching import teaching_sentence
+from hexacell.text.verdict import teaching_sentence
 from procedures.journal.line_format import Entry
 from procedures.replay.comparison import ReplayReport
 from procedures.run import events

@@ -8,11 +8,10 @@ from hexacell.campaign.decisions import Forecast
 from hexacell.campaign.pilots import pilot_number
 from hexacell.text.design_statement import design_sentence
 from hexacell.text.layout import wrapped
-from hexacell.text.length import length_text
 from hexacell.text.measured_noise import noise_and_averaging_text
 from hexacell.text.plan_draft import removed_summary
 from hexacell.text.planning import quick_accuracy_text, quick_start_text, run_forecast_line
-from hexacell.text.verification import check_start_text, check_text, verification_text
+from hexacell.text.verdict import check_start_text, check_text, length_text, verification_text
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Move, Phase, Pilot, Probe, Repeat, SetKey, Standstill, Try

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hexacell.results.run_comparison import ParameterDifference, ParameterTrend, RunComparison
-from hexacell.services.history.history import PastRun
+from hexacell.results.run_comparison import ParameterTrend, RunComparison
+from hexacell.services.history.past_runs import PastRun
 from hexacell.services.history.retention import Retention
 from hexacell.text.layout import wrapped
+from hexacell.text.parameters import parameter_table, rows_of_changes
 
 NO_RUNS = "This cell has no runs yet."
 NO_DRIFT = "A drift needs three calibrations of the cell."
@@ -59,12 +60,10 @@ def standing(run: PastRun) -> str:
 
 def comparison_text(before: PastRun, after: PastRun, compared: RunComparison) -> str:
     """The verdict on the change in words, then every free parameter."""
-    head = f"{'':5}{'before':>15}{'after':>15}{'change':>11}{'sigma':>9}"
     return "\n".join(
         [
             wrapped(f"{before.name} -> {after.name}: {comparison_sentence(compared)}"),
-            head,
-            *(_difference_line(one) for one in compared.parameters),
+            *parameter_table(rows_of_changes(compared.parameters), "before", "after"),
             wrapped(
                 f"In the frame convention {compared.frame}: where a point that it fixes moved, others "
                 "show it. Sigma is the noise of both runs."
@@ -96,11 +95,6 @@ def drift_text(found: Sequence[ParameterTrend]) -> str:
 
 def _columns(name: str, mode: str, verdict: str, error: str, what: str) -> str:
     return f"{name:23}{mode:9}{verdict:17}{error:17}{what}".rstrip()
-
-
-def _difference_line(one: ParameterDifference) -> str:
-    mark = "  changed" if one.is_significant else ""
-    return f"{one.name:5}{one.before:15.4f}{one.after:15.4f}{one.change:+11.4f}{one.sigma:9.4f}{mark}"
 
 
 def _trend_line(one: ParameterTrend) -> str:

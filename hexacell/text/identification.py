@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-
-import numpy as np
+from collections.abc import Sequence
 
 from hexacell.identification.diagnostics.model_tests import contradicted_points
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.parameters import GeometricParameter, JointUnit, ParameterUnit
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.noise.repeatability import Repeatability
 from hexacell.noise.variance_components import NoiseLevel, NoiseLevels
 from hexacell.text.design_statement import design_sentence
 from hexacell.text.layout import wrapped
 from hexacell.text.measured_noise import measured_noise_text
-from hexacell.text.uncertainty import budget_table
+from hexacell.text.parameters import parameter_rows, parameter_table
+from hexacell.uncertainty.budget import BudgetLine, UncertaintyBudget
 from hexacell.verdict.assessment import Assessment
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.findings import findings, noise_sentence, pair_sentences, residual_sentence
+
+SMALLEST_BUDGET_LINE_MM = 0.0005
+"""Lines of an uncertainty budget below this are left out: they would be zero in the table, mm."""
 
 
 def identification_report(assessed: Assessment) -> str:
@@ -28,15 +30,18 @@ def identification_report(assessed: Assessment) -> str:
     found = assessed.found
     parts = (
         "\n".join(wrapped(sentence) for sentence in findings(assessed)),
-        verdict_line(assessed),
+        _verdict_line(assessed),
         accuracy_table(assessed),
         budget_table(assessed.budget),
         "" if assessed.design is None else wrapped(design_sentence(assessed.design)),
-        _data_and_termination(found),
+        wrapped(
+            f"{len(found.free)} parameters from {found.records} records at {found.points} points; the "
+            f"solver ended because {found.termination.value} ({found.solution.iterations} iterations)."
+        ),
         _identified(assessed),
-        parameter_table(assessed.zeros or found, assessed.drawing),
+        "\n".join(drawing_table(assessed.zeros or found, assessed.drawing)),
         residual_line(found),
-        points_line(assessed),
+        _points_line(assessed),
         noise_table(assessed.noise),
         "" if assessed.measured_noise is None else measured_noise_text(assessed.measured_noise),
         repeatability_lines(assessed.repeatability),
@@ -45,7 +50,7 @@ def identification_report(assessed: Assessment) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def verdict_line(assessed: Assessment) -> str:
+def _verdict_line(assessed: Assessment) -> str:
     """That records of the identification alone give no verdict on the robot, and what U it would have."""
     sentence = f"Verdict: {Verdict.NOT_EVALUATED}, as no held-out records test this model."
     budget = assessed.budget
@@ -54,7 +59,7 @@ def verdict_line(assessed: Assessment) -> str:
     return wrapped(f"{sentence} U at the task poses is {budget.expanded_mm:.3f} mm.")
 
 
-def points_line(assessed: Assessment) -> str:
+def _points_line(assessed: Assessment) -> str:
     """Whether the records of each point agree with what the others predict."""
     if not assessed.points:
         return "Each point by the others: not evaluated, they do not determine the geometry."
@@ -88,13 +93,6 @@ def _error_row(name: str, errors: PoseErrors) -> str:
     )
 
 
-def _data_and_termination(found: Identification) -> str:
-    return wrapped(
-        f"{len(found.free)} parameters from {found.records} records at {found.points} points; the "
-        f"solver ended because {found.termination.value} ({found.solution.iterations} iterations)."
-    )
-
-
 def _identified(assessed: Assessment) -> str:
     """Which parameters are identified, where not all are."""
     if assessed.zeros is None:
@@ -106,38 +104,18 @@ def _identified(assessed: Assessment) -> str:
     )
 
 
-def parameter_table(found: Identification | IdentifiedZeros, drawing: Geometry) -> str:
-    """One line a parameter, mm or mrad; those that the frame convention fixes are left out."""
-    undetermined, parameters = set(found.undetermined), found.geometry.parameters
-    held = set() if isinstance(found, Identification) else set(parameters.names) - set(found.names)
-    values = np.array([drawing.vector, found.geometry.vector, found.sigma]) / parameters.like_a_mm
-    names = [_with_unit(parameter) for parameter in parameters.parameters]
-    width = max(4, *map(len, names))
-    lines = [
-        f"{name:{width}}{old:10.3f}{new:12.3f}{new - old:+9.3f}{sigma:8.3f}  "
-        + _word(name.split(",")[0], undetermined, held, _significance(new - old, sigma))
-        for name, (old, new, sigma) in zip(names, values.T, strict=True)
-        if sigma > 0.0
-    ]
-    header = f"{'mm':{width}}{'drawing':>10}{'identified':>12}{'change':>9}{'sigma':>8}"
-    return "\n".join([header, *lines])
-
-
-def _word(name: str, undetermined: Collection[str], held: Collection[str], otherwise: str) -> str:
-    if name in held:
-        return "not identified"
-    return "not determined by these data" if name in undetermined else otherwise
-
-
-def _with_unit(parameter: GeometricParameter) -> str:
-    """``S3x``; ``rail2a, mrad``."""
-    unit = parameter.kind.unit
-    return parameter.name if unit is ParameterUnit.MM else f"{parameter.name}, {unit.shown}"
-
-
-def _significance(change: float, sigma: float) -> str:
-    times = abs(change) / sigma
-    return f"moved {times:.1f} sigma" if times < 99.95 else f"moved {times:.0f} sigma"
+def drawing_table(found: Identification | IdentifiedZeros, drawing: Geometry) -> tuple[str, ...]:
+    """The drawing and the identified geometry, a line a parameter."""
+    parameters = found.geometry.parameters
+    rows = parameter_rows(
+        parameters,
+        drawing.vector,
+        found.geometry.vector,
+        found.sigma,
+        undetermined=found.undetermined,
+        held=() if isinstance(found, Identification) else set(parameters.names) - set(found.names),
+    )
+    return parameter_table(rows, "drawing", "identified")
 
 
 def residual_line(found: Identification) -> str:
@@ -195,3 +173,39 @@ def correlation_lines(sentences: Sequence[str], strong: int) -> str:
 
 def _counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def budget_table(budget: UncertaintyBudget | None) -> str:
+    """One line for the noise and each effect that matters, their sum, and what the records cannot show."""
+    if budget is None:
+        return ""
+    title = "Uncertainty at the worst task pose, mm"
+    noise = "noise, and all that is not identified" if budget.has_held else "noise of the readings"
+    expanded = f"U, 95 %, of the largest error of all poses (angle: {budget.expanded_deg:.3f} deg)"
+    unseen = ", ".join(f"{line.effect.name} ({_by_one_unit(line)})" for line in budget.unseen)
+    return "\n".join(
+        [
+            f"{title:44}{'size':>12}{'result':>8}{'direct':>8}{'both':>8}",
+            f"  {noise:42}{'':12}{budget.noise_mm:8.3f}{'':8}{budget.noise_mm:8.3f}",
+            *filter(None, map(_budget_line, budget.lines)),
+            f"  {'standard uncertainty (root of the squares)':70}{budget.standard_mm:8.3f}",
+            f"  {expanded:70}{budget.expanded_mm:8.3f}",
+            *([wrapped(f"Not checked, as no record shows it: {unseen}.", indent=2)] if unseen else []),
+        ]
+    )
+
+
+def _budget_line(line: BudgetLine) -> str:
+    """A line of the budget; empty where all of it would be zero."""
+    effect, figures = line.effect, (line.through_mm, line.direct_mm, line.combined_mm)
+    if max(figures) < SMALLEST_BUDGET_LINE_MM:
+        return ""
+    through, direct = (f"{mm:8.3f}" if mm else f"{'-':>8}" for mm in figures[:2])
+    size = f"{effect.size:.3g} {effect.unit}"
+    return f"  {effect.name:42}{size:>12}{through}{direct}{line.combined_mm:8.3f}"
+
+
+def _by_one_unit(line: BudgetLine) -> str:
+    length_mm = line.per_unit_mm
+    shown = f"{length_mm:.2g} mm" if length_mm >= 0.1 else f"{1e3 * length_mm:.2g} um"
+    return f"{shown} by 1 {line.effect.unit}"

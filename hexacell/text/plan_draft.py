@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.dry_run.checks import CheckTrial, QuickTrial
+from hexacell.services.offline import PlanTrial
 from hexacell.services.preflight.plan_draft import ModeTrial, PlanDraft, PlanPreview
-from hexacell.services.records.offline import PlanTrial
 from hexacell.text.layout import duration
 from hexacell.text.planning import check_trial_text, plan_trial_lines, quick_trial_text
 

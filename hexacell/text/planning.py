@@ -13,7 +13,7 @@ from hexacell.dry_run.checks import CheckTrial, QuickTrial
 from hexacell.dry_run.verdict_forecast import NOISE, WANTED, VerdictForecast
 from hexacell.measurements.records import RecordId
 from hexacell.results.result import AcceptedResult
-from hexacell.services.records.offline import PlanTrial
+from hexacell.services.offline import PlanTrial
 from hexacell.text.layout import duration, wrapped
 from hexacell.text.measured_noise import averaging_lines
 from hexacell.verdict.decision import Verdict

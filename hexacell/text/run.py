@@ -12,7 +12,7 @@ from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.text.answers import request_text
 from hexacell.text.layout import duration, wrapped
-from hexacell.text.teaching import teaching_line, teaching_sentence
+from hexacell.text.verdict import teaching_line, teaching_sentence
 from procedures.calibration.workflow import Mode
 from procedures.replay.comparison import Aspect, Difference, ReplayReport
 from procedures.run import events

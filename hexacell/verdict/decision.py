@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
 
+from hexacell.cell.fields import Frozen
 from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.uncertainty.statement import LargestError, TaskErrors
 
@@ -48,6 +49,42 @@ def decide(error: LargestError, limit: float, guard_band_factor: float = 1.0) ->
     if value + guard_band <= limit:
         return Verdict.PASS
     return Verdict.CONDITIONAL_PASS if value <= limit else Verdict.CONDITIONAL_FAIL
+
+
+class JudgedError(Frozen):
+    """The largest error over the task poses, its expanded uncertainty and limit, mm or deg; the verdict.
+
+    The guard band of the decision is ``guard_band_factor`` times the expanded uncertainty.
+    """
+
+    value: float
+    expanded: float
+    limit: float
+    verdict: Verdict
+    guard_band_factor: float = 1.0
+
+    @classmethod
+    def of(cls, error: LargestError, limit: float, guard_band_factor: float) -> JudgedError:
+        """The decision on an error."""
+        return cls(
+            value=error.value,
+            expanded=error.expanded,
+            limit=limit,
+            verdict=decide(error, limit, guard_band_factor),
+            guard_band_factor=guard_band_factor,
+        )
+
+    @property
+    def guard_band(self) -> str:
+        """As a multiple of U, for people; empty where it is U, or the limit is passed."""
+        factor = self.guard_band_factor
+        return "" if factor == 1.0 or self.verdict is Verdict.PASS else f"{factor:g} U"
+
+    @property
+    def rule(self) -> str:
+        """The limit, and the guard band where it is told."""
+        guard_band = f", guard band {self.guard_band}" if self.guard_band else ""
+        return f"limit {self.limit:g}{guard_band}"
 
 
 def worst_verdict(verdicts: Iterable[Verdict]) -> Verdict:

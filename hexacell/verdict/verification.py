@@ -13,26 +13,27 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen, SixNumbers
 from hexacell.cell.model import CellSettings
 from hexacell.identification.diagnostics.model_tests import update
+from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
-from hexacell.results.length_result import LengthMeasurements, LengthResult, length_check
-from hexacell.results.result import IdentificationResult
+from hexacell.results.result import IdentificationResult, LengthResult
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_errors import JudgedGeometry
-from hexacell.uncertainty.statement import LargestError
-from hexacell.verdict.acceptance import DeviationStatistics, is_worse
-from hexacell.verdict.decision import Verdict, decide, worst_verdict
+from hexacell.verdict.decision import JudgedError, Verdict, worst_verdict
+from hexacell.verdict.length_check import LengthMeasurements, length_check, length_result
 from hexacell.verdict.model_evidence import (
     ZEROS_DOUBTED,
     ModelTest,
@@ -44,40 +45,20 @@ from hexacell.verdict.model_evidence import (
 )
 
 
-class JudgedError(Frozen):
-    """The largest error over the task poses, its expanded uncertainty and limit, mm or deg; the verdict.
+@dataclass(frozen=True, slots=True)
+class DeviationStatistics:
+    """Mean distance of the ball from its point's reference, mm, over a number of poses."""
 
-    The guard band of the decision is ``guard_band_factor`` times the expanded uncertainty.
-    """
-
-    value: float
-    expanded: float
-    limit: float
-    verdict: Verdict
-    guard_band_factor: float = 1.0
+    mean_mm: float
+    poses: int
 
     @classmethod
-    def of(cls, error: LargestError, limit: float, guard_band_factor: float) -> JudgedError:
-        """The decision on an error."""
-        return cls(
-            value=error.value,
-            expanded=error.expanded,
-            limit=limit,
-            verdict=decide(error, limit, guard_band_factor),
-            guard_band_factor=guard_band_factor,
-        )
-
-    @property
-    def guard_band(self) -> str:
-        """As a multiple of U, for people; empty where it is U, or the limit is passed."""
-        factor = self.guard_band_factor
-        return "" if factor == 1.0 or self.verdict is Verdict.PASS else f"{factor:g} U"
-
-    @property
-    def rule(self) -> str:
-        """The limit, and the guard band where it is told."""
-        guard_band = f", guard band {self.guard_band}" if self.guard_band else ""
-        return f"limit {self.limit:g}{guard_band}"
+    def of(cls, deviations: ArrayLike) -> DeviationStatistics | None:
+        """Of deviations (n, 3), mm, without the references; none without any, or if one is not finite."""
+        distances: Array = np.linalg.norm(np.reshape(np.asarray(deviations, dtype=float), (-1, 3)), axis=-1)
+        if not len(distances) or not np.isfinite(distances).all():
+            return None
+        return cls(float(distances.mean()), len(distances))
 
 
 class VerifiedAccuracy(Frozen):
@@ -248,7 +229,7 @@ def verified_accuracy(
     if budget is None:
         return None
     check = measured and _length_check(settings, robot, updated, budget, measured)
-    length = check and LengthResult.of(check, settings.uncertainty.common_scale_um_m)
+    length = check and length_result(check, settings.uncertainty.common_scale_um_m)
     if check and length and length.replaces_stated:
         budget = (
             task.budget(updated, belief, robot.effects, robot.known_effects, check.observation) or budget
@@ -308,3 +289,14 @@ def _verdict(tests: Sequence[ModelTest], accuracy: VerifiedAccuracy | None, *, w
         return Verdict.NOT_EVALUATED
     evidence = Verdict.PASS if all(test.passed for test in tests) else Verdict.NOT_EVALUATED
     return worst_verdict([evidence, accuracy.position.verdict, accuracy.orientation.verdict])
+
+
+def is_worse(before: DeviationStatistics, after: DeviationStatistics, noise: Noise) -> bool:
+    """Whether the mean distance is significantly larger than before, at the same poses.
+
+    A mean of n distances to one noisy reference has at most the variance of a record, once for the
+    reference and 1/n for the poses.
+    """
+    record_mm = float(np.hypot(noise.gauge_mm, noise.encoder))
+    standard_error = record_mm * float(np.sqrt(2.0 + 1.0 / before.poses + 1.0 / after.poses))
+    return after.mean_mm - before.mean_mm > SIGNIFICANT_SIGMAS * standard_error

@@ -32,12 +32,12 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
-from hexacell.results.length_result import with_measured_scale
 from hexacell.results.result import AcceptedResult
 from hexacell.results.written_geometry import WrittenGeometry, as_written
 from hexacell.robot.model import Robot
 from hexacell.robot.stated_effects import stated_effects
 from hexacell.verdict.decision import ErrorLimits, Verdict
+from hexacell.verdict.length_check import with_measured_scale
 from procedures.calibration.held_out_poses import PosesByPoint, replacements
 from procedures.calibration.measuring import Measuring
 from procedures.run import events

@@ -14,14 +14,13 @@ from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.noise.noise_assessment import assess_noise
-from hexacell.results.length_result import LengthMeasurements
 from hexacell.results.result import IdentificationResult
 from hexacell.runs.run_folder import RunFolder
-from hexacell.verdict.acceptance import gates
+from hexacell.verdict.acceptance_gates import gates
 from hexacell.verdict.assessment import Assessment, assess
-from hexacell.verdict.documents import fit_document
 from hexacell.verdict.findings import findings
-from hexacell.verdict.length_statement import length_line, length_statement
+from hexacell.verdict.fit_document import fit_document
+from hexacell.verdict.length_check import LengthMeasurements, length_line, length_statement
 from hexacell.verdict.verification import HeldOut, outcome_line, reason_of, verify
 from procedures.calibration.held_out_poses import PosesByPoint
 from procedures.calibration.noise_steps import noise_readings

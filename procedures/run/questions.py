@@ -14,7 +14,7 @@ from hexacell.errors import AnswerNeeded
 from hexacell.kinematics.pose import Pose
 from hexacell.results.result import ExpectedImprovement
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.verification import Verification
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.steps import SetKey

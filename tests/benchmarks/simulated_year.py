@@ -39,10 +39,10 @@ from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.runs import run_folder
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.history.drift_history import drift_history
-from hexacell.services.history.history import past_runs
+from hexacell.services.history.past_runs import past_runs
 from hexacell.services.run.calibration_run import new_calibration
 from hexacell.services.schedule import unattended_runs
-from hexacell.verdict.acceptance import gates
+from hexacell.verdict.acceptance_gates import gates
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import outcome_line, verify
 from procedures.calibration.workflow import Calibration, Mode

@@ -12,7 +12,7 @@ import pytest
 
 from hexacell.runs.archive import INDEX
 from hexacell.runs.run_folder import runs_folder
-from hexacell.services.history.history import past_runs
+from hexacell.services.history.past_runs import past_runs
 from tests.hexacell.services.proposed_runs import a_cell, propose_run
 
 Say = Callable[[str, str, str], None]

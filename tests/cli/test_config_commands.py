@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.robot.model import config_layout
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from tests.cli.terminal import ended
 from tests.hexacell.config.test_keyed_formats import write_hal, write_ini
 from tests.hexacell.services.proposed_runs import MET, propose_run

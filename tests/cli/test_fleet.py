@@ -10,8 +10,8 @@ import pytest
 
 from hexacell.runs.archive import INDEX
 from hexacell.runs.cell_lock import cell_lock
-from hexacell.services.history.fleet import FleetCell
-from hexacell.text.fleet import fleet_text
+from hexacell.services.history.cell_status import FleetCell
+from hexacell.text.cells import fleet_text
 
 
 @pytest.fixture

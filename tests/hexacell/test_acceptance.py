@@ -16,11 +16,8 @@ from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
-from hexacell.verdict.acceptance import (
-    DeviationStatistics,
-    gates,
-    is_worse,
-)
+from hexacell.verdict.acceptance_gates import gates
+from hexacell.verdict.verification import DeviationStatistics, is_worse
 
 TOLERANCES = Tolerances({"S": 7.0, "B": 7.0, "l": 7.0})
 

@@ -17,7 +17,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import Robot, robot_of
 from hexacell.robot.virtual_robot import random_robot
 from hexacell.study import data_sets
-from hexacell.text.identification import parameter_table
+from hexacell.text.identification import drawing_table
 
 CONFIG = Path(__file__).parents[2] / "configs" / "linapod.toml"
 TURN = np.cos(np.radians(10.0))
@@ -67,7 +67,7 @@ def test_a_rail_that_leans_by_twice_its_tolerance_is_named(robot: Robot) -> None
 
 def test_the_table_has_them_in_mrad(robot: Robot) -> None:
     found = identified(robot, changed(robot, "rail2a", 0.0015))
-    lines = parameter_table(found, robot.mechanism.normalize_frames(robot.drawing)[0]).splitlines()
+    lines = drawing_table(found, robot.mechanism.normalize_frames(robot.drawing)[0])
     assert len({line.index(".") for line in lines[1:]}) == 1
     (line,) = (line for line in lines if line.startswith("rail2a"))
     name, unit, *numbers = line.split()

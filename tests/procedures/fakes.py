@@ -25,7 +25,7 @@ from hexacell.cell.recovery import Action
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.verification import Verification
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.run.questions import (

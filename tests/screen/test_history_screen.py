@@ -23,7 +23,7 @@ from hexacell.screen.session import ScreenSession
 from hexacell.services.write_back.config_history import config_history
 from hexacell.text.config_changes import RELOAD
 from hexacell.text.screens.questions import PERSON
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
 from tests.mutations.journals import with_checksum
 from tests.screen.conftest import settled

@@ -16,7 +16,7 @@ from hexacell.screen.assistant import FirstCellAssistant
 from hexacell.screen.assistant_screen import AssistantScreen
 from hexacell.screen.overlays.question_overlay import QuestionOverlay
 from hexacell.screen.overlays.quit_overlay import QuitOverlay
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.run import events
 from procedures.run.questions import ask_approval
 from tests.screen.conftest import Opened, settled

@@ -18,7 +18,7 @@ from hexacell.screen.overlays.question_overlay import QuestionOverlay
 from hexacell.screen.widgets.text_panel import TextList, TextPanel
 from hexacell.screen.workplace import Preflight
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.command_loop import Status
 from procedures.run import events
 from procedures.run.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo

@@ -19,7 +19,7 @@ from hexacell.screen.assistant_screen import AssistantScreen
 from hexacell.screen.key_map import THEMES
 from hexacell.screen.workplace import Preflight, TriedPlan
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.command_loop import Status
 from procedures.run import events
 from procedures.run.questions import ask_approval, ask_placement

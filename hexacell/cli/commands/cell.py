@@ -11,8 +11,7 @@ from hexacell.cli.cell_argument import cell_at, cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
 from hexacell.services.devices.device_setup import require_drivers
-from hexacell.services.records.offline import plan_of
-from hexacell.services.records.stated_poses import require_stated_poses
+from hexacell.services.offline import plan_of, require_stated_poses
 from hexacell.text.config_changes import files_named
 
 

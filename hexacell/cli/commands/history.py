@@ -10,12 +10,13 @@ from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.runs.run_folder import RunFolder, find_run
+from hexacell.services.history.cell_status import fleet_runs
 from hexacell.services.history.drift_history import drift_history
-from hexacell.services.history.fleet import fleet_runs
-from hexacell.services.history.history import compare_runs, parameter_trends, past_runs
+from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
 from hexacell.services.history.retention import delete_runs, retention
 from hexacell.services.history.run_index import RunIndex
 from hexacell.services.write_back.config_history import config_history
+from hexacell.text.cells import fleet_history_document, fleet_history_text
 from hexacell.text.changes import watch_text
 from hexacell.text.config_changes import config_history_text
 from hexacell.text.documents import (
@@ -26,7 +27,6 @@ from hexacell.text.documents import (
     retention_document,
     story_document,
 )
-from hexacell.text.fleet import fleet_history_document, fleet_history_text
 from hexacell.text.history import comparison_text, drift_text, history_text, retention_text
 from hexacell.text.run_story import story_text
 from procedures.journal.journal import read_entries

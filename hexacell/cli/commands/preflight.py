@@ -10,7 +10,7 @@ from hexacell.cli.cell_argument import cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.dry_run.checks import try_quick_level
 from hexacell.errors import ExitCode, HexacellError, flatten_errors
-from hexacell.services.records.offline import try_plan
+from hexacell.services.offline import try_plan
 from hexacell.services.run.calibration_run import new_calibration, preflight
 from hexacell.text.documents import preflight_document, quick_preflight_document
 from hexacell.text.layout import wrapped

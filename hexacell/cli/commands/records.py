@@ -11,12 +11,12 @@ from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.measurements.records import MeasurementSet
 from hexacell.runs.run_folder import RunFolder
-from hexacell.services.records.offline import MOST_RECORDS_BEFORE_NEXT, fit_measurements, next_pose
+from hexacell.services.offline import MOST_RECORDS_BEFORE_NEXT, fit_measurements, next_pose
 from hexacell.text.documents import next_document
 from hexacell.text.identification import identification_report
 from hexacell.text.layout import wrapped
 from hexacell.text.planning import decision_text, forecast_text, left_out_text
-from hexacell.verdict.documents import fit_document
+from hexacell.verdict.fit_document import fit_document
 
 MANY_RECORDS = 200
 

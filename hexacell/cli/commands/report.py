@@ -9,10 +9,8 @@ from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.services.history.reported_run import ReportedRun, reported_run
 from hexacell.storage.atomic_files import write_atomically
-from hexacell.text.certificate import certificate
-from hexacell.text.report.blocks import Report
-from hexacell.text.report.html import html_of
-from hexacell.text.report.pdf import pdf_of
+from hexacell.text import certificate
+from hexacell.text.report.pages import Report, html_of, pdf_of
 from hexacell.text.report.report import report_of
 
 CERTIFICATE = ".xml"

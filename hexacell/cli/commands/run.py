@@ -26,10 +26,10 @@ from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.run_process.run_device_watch import RunDeviceWatch
 from hexacell.runs.run_folder import new_run
 from hexacell.services.notify.notice import RunEnd
+from hexacell.services.recorded.resumption import run_to_resume
 from hexacell.services.run.calibration_run import RunRequest, calibrate, is_unverified
 from hexacell.services.run.demo import prepare_demo
 from hexacell.services.run.event_stream import EventStream
-from hexacell.services.run.interrupted_runs import run_to_resume
 from hexacell.services.schedule.unattended_runs import (
     ended_in_time,
     note_unreadable_cell,

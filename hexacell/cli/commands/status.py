@@ -11,11 +11,9 @@ from hexacell.cli.archive_argument import archive_url, publish_or_warn
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, HexacellError, UsageError
-from hexacell.services.history.cell_status import CellStatus, UnreadableCell, cell_status
-from hexacell.services.history.fleet import fleet_cells
+from hexacell.services.history.cell_status import CellStatus, UnreadableCell, cell_status, fleet_cells
 from hexacell.storage.atomic_files import write_atomically
-from hexacell.text.cell_status import metrics_text, status_document, status_text
-from hexacell.text.fleet import fleet_document, fleet_text
+from hexacell.text.cells import fleet_document, fleet_text, metrics_text, status_document, status_text
 
 
 def main(options: argparse.Namespace) -> ExitCode:

@@ -19,8 +19,7 @@ from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, flatten_errors
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.plugins import Group, load, names
-from hexacell.services.records.offline import plan_of
-from hexacell.services.records.stated_poses import require_stated_poses
+from hexacell.services.offline import plan_of, require_stated_poses
 from hexacell.storage.atomic_files import write_atomically
 from hexacell.storage.toml_document import KeyPath, TomlDocument
 

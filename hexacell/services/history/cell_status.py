@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import socket
+from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from pydantic import ValidationError
+
+from hexacell.cell.fields import Frozen, Name, Text
 from hexacell.cell.loader import Cell
 from hexacell.errors import HexacellError
+from hexacell.runs.archived_documents import DocumentKind, StampedDocument
 from hexacell.runs.cell_lock import lock_holder
+from hexacell.runs.run_folder import runs_folder
 from hexacell.services.history.drift_history import DriftHistory, drift_history
-from hexacell.services.history.history import PastRun, past_runs
+from hexacell.services.history.past_runs import PastRun, RunSummary, past_runs
 from hexacell.services.history.run_index import RunIndex
 from hexacell.verdict.decision import Verdict
 
@@ -96,3 +104,146 @@ def next_calibration_due(cell: Cell, in_force: PastRun | None) -> datetime | Non
     if in_force is None or in_force.summary.ended is None or valid_days is None:
         return None
     return in_force.summary.ended + timedelta(days=valid_days)
+
+
+# JOINED The cells that share an archive: each puts there how it is, and any computer can read of all.
+
+if TYPE_CHECKING:
+    from hexacell.runs.archive import SharedDocument
+
+OF_THE_CELL = ""
+"""Stands for a run's name where a document is of the cell itself."""
+
+
+class FleetCell(Frozen):
+    """How a cell was when it was seen last. Errors in mm.
+
+    Attributes:
+        host, cell: the computer it is run from, and its cell file there.
+        seen_at: when it put this into the archive, UTC.
+        latest_run, latest_at, mode: of the run that ended last.
+        verdict, position_mm, expanded_mm, judged_at: of the last one with a verdict.
+        due_at: when the next calibration is due, where its cell file says how long one is valid.
+        proposal: the newest run whose proposal waits for a person.
+        changes: of the robot, that the watch over all runs found.
+    """
+
+    name: Name
+    host: Text
+    cell: Text
+    seen_at: datetime
+    latest_run: Text | None = None
+    latest_at: datetime | None = None
+    mode: Text = ""
+    verdict: Verdict | None = None
+    position_mm: float | None = None
+    expanded_mm: float | None = None
+    judged_at: datetime | None = None
+    passed_at: datetime | None = None
+    due_at: datetime | None = None
+    proposal: Text | None = None
+    changes: int = 0
+
+    def is_overdue(self, now: datetime) -> bool:
+        """Whether its calibration should have been by now."""
+        return self.due_at is not None and self.due_at <= now
+
+
+@dataclass(frozen=True, slots=True)
+class FleetRun:
+    """One run of one of the cells; ``place`` is the computer and folder of its runs."""
+
+    cell: str
+    place: str
+    name: str
+    summary: RunSummary
+
+
+def publish_status(status: CellStatus) -> None:
+    """Put how a cell is into the archive that it shares; nothing where it shares none.
+
+    Raises:
+        ArchiveUnavailable: it cannot be written.
+    """
+    cell = status.cell
+    if cell.settings.archive.url is None:
+        return
+    from hexacell.runs.archive import Archive  # noqa: PLC0415 - SQLAlchemy only where it is used
+
+    content = fleet_cell(status).model_dump_json().encode()
+    with closing(Archive(runs_folder(cell), cell.settings.name, cell.settings.archive.url)) as archive:
+        archive.store(DocumentKind.CELL, {OF_THE_CELL: StampedDocument(OF_THE_CELL, content)})
+
+
+def fleet_cell(status: CellStatus) -> FleetCell:
+    """What others are told of a cell."""
+    latest, judged = status.latest, status.judged
+    accuracy = None if judged is None else judged.summary.accuracy
+    return FleetCell(
+        name=status.cell.settings.name,
+        host=socket.gethostname(),
+        cell=str(status.cell.path.absolute()),
+        seen_at=datetime.now(UTC),
+        latest_run=None if latest is None else latest.name,
+        latest_at=None if latest is None else latest.summary.ended,
+        mode="" if latest is None else latest.summary.mode,
+        verdict=None if judged is None else judged.summary.verdict,
+        position_mm=None if accuracy is None else accuracy.position.value,
+        expanded_mm=None if accuracy is None else accuracy.position.expanded,
+        judged_at=None if judged is None else judged.summary.ended,
+        passed_at=status.passed_at,
+        due_at=status.due_at,
+        proposal=None if status.proposal is None else status.proposal.name,
+        changes=len(status.drift.changes),
+    )
+
+
+def fleet_cells(url: str) -> tuple[FleetCell, ...]:
+    """All cells of an archive, by name; without those that a newer program has put there.
+
+    Raises:
+        ArchiveUnavailable: it cannot be read.
+    """
+    found = map(_cell, _shared_documents(url, DocumentKind.CELL))
+    return tuple(one for one in found if one is not None)
+
+
+def fleet_runs(url: str) -> tuple[FleetRun, ...]:
+    """The runs of all cells of an archive, the newest first.
+
+    Raises:
+        ArchiveUnavailable: it cannot be read.
+    """
+    found = map(_run, _shared_documents(url, DocumentKind.SUMMARY))
+    ended = [one for one in found if one is not None]
+    return tuple(sorted(ended, key=lambda one: (_moment(one), one.cell, one.name), reverse=True))
+
+
+def is_overdue_now(cell: FleetCell) -> bool:
+    """Whether its calibration should have been by now, by this computer's clock."""
+    return cell.is_overdue(datetime.now(UTC))
+
+
+def _shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]:
+    from hexacell.runs.archive import shared_documents  # noqa: PLC0415 - SQLAlchemy only where used
+
+    return shared_documents(url, kind)
+
+
+def _moment(run: FleetRun) -> float:
+    return 0.0 if run.summary.ended is None else run.summary.ended.timestamp()
+
+
+def _cell(document: SharedDocument) -> FleetCell | None:
+    try:
+        return FleetCell.model_validate_json(document.content)
+    except ValidationError:
+        return None
+
+
+def _run(document: SharedDocument) -> FleetRun | None:
+    try:
+        summary = RunSummary.model_validate_json(document.content)
+    except ValidationError:
+        return None
+    return FleetRun(document.cell, document.place, document.run, summary)

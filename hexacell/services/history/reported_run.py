@@ -16,7 +16,7 @@ from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.runs.run_folder import CELL_FILE, JOURNAL, MEASUREMENTS, RESULT, RunFolder
 from hexacell.services.recorded.journal_soundness import require_sound
-from hexacell.services.recorded.started_robot import geometry_before
+from hexacell.services.recorded.recorded_robot import geometry_before
 from hexacell.storage import atomic_files
 from procedures.journal.journal import read_entries
 from procedures.run import events

@@ -19,7 +19,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.recorded.journal_soundness import require_sound
-from hexacell.services.recorded.started_robot import started_robot
+from hexacell.services.recorded.recorded_robot import started_robot
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
 from procedures.run import events

@@ -18,7 +18,7 @@ from hexacell.dry_run.campaign import VisitedPose
 from hexacell.dry_run.checks import CheckTrial, QuickTrial, try_check, try_quick_level
 from hexacell.errors import UsageError
 from hexacell.kinematics.pose import Pose
-from hexacell.services.records.offline import PlanTrial, try_plan
+from hexacell.services.offline import PlanTrial, try_plan
 from hexacell.services.run.calibration_run import new_calibration
 from procedures.calibration.workflow import Mode
 

@@ -12,13 +12,13 @@ from hexacell.config.layout import fingerprint
 from hexacell.config.receipt import Receipt
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
-from hexacell.results.length_result import LengthResult, with_measured_scale
-from hexacell.results.result import AcceptedResult
+from hexacell.results.result import AcceptedResult, LengthResult
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.recorded.journal_soundness import require_sound
-from hexacell.services.recorded.started_robot import started_robot
+from hexacell.services.recorded.recorded_robot import started_robot
 from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import Verdict
+from hexacell.verdict.length_check import with_measured_scale
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
 from procedures.run import events

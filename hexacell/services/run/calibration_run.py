@@ -22,8 +22,8 @@ from hexacell.services import search_effort
 from hexacell.services.devices.changed_devices import with_changes
 from hexacell.services.devices.device_setup import Connected, device_addresses, open_devices
 from hexacell.services.recorded.journal_soundness import require_sound
-from hexacell.services.recorded.run_ownership import require_own_run
-from hexacell.services.recorded.started_robot import started_robot
+from hexacell.services.recorded.recorded_robot import started_robot
+from hexacell.services.recorded.resumption import require_own_run
 from hexacell.services.run.accepted_results import last_accepted_result
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
 from procedures.calibration.preflight import (

@@ -20,7 +20,7 @@ from hexacell.kinematics.parameters import ParameterSet
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from procedures.engine.config_transactions import holds_provisional
 from procedures.journal.journal import read_journal

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from datetime import date
+
+from drivers.interfaces import DeviceIdentity
+from hexacell.cell.fields import CertificateSettings
 from hexacell.services.history.reported_run import ReportedRun
-from hexacell.text.report.blocks import Report, Tone
-from hexacell.text.report.comparison import comparison_chapter
-from hexacell.text.report.figures import figure_chapter
-from hexacell.text.report.provenance import (
-    authorisation_chapter,
-    conditions_chapter,
-    integrity_chapter,
-    traceability_chapter,
-)
+from hexacell.text.events import set_name
+from hexacell.text.measured_noise import measured_noise_lines
+from hexacell.text.report.pages import Chapter, Facts, Paragraph, Report, Table, Tone
 from hexacell.text.report.results import (
+    comparison_chapter,
+    figure_chapter,
     observability_chapter,
     parameter_chapter,
     uncertainty_chapter,
@@ -62,4 +62,117 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
         verdict=NO_VERDICT if verdict is None else verdict.value.upper(),
         tone=Tone.OPEN if verdict is None else TONES.get(verdict, Tone.OPEN),
         chapters=tuple(chapter for chapter in chapters if chapter is not None),
+    )
+
+
+# JOINED Where the figures come from: conditions, instruments and their certificates, files, who answers.
+
+NOT_STATED = "not stated"
+
+
+def conditions_chapter(run: ReportedRun) -> Chapter:
+    """Temperatures, records, noise: under what the figures were taken."""
+    state = run.state
+    pairs = [("Records", str(sum(len(measured.samples) for measured in state.sets.values())))]
+    pairs += [
+        (f"Temperature, {name}", f"{lowest:.1f} to {highest:.1f} deg C")
+        for name, (lowest, highest) in temperature_ranges(run).items()
+    ]
+    if len(pairs) == 1:
+        pairs.append(("Temperature", "not measured"))
+    pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
+    noise = () if state.noise is None else measured_noise_lines(state.noise.noise)
+    return Chapter("Conditions", (Facts(tuple(pairs)), *map(_sentence, noise), *_sets_table(run)))
+
+
+def _sentence(line: str) -> Paragraph:
+    """A line of a run's output as a sentence of a page."""
+    text = line[:1].upper() + line[1:]
+    return Paragraph(text if text.endswith(".") else f"{text}.")
+
+
+def _sets_table(run: ReportedRun) -> tuple[Table, ...]:
+    """Each set whose reference was read again, with how far the gauges had drifted by then."""
+    columns = ("Set of records", "records", "largest deviation, mm", "drift of the gauges, mm")
+    rows = tuple(
+        (
+            set_name(key),
+            str(len(measured.samples)),
+            f"{max(abs(value) for one in measured.samples for value in one.deviation_mm):.3f}",
+            f"{max(map(abs, measured.drift_mm)):.3f}",
+        )
+        for key, measured in run.state.sets.items()
+        if measured.drift_mm is not None and measured.samples
+    )
+    return (Table(columns, rows),) if rows else ()
+
+
+def traceability_chapter(run: ReportedRun) -> Chapter:
+    """Every instrument with its serial number and certificate."""
+    day = run.began.date()
+    rows = tuple(_instrument_row(run, device, day) for device in run.started.devices)
+    expired = run.settings.expired_on(day)
+    text = f"Expired on the day of the run: {', '.join(expired)}." if expired else ""
+    table = Table(("Instrument", "kind", "serial number", "certificate", "due"), rows, None)
+    return Chapter(
+        "Instruments and traceability", (table, *([Paragraph(text, is_strong=True)] if text else []))
+    )
+
+
+def integrity_chapter(run: ReportedRun) -> Chapter:
+    """The fingerprints of the files that everything above can be derived from."""
+    text = (
+        "Everything in this report can be derived again from these files of the run folder; "
+        "`hexacell replay` repeats its decisions and results."
+    )
+    rows = tuple((name, digest) for name, digest in sorted(run.fingerprints.items()))
+    return Chapter("Files", (Paragraph(text), Table(("File", "SHA-256"), rows, None)))
+
+
+def authorisation_chapter(run: ReportedRun) -> Chapter:
+    """Who answers for it."""
+    named = run.settings.report.authorised_by or "not stated in the cell file"
+    pairs = (("Authorised by", named), ("Date and signature", "\u2003" * 20))
+    text = (
+        "This report may be copied as a whole only. Its results are of this robot alone, as it was when it "
+        "was measured."
+    )
+    return Chapter("Authorisation", (Facts(pairs), Paragraph(text)))
+
+
+def temperature_ranges(run: ReportedRun) -> dict[str, tuple[float, float]]:
+    """The lowest and highest temperature that each thermometer showed with the records, deg C."""
+    shown: dict[str, list[float]] = {}
+    for measured in run.state.sets.values():
+        for sample in measured.samples:
+            for one in sample.reading.temperatures:
+                if one.celsius is not None:
+                    shown.setdefault(one.name, []).append(one.celsius)
+    return {name: (min(values), max(values)) for name, values in shown.items()}
+
+
+def _instrument_row(run: ReportedRun, device: DeviceIdentity, day: date) -> tuple[str, ...]:
+    certificate = certificate_of(run, device)
+    number = NOT_STATED if certificate is None else certificate.number
+    if certificate is not None and certificate.expanded_um is not None:
+        number = f"{number} (U {certificate.expanded_um:g} um)"
+    due = "" if certificate is None or certificate.due is None else certificate.due.isoformat()
+    if certificate is not None and certificate.has_expired(day):
+        due = f"{due}: EXPIRED"
+    serial = serial_number_of(run, device) or NOT_STATED
+    return device.name, device.description, serial, number, due
+
+
+def certificate_of(run: ReportedRun, device: DeviceIdentity) -> CertificateSettings | None:
+    """A gauge has its own; the encoders have one together."""
+    certificates = run.settings.certificates
+    if device.name.startswith("encoder"):
+        return certificates.get("encoders")
+    return certificates.get(f"gauge {device.name}")
+
+
+def serial_number_of(run: ReportedRun, device: DeviceIdentity) -> str:
+    """As it says itself, or else as the cell file does; empty if neither does."""
+    return device.serial_number or next(
+        (gauge.serial_number for gauge in run.settings.gauges if gauge.name == device.name), ""
     )

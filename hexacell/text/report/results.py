@@ -1,124 +1,171 @@
-"""The results behind the statement: uncertainty budget, parameters, what the records could tell apart."""
+"""The results behind the statement: figures, uncertainty budget, parameters, what the records tell apart.
+
+The figures are SVG text that is the same, byte for byte, whenever it is drawn.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from hexacell.checks.check_result import ParameterChange
 from hexacell.identification.identified_zeros import ParameterChoice
-from hexacell.kinematics.parameters import ParameterUnit
-from hexacell.results.result import IdentificationResult
+from hexacell.kinematics.rotations import Array
+from hexacell.results.run_comparison import compare_results
+from hexacell.services.history.past_runs import require_result
 from hexacell.services.history.reported_run import ReportedRun
+from hexacell.text.identification import SMALLEST_BUDGET_LINE_MM
+from hexacell.text.parameters import ParameterRow, rows_of_changes, rows_of_run
 from hexacell.text.planning import quick_accuracy_sentences
-from hexacell.text.report.blocks import Block, Chapter, Paragraph, Table
-from hexacell.uncertainty.statement import COVERAGE_FACTOR
+from hexacell.text.report.pages import Chapter, Paragraph, Picture, Table
+from hexacell.text.svg_drawing import AFTER, BEFORE, INK, SMALLEST_MM, as_svg, new_figure
+from procedures.run.steps import Phase
 
-SMALLEST_MM = 0.0005
-"""Lines of the budget below are zero in the table, and left out."""
+AXES_PLACE = (0.12, 0.17, 0.87, 0.72)
+"""Place of the axes in a figure; to find the best one would draw each figure twice."""
+
+LABELS_PT = 300.0
+"""Height of all labels of parameters side by side; with more of them they are smaller."""
+
+
+def figure_chapter(run: ReportedRun) -> Chapter | None:
+    """The ball's deviations before and after, and how well the records agree; None without records."""
+    pictures = tuple(one for one in (_deviations(run), _changes(run)) if one is not None)
+    return Chapter("Figures", pictures) if pictures else None
+
+
+def _deviations(run: ReportedRun) -> Picture | None:
+    """What the gauges show at each held-out pose, as in figures 8 and 9 of the paper."""
+    phases = (("as found", Phase.BEFORE, BEFORE, "o"), ("as left", Phase.AFTER, AFTER, "s"))
+    series = [(name, _distances(run, phase), colour, marker) for name, phase, colour, marker in phases]
+    if not any(len(distances) for _, distances, _, _ in series):
+        return None
+    figure, axes = _axes()
+    for name, distances, colour, marker in series:
+        numbers = np.arange(1, len(distances) + 1)
+        axes.semilogy(numbers, distances, marker, color=colour, label=name, markersize=5)
+    axes.set_xlabel("held-out pose")
+    axes.set_ylabel("deviation of the ball, mm")
+    axes.grid(visible=True, axis="y", color="#dddddd", linewidth=0.6)
+    axes.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    return Picture(as_svg(figure), "Distance of the ball from its reference at each held-out pose.")
+
+
+def _distances(run: ReportedRun, phase: Phase) -> Array:
+    deviations = np.array(run.state.held_out(phase), dtype=float).reshape(-1, 3)
+    distances: Array = np.maximum(np.linalg.norm(deviations, axis=-1), SMALLEST_MM)
+    return distances
+
+
+def _changes(run: ReportedRun) -> Picture | None:
+    """The change of each free parameter by its expanded uncertainty."""
+    if run.state.identified is None:
+        return None
+    rows = rows_of_run(run.state, run.settings)
+    figure, axes = _axes()
+    axes.errorbar(
+        np.arange(len(rows)),
+        [one.change / one.unit.like_a_mm for one in rows],
+        yerr=[one.expanded / one.unit.like_a_mm for one in rows],
+        fmt="o",
+        color=AFTER,
+        markersize=3.5,
+        capsize=2,
+    )
+    axes.axhline(0.0, color=INK, linewidth=0.6)
+    names = [one.name for one in rows]
+    axes.set_xticks(np.arange(len(rows)), names, rotation=90, fontsize=min(9.0, LABELS_PT / len(rows)))
+    kinds = run.settings.mechanism.parameters.kinds
+    axes.set_ylabel(f"change, {' or '.join(dict.fromkeys(kind.unit.shown for kind in kinds))}")
+    return Picture(as_svg(figure), "Change of each parameter, with its expanded uncertainty (k = 2).")
+
+
+def _axes() -> tuple[Any, Any]:
+    figure, [axes] = new_figure((7.0, 2.8), AXES_PLACE)
+    return figure, axes
 
 
 def uncertainty_chapter(run: ReportedRun) -> Chapter | None:
-    """The budget that U comes from; none without an identification."""
+    """The budget that U comes from; None without an identification."""
     budget = run.document.get("uncertainty")
     if not budget:
         return None
     rows = [("noise of the readings", "", f"{budget['noise_mm']:.3f}", "measured and stated")]
-    rows += [_budget_row(line) for line in budget["lines"] if line["combined_mm"] >= SMALLEST_MM]
+    rows += [
+        (line["name"], f"{line['size']:.3g} {line['unit']}", f"{line['combined_mm']:.3f}", line["source"])
+        for line in budget["lines"]
+        if line["combined_mm"] >= SMALLEST_BUDGET_LINE_MM
+    ]
     rows.append(("standard uncertainty (root of the squares)", "", f"{budget['standard_mm']:.3f}", ""))
     table = Table(("Cause", "size", "at the worst task pose, mm", "source"), tuple(rows))
     unseen = [line["name"] for line in budget["lines"] if not line["visible"]]
-    text = f"No record shows these: {', '.join(unseen)}." if unseen else ""
-    return Chapter("Uncertainty budget of the identified geometry", (table, *_text(text)))
+    note = (Paragraph(f"No record shows these: {', '.join(unseen)}."),) if unseen else ()
+    return Chapter("Uncertainty budget of the identified geometry", (table, *note))
 
 
 def parameter_chapter(run: ReportedRun) -> Chapter | None:
-    """Old, new, change and uncertainty of each parameter; none where nothing was identified or checked."""
-    state = run.state
-    if state.judged is not None and state.judged.check is not None and state.judged.check.changes:
-        return _changes_chapter(state.judged.check.changes)
-    if state.identified is None:
-        return None
-    table = Table(
-        ("Parameter", "unit", "old", "new", "change", "U (k = 2)"), tuple(_parameter_rows(run)), 2
-    )
+    """Old, new, change and uncertainty of each parameter; None where nothing was identified or checked."""
+    rows = rows_of_run(run.state, run.settings)
+    if run.state.identified is None:
+        columns = ("Parameter", "unit", "change since identified", "U (k = 2)")
+        cells = tuple((*_cells(one)[:2], *_cells(one)[4:]) for one in rows)
+        return Chapter("Changes of the geometry", (Table(columns, cells, 2),)) if rows else None
     text = (
         "Both geometries are in the frame convention of the mechanism, so that a choice of frames is no "
         "change; the controller's config has the new one in the frames in which the task poses move least."
     )
-    return Chapter("Identified geometry", (table, Paragraph(text)))
+    return Chapter("Identified geometry", (_parameter_table(rows, "old", "new"), Paragraph(text)))
+
+
+def comparison_chapter(earlier: ReportedRun, run: ReportedRun) -> Chapter:
+    """What has changed since an earlier run.
+
+    Raises:
+        UsageError: one of them identified no geometry of its own, or their frames differ.
+    """
+    then, now = (require_result(one.state, one.name) for one in (earlier, run))
+    compared = compare_results(run.settings.mechanism.parameters, then, now)
+    text = (
+        "All changes together are more than the noise of both runs explains."
+        if compared.is_changed
+        else "The noise of both runs explains all changes together."
+    )
+    table = _parameter_table(rows_of_changes(compared.parameters), "then", "now")
+    title = f"Compared with {earlier.name} of {earlier.ended:%Y-%m-%d}"
+    return Chapter(title, (Paragraph(text, is_strong=True), table))
+
+
+def _parameter_table(rows: Sequence[ParameterRow], old: str, new: str) -> Table:
+    columns = ("Parameter", "unit", old, new, "change", "U (k = 2)", "")
+    return Table(columns, tuple((*_cells(one), one.meaning) for one in rows), 2)
+
+
+def _cells(one: ParameterRow) -> tuple[str, ...]:
+    values = one.figure(one.old), one.figure(one.new)
+    return one.name, one.unit.shown, *values, one.figure(one.change, "+"), one.figure(one.expanded)
 
 
 def observability_chapter(run: ReportedRun) -> Chapter | None:
     """What the records determine and what they hardly tell apart, and which were left out."""
-    state, document = run.state, run.document
-    if state.identified is None:
+    if run.state.identified is None:
         return None
-    result = state.identified.result
-    expected, quick = result.residuals.expected, state.identified.quick
-    undetermined = ", ".join(result.undetermined) or "none"
-    sentences = [
-        f"{result.records} records at {result.points} points.",
-        *_choice(result),
+    result, quick = run.state.identified.result, run.state.identified.quick
+    expected = result.residuals.expected
+    left_out = ", ".join(f"P{one.point}/{one.orientation} ({one.kind.value})" for one in result.outliers)
+    sentences = [f"{result.records} records at {result.points} points."]
+    if result.identifies is not ParameterChoice.ALL:
+        sentences.append(
+            "The encoders' zeros alone are identified. All else is as the controller had it, and its "
+            "tolerances are its uncertainty."
+        )
+    sentences += [
         f"Residuals {1e3 * result.residual_rms_mm:.1f} um (rms), chi2 {result.chi2:.1f} of {expected:.0f}.",
         *([] if quick is None else [quick_accuracy_sentences(quick)]),
-        f"Parameters that the records do not determine: {undetermined}.",
-        f"Records left out as false: {_left_out(run)}.",
+        f"Parameters that the records do not determine: {', '.join(result.undetermined) or 'none'}.",
+        f"Records left out as false: {left_out or 'none'}.",
     ]
-    pairs = document.get("correlated") or []
+    pairs = run.document.get("correlated") or []
     rows = tuple((" and ".join(pair["parameters"]), f"{pair['correlation']:+.2f}") for pair in pairs[:10])
     tables = (Table(("Strongly correlated parameters", "correlation"), rows),) if rows else ()
     return Chapter("Observability", (*map(Paragraph, sentences), *tables))
-
-
-def _text(text: str) -> tuple[Block, ...]:
-    return (Paragraph(text),) if text else ()
-
-
-def _budget_row(line: Mapping[str, Any]) -> tuple[str, str, str, str]:
-    size = f"{line['size']:.3g} {line['unit']}"
-    return line["name"], size, f"{line['combined_mm']:.3f}", line["source"]
-
-
-def _changes_chapter(changes: tuple[ParameterChange, ...]) -> Chapter:
-    rows = tuple(
-        (one.name, one.unit, f"{one.change:+.3f}", f"{COVERAGE_FACTOR * one.sigma:.3f}") for one in changes
-    )
-    table = Table(("Parameter", "unit", "change since identified", "U (k = 2)"), rows, 2)
-    return Chapter("Changes of the geometry", (table,))
-
-
-def _parameter_rows(run: ReportedRun) -> Iterator[tuple[str, ...]]:
-    identified, mechanism = run.state.identified, run.settings.mechanism
-    assert identified is not None  # noqa: S101 - asked only then
-    parameters = mechanism.parameters
-    old = run.geometry_before.vector
-    new = parameters.vector(identified.result.geometry)
-    sigma = parameters.vector(identified.result.sigma)
-    for row in np.flatnonzero(sigma > 0.0):
-        unit = parameters.parameters[row].kind.unit
-        decimals = 3 if unit is ParameterUnit.MM else 6
-        figures = (old[row], new[row])
-        yield (
-            parameters.parameters[row].name,
-            unit.value,
-            *(f"{value:.{decimals}f}" for value in figures),
-            f"{new[row] - old[row]:+.{decimals}f}",
-            f"{COVERAGE_FACTOR * sigma[row]:.{decimals}f}",
-        )
-
-
-def _choice(result: IdentificationResult) -> list[str]:
-    """Which parameters are identified, where not all are."""
-    if result.identifies is ParameterChoice.ALL:
-        return []
-    sentence = "The encoders' zeros alone are identified. All else is as the controller had it"
-    return [f"{sentence}, and its tolerances are its uncertainty."]
-
-
-def _left_out(run: ReportedRun) -> str:
-    assert run.state.identified is not None  # noqa: S101 - asked only then
-    outliers = run.state.identified.result.outliers
-    return ", ".join(f"P{one.point}/{one.orientation} ({one.kind.value})" for one in outliers) or "none"

@@ -6,15 +6,14 @@ In the order and words of ISO/IEC 17025:2017, 7.8, where they apply.
 from __future__ import annotations
 
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.services.history.history import judged_accuracy
+from hexacell.services.history.past_runs import judged_accuracy
 from hexacell.services.history.reported_run import ReportedRun
-from hexacell.text.length import not_checked, scale_lines
-from hexacell.text.report.blocks import Block, Chapter, Facts, Paragraph, Table, Tone
-from hexacell.text.teaching import teaching_sentence
+from hexacell.text.report.pages import Block, Chapter, Facts, Paragraph, Table, Tone
+from hexacell.text.verdict import not_checked, scale_lines, teaching_sentence
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
-from hexacell.verdict.decision import Verdict
+from hexacell.verdict.decision import JudgedError, Verdict
 from hexacell.verdict.model_evidence import ModelTest
-from hexacell.verdict.verification import JudgedError, VerifiedAccuracy
+from hexacell.verdict.verification import VerifiedAccuracy
 from procedures.run.steps import Phase
 
 NO_VERDICT = "NOT EVALUATED"

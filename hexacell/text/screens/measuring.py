@@ -11,8 +11,8 @@ from hexacell.run_process.messages import HostFailed
 from hexacell.text.events import activity, pose_name, set_name
 from hexacell.text.layout import duration
 from hexacell.text.screens.live import live_view
-from hexacell.text.screens.run_picture import RunPicture
-from hexacell.text.screens.views import Guidance, MeasureView, PlotView, Series
+from hexacell.text.screens.run_picture import RunPicture, Setback
+from hexacell.text.screens.views import FaultView, Guidance, MeasureView, PlotView, Series
 from procedures.engine.command_loop import Status
 from procedures.run import events
 from procedures.run.state import RunState
@@ -263,3 +263,27 @@ def _accuracy_title(picture: RunPicture) -> str:
 
 def _columns(pairs: list[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return tuple(x for x, _ in pairs), tuple(y for _, y in pairs)
+
+
+# JOINED Text for what went wrong: the fact, its cause, and the next action.
+
+RESUMABLE = "What was measured is kept. Mend it, then press r in 2 Preflight, which resumes the run."
+
+
+def fault_view(setback: Setback) -> FaultView:
+    """A fault in words."""
+    match setback:
+        case events.Tripped(guard=guard, device=device, problem=problem, action=action):
+            where = f"{device}: " if device else ""
+            return FaultView(f"Stopped by a guard: {guard.value}", f"{where}{problem}", action)
+        case events.Failed(reason=reason, attempt=attempt, action=action):
+            return FaultView(
+                "A step failed, the robot was stopped",
+                reason,
+                f"The run does this now: {action.value} (attempt {attempt}).",
+            )
+        case events.Interrupted(reason=reason):
+            return FaultView("The run ended early", reason, RESUMABLE)
+        case HostFailed(problem=problem, action=action, exit_code=exit_code):
+            title = "That was refused" if exit_code is None else "The run could not go on"
+            return FaultView(title, problem, action)

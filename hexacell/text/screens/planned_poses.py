@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hexacell.services.preflight.plan_draft import PlanDraft
 from hexacell.text.plan_draft import plan_rows, removed_text
-from hexacell.text.screens.checklists import TRYING
+from hexacell.text.screens.live import TRYING
 from hexacell.text.screens.views import PlanView
 
 NOT_TRIED = "v in 2 Preflight tries the plan; then its poses are here."

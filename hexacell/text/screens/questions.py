@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from hexacell.run_process.snapshots import LiveSnapshot
 from hexacell.text.screens.views import Choice, QuestionView, Urgency
-from hexacell.text.teaching import teaching_sentence
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.text.verdict import teaching_sentence
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.run.questions import (
     NO,
     PLACED,

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hexacell.cell.model import CellSettings
+from hexacell.services.history.past_runs import PastRun
 from hexacell.text.events import event_text
+from hexacell.text.history import NO_RUNS, history_head, history_line
+from hexacell.text.parameters import parameter_table, rows_of_run
 from hexacell.text.screens.measuring import accuracy_plot
-from hexacell.text.screens.parameters import PARAMETER_COLUMNS, parameter_lines
-from hexacell.text.screens.questions import approval_refusal
+from hexacell.text.screens.questions import PERSON, approval_refusal
 from hexacell.text.screens.run_picture import RunPicture
-from hexacell.text.screens.views import PlotView, ReviewView, Series, Urgency
-from hexacell.verdict.acceptance import DeviationStatistics
+from hexacell.text.screens.views import (
+    Choice,
+    HistoryEntry,
+    HistoryView,
+    PlotView,
+    QuestionView,
+    ReviewView,
+    Series,
+    Urgency,
+)
 from hexacell.verdict.decision import Verdict
+from hexacell.verdict.verification import DeviationStatistics
 from procedures.run.questions import PendingChange, QuestionKind
 from procedures.run.state import RunState
 from procedures.run.steps import Phase
@@ -30,12 +43,13 @@ def review_view(picture: RunPicture, settings: CellSettings | None, change: str 
     """The screen of a result; ``change`` is the text change of the config, if it is known."""
     state = picture.state
     verdict, urgency = _verdict(state)
+    header, *lines = parameter_table(rows_of_run(state, settings))
     return ReviewView(
         verdict=verdict,
         scope=_scope(state),
         approval=_approval(picture),
-        parameters_header=PARAMETER_COLUMNS,
-        parameters=parameter_lines(state, settings),
+        parameters_header=header,
+        parameters=tuple(lines) or ("The geometry is not identified yet.",),
         comparison=_comparison(state),
         plots=(deviation_plot(state), residual_plot(picture), accuracy_plot(picture, None)),
         change=tuple((_diff(picture) or change or "There is no change yet.").splitlines()),
@@ -145,3 +159,37 @@ def residual_plot(picture: RunPicture) -> PlotView:
         level=0.0,
         note="No record beside a reference is taken yet.",
     )
+
+
+# JOINED Text for the screen of a cell's runs.
+
+PROPOSAL_WAITS = "Its proposal can still be written: w asks for it, with the change."
+READING = "Reading the runs of this cell ..."
+WHAT_TO_PRESS = (
+    "Enter  watch the chosen run again      v  compare it with the one before it",
+    "b      go back to the config that it wrote; if the controller has it: undo it",
+    "w      write its proposal, where it has one, into the controller's config",
+    "o      the drift of each parameter over all runs",
+)
+
+
+def history_entries(runs: Sequence[PastRun]) -> tuple[HistoryEntry, ...]:
+    """A line for each run, in their order."""
+    return tuple(HistoryEntry(run.name, history_line(run), run.summary.has_proposal) for run in runs)
+
+
+def history_view(entries: tuple[HistoryEntry, ...] | None, compared: tuple[str, ...]) -> HistoryView:
+    """The list; ``entries`` are none before they were read."""
+    if entries is None:
+        return HistoryView(history_head(), (), note=READING)
+    note = "" if entries else NO_RUNS
+    return HistoryView(history_head(), entries, (*WHAT_TO_PRESS, "", *compared), note)
+
+
+def rollback_question(run: str, *, is_in_controller: bool) -> QuestionView:
+    """What a person confirms before the controller's config is changed."""
+    title = f"Go back to the controller's config that {run} wrote?"
+    if is_in_controller:
+        title = f"Undo {run}: put back the controller's config of before it?"
+    consent = Choice("y", "yes, replace the config, bit for bit", PERSON, is_consent=True)
+    return QuestionView(title, (), "Press y or n.", (consent, Choice("n", "no, leave it as it is", None)))

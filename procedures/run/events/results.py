@@ -12,9 +12,9 @@ from hexacell.checks.quick_level import QuickAccuracy
 from hexacell.design.design_efficiency import DesignEfficiency
 from hexacell.results.result import ExpectedImprovement, IdentificationResult
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
-from hexacell.verdict.length_statement import LengthStatement
+from hexacell.verdict.length_check import LengthStatement
 from hexacell.verdict.verification import Verification
 from procedures.run.steps import SixNumbers
 

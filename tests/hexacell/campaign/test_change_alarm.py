@@ -16,7 +16,7 @@ from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.text.verification import alarm_sentence, check_text
+from hexacell.text.verdict import alarm_sentence, check_text
 from hexacell.uncertainty.encoder_effects import encoder_scales
 from hexacell.verdict.decision import ErrorLimits
 

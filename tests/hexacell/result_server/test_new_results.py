@@ -7,7 +7,7 @@ import pytest
 from hexacell.result_server import published_result as new_results
 from hexacell.result_server.published_result import NewResults, ResultEvaluation, ResultState
 from hexacell.runs.run_folder import runs_folder
-from hexacell.services.history.history import past_runs
+from hexacell.services.history.past_runs import past_runs
 from hexacell.verdict.decision import Verdict
 from tests.hexacell.services.proposed_runs import a_cell, propose_run
 

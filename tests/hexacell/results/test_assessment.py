@@ -25,8 +25,8 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import make_robot
 from hexacell.verdict.assessment import assess
-from hexacell.verdict.documents import fit_document
 from hexacell.verdict.findings import findings, pair_sentences
+from hexacell.verdict.fit_document import fit_document
 
 AGAIN = 100
 """Added to the orientation's number at a second visit."""

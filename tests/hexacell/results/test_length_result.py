@@ -13,13 +13,12 @@ from hexacell.cell.loader import load_cell
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.identification.estimator import identify
 from hexacell.measurements.records import MeasurementSet, joints_of
-from hexacell.results.length_result import LengthMeasurements, LengthResult, length_standard
-from hexacell.results.result import IdentificationResult
+from hexacell.results.result import IdentificationResult, LengthResult
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import robot_of
-from hexacell.text.length import not_checked
-from hexacell.text.verification import verification_text
+from hexacell.text.verdict import not_checked, verification_text
 from hexacell.verdict.decision import Verdict
+from hexacell.verdict.length_check import LengthMeasurements, length_standard
 from hexacell.verdict.verification import HeldOut, Verification, outcome_line, verify
 from tests.hexacell.results.two_seat_records import two_seat_records
 

@@ -19,7 +19,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.results.result import IdentificationResult
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, robot_of
-from hexacell.text.verification import verification_text
+from hexacell.text.verdict import verification_text
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.model_evidence import ZEROS_DOUBTED
 from hexacell.verdict.verification import HeldOut, Verification, outcome_line, reason_of, verify

@@ -14,7 +14,7 @@ from hexacell.config.layout import fingerprint
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import config_layout, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
 from procedures.calibration.workflow import Calibration, Mode

@@ -10,7 +10,7 @@ import pytest
 from hexacell.cell.loader import Cell
 from hexacell.config.write_back import commit
 from hexacell.errors import UsageError
-from hexacell.services.history.history import compare_runs, parameter_trends, past_runs
+from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
 from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.text.history import (
     NO_DRIFT,

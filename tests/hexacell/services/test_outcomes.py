@@ -17,7 +17,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
 from hexacell.robot.model import robot_of
 from hexacell.services.run.calibration_run import run_started
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.run import events

@@ -22,7 +22,7 @@ from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.write_back.proposals import COMMAND, apply_proposal, later_approval, read_proposal
 from hexacell.storage import atomic_files
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from procedures.run.questions import PendingChange, Question, UnattendedOperator
 from tests.hexacell.services.proposed_runs import MET, ProposedRun, a_cell, propose_run

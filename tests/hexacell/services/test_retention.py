@@ -12,7 +12,7 @@ from hexacell.config.write_back import commit
 from hexacell.errors import CellBusy
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.services.history.history import past_runs
+from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.retention import LEAVING, KeptFor, delete_runs, retention
 from hexacell.text.history import retention_text
 from procedures.journal.journal import read_journal

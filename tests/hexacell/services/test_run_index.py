@@ -13,7 +13,7 @@ from hexacell.config.write_back import commit
 from hexacell.runs.archive import INDEX, Archive
 from hexacell.runs.archived_documents import DocumentKind, StampedDocument
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.services.history.history import PastRun, past_runs
+from hexacell.services.history.past_runs import PastRun, past_runs
 from hexacell.services.history.run_index import RunIndex
 from procedures.journal.journal import Journal, read_entries
 from procedures.journal.line_format import Entry
@@ -40,7 +40,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         names.append(path.parent.name)
         return read_entries(path)
 
-    monkeypatch.setattr("hexacell.services.history.history.read_entries", noted)
+    monkeypatch.setattr("hexacell.services.history.past_runs.read_entries", noted)
     return names
 
 

@@ -21,7 +21,7 @@ from hexacell.errors import (
 )
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.runs.run_folder import RunFolder, find_run, read_attempts, runs_folder
-from hexacell.services.history.history import past_runs
+from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.retention import reason_to_keep
 from hexacell.services.run.calibration_run import RunRequest, calibrate
 from hexacell.services.schedule.unattended_runs import (

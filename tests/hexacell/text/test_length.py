@@ -5,12 +5,11 @@ from __future__ import annotations
 import pytest
 
 from hexacell.kinematics.pose import Pose
-from hexacell.results.length_result import LengthResult, LengthSource
-from hexacell.text.length import earlier_scale_line, length_text, not_checked, scale_lines
+from hexacell.results.result import LengthResult, LengthSource
 from hexacell.text.run import question_text
-from hexacell.verdict.decision import Verdict
-from hexacell.verdict.length_statement import LengthStatement, length_line
-from hexacell.verdict.verification import JudgedError
+from hexacell.text.verdict import earlier_scale_line, length_text, not_checked, scale_lines
+from hexacell.verdict.decision import JudgedError, Verdict
+from hexacell.verdict.length_check import LengthStatement, length_line
 from procedures.run.questions import ask_mounting
 
 SOURCES = tuple(

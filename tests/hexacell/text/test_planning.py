@@ -17,7 +17,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import AveragingForecast
-from hexacell.services.records.offline import PlanTrial
+from hexacell.services.offline import PlanTrial
 from hexacell.text.layout import duration
 from hexacell.text.planning import (
     decision_text,

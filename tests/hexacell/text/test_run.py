@@ -14,7 +14,7 @@ from hexacell.runs.run_folder import RunFolder
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.text.documents import run_document
 from hexacell.text.run import closing_lines, resume_command, resume_hint
-from hexacell.text.teaching import teaching_line, teaching_sentence
+from hexacell.text.verdict import teaching_line, teaching_sentence
 from procedures.calibration.workflow import Mode
 from procedures.run import events
 from procedures.run.questions import UnattendedOperator

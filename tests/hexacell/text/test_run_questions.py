@@ -11,8 +11,8 @@ from hexacell.results.result import ExpectedImprovement
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.answers import TypedAnswer, request_text, typed_answer
 from hexacell.text.run import question_text
-from hexacell.text.teaching import teaching_sentence
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.text.verdict import teaching_sentence
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
 from procedures.run.questions import (

@@ -20,12 +20,11 @@ from hexacell.run_process.messages import (
     StatusChanged,
 )
 from hexacell.run_process.snapshots import ControllerSnapshot, EncoderSnapshot, GaugeSnapshot, LiveSnapshot
+from hexacell.text.parameters import parameter_table, rows_of_run
 from hexacell.text.screens.block_digits import block_text
-from hexacell.text.screens.faults import fault_view
 from hexacell.text.screens.lines import device_lines
 from hexacell.text.screens.live import live_view, mounting_advice, travel_bar
-from hexacell.text.screens.measuring import guidance, record_lines
-from hexacell.text.screens.parameters import parameter_lines
+from hexacell.text.screens.measuring import fault_view, guidance, record_lines
 from hexacell.text.screens.questions import question_view
 from hexacell.text.screens.reviewing import review_view
 from hexacell.text.screens.run_picture import RunPicture, picture_after
@@ -233,7 +232,7 @@ def test_a_check_shows_what_has_changed() -> None:
     )
     check = CheckResult(verdict=Verdict.PASS, records=16, points=4, changes=changes)
     judged = events.ResultValidated(verdict=Verdict.PASS, line="pass", check=check)
-    assert parameter_lines(fold([judged]), None) == (
+    assert parameter_table(rows_of_run(fold([judged]), None))[1:] == (
         "S1y                               +0.120    0.020  changed (6 sigma)",
         "l4                                -0.010    0.020  unchanged (0.5 sigma)",
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.text.teaching import teaching_line, teaching_sentence
+from hexacell.text.verdict import teaching_line, teaching_sentence
 
 
 @pytest.mark.parametrize(

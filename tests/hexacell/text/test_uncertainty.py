@@ -12,9 +12,9 @@ from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.robot.model import make_robot
 from hexacell.robot.stated_effects import stated_effects
-from hexacell.text.uncertainty import budget_table
+from hexacell.text.identification import budget_table
 from hexacell.verdict.assessment import assess
-from hexacell.verdict.documents import fit_document
+from hexacell.verdict.fit_document import fit_document
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from hexacell.errors import AnswerNeeded, HexacellError
 from hexacell.kinematics.pose import Pose
 from hexacell.results.result import AcceptedResult
 from hexacell.verdict.decision import Verdict
-from hexacell.verdict.length_statement import LengthStatement
+from hexacell.verdict.length_check import LengthStatement
 from procedures.calibration.expected_records import expected_records
 from procedures.calibration.length_steps import BESIDE_MM
 from procedures.calibration.preflight import plan_failures

@@ -6,7 +6,7 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.journal import Journal
 from procedures.run import events
 

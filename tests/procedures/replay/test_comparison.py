@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from hexacell.cell.fields import Frozen
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.line_format import decode
 from procedures.replay.comparison import Aspect, Change, Difference, changes, is_wording
 from procedures.run import events

@@ -9,7 +9,7 @@ import pytest
 from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded, ExitCode
 from hexacell.kinematics.pose import Pose
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.run.questions import (
     GaugePlacement,
     Question,

@@ -24,10 +24,10 @@ from hexacell.noise.measured_noise import (
     RepeatedApproaches,
 )
 from hexacell.results.result import OutlierRecord
-from hexacell.verdict.acceptance import AcceptanceGate
-from hexacell.verdict.decision import Verdict
+from hexacell.verdict.acceptance_gates import AcceptanceGate
+from hexacell.verdict.decision import JudgedError, Verdict
 from hexacell.verdict.model_evidence import ModelTest
-from hexacell.verdict.verification import JudgedError, Verification, VerifiedAccuracy
+from hexacell.verdict.verification import Verification, VerifiedAccuracy
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.events import course, measuring, results

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hexacell.verdict.acceptance import AcceptanceGate
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.state import RunState

@@ -8,7 +8,7 @@ from hexacell.cell.loader import Cell
 from hexacell.cell.operation import Occasion
 from hexacell.errors import AnswerNeeded, CellBusy, DeviceError, SeveralErrors
 from hexacell.runs.run_folder import RunFolder
-from hexacell.services.history.history import past_runs
+from hexacell.services.history.past_runs import past_runs
 from hexacell.services.notify import notice as run_notices
 from hexacell.services.notify.notice import RunEnd, notice_of_end, notice_of_failure
 from hexacell.services.run.calibration_run import RunRequest

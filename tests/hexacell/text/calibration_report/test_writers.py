@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexacell.errors import UsageError
-from hexacell.text.report.blocks import (
+from hexacell.text.report.pages import (
     Chapter,
     Facts,
     Paragraph,
@@ -18,9 +18,10 @@ from hexacell.text.report.blocks import (
     Report,
     Table,
     Tone,
+    html_of,
+    pdf_of,
+    typst_of,
 )
-from hexacell.text.report.html import html_of
-from hexacell.text.report.pdf import pdf_of, typst_of
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><rect width="9" height="9"/></svg>'
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from hexacell.cell.model import CellSettings
+from hexacell.config.interface import ControllerLimits
 from hexacell.errors import HexacellError
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.kinematics.geometry import Geometry
 from hexacell.noise.measured_noise import MeasuredNoise
+from hexacell.robot.model import Robot, robot_of_start
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.recorded.journal_soundness import require_sound
 from procedures.journal.journal import read_journal
+from procedures.run.events import RunStarted
 from procedures.run.state import RunState
 
 
@@ -42,3 +45,18 @@ def _state_of(folder: RunFolder, settings: CellSettings) -> RunState:
         return require_sound(history, settings, folder.journal, follows_plan=False)
     except HexacellError:
         return RunState()
+
+
+# JOINED The robot of a run, as the run knew it when it began.
+
+
+def started_robot(settings: CellSettings, started: RunStarted) -> Robot:
+    """From a cell's settings, which may be newer, and what its controller had then."""
+    limits = started.limits or ControllerLimits(joints=started.joint_ranges)
+    return robot_of_start(settings, started.controller, started.branch, started.taught, limits)
+
+
+def geometry_before(settings: CellSettings, started: RunStarted) -> Geometry:
+    """That of the controller when the run began, in the mechanism's frame convention."""
+    mechanism = settings.mechanism
+    return mechanism.normalize_frames(Geometry.of(mechanism.parameters, started.controller))[0]

@@ -6,14 +6,9 @@ The deviations of the ball at held-out points are compared before and after the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import ArrayLike
 
 from hexacell.cell.fields import Frozen
-from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS, ToleranceViolation
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.solver.chi_square import (
     CONTRADICTED_RATIO,
     ChiSquareTest,
@@ -21,7 +16,6 @@ from hexacell.identification.solver.chi_square import (
 )
 from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.rotations import Array
 
 
 class AcceptanceGate(Frozen):
@@ -141,30 +135,3 @@ def _certified(expired: Sequence[str]) -> AcceptanceGate:
         else "The certificates of the instruments were valid when the run began."
     )
     return AcceptanceGate(name="certified", passed=not expired, sentence=sentence, needs_person=True)
-
-
-@dataclass(frozen=True, slots=True)
-class DeviationStatistics:
-    """Mean distance of the ball from its point's reference, mm, over a number of poses."""
-
-    mean_mm: float
-    poses: int
-
-    @classmethod
-    def of(cls, deviations: ArrayLike) -> DeviationStatistics | None:
-        """Of deviations (n, 3), mm, without the references; none without any, or if one is not finite."""
-        distances: Array = np.linalg.norm(np.reshape(np.asarray(deviations, dtype=float), (-1, 3)), axis=-1)
-        if not len(distances) or not np.isfinite(distances).all():
-            return None
-        return cls(float(distances.mean()), len(distances))
-
-
-def is_worse(before: DeviationStatistics, after: DeviationStatistics, noise: Noise) -> bool:
-    """Whether the mean distance is significantly larger than before, at the same poses.
-
-    A mean of n distances to one noisy reference has at most the variance of a record, once for the
-    reference and 1/n for the poses.
-    """
-    record_mm = float(np.hypot(noise.gauge_mm, noise.encoder))
-    standard_error = record_mm * float(np.sqrt(2.0 + 1.0 / before.poses + 1.0 / after.poses))
-    return after.mean_mm - before.mean_mm > SIGNIFICANT_SIGMAS * standard_error

@@ -7,7 +7,7 @@ to again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,16 +17,17 @@ from hexacell.config.change import ConfigChange
 from hexacell.config.interface import ControllerGeometry, ControllerLimits
 from hexacell.config.layout import are_same_files, fingerprint_of, read_contents_if_present
 from hexacell.config.receipt import BEFORE, RECEIPT, Receipt, kept_paths
-from hexacell.errors import FileError
+from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import SAME_FRAMES
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import Robot, controller_geometry
 from hexacell.robot.stated_limits import stated_limits
-from hexacell.runs.run_folder import RunFolder
-from hexacell.services.recorded.started_robot import started_robot
+from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
+from hexacell.services.recorded.recorded_robot import started_robot
 from procedures.engine.config_edits import PROVISIONAL_FOLDER
-from procedures.journal.line_format import RESTORE
+from procedures.journal.journal import read_entries
+from procedures.journal.line_format import RESTORE, Entry
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import SixNumbers
@@ -155,3 +156,41 @@ def _commanding(robot: Robot, state: RunState) -> Iterator[Geometry]:
         yield Geometry.of(parameters, state.proposed.written)
     if state.identified is not None:
         yield robot.for_controller(state.identified.result.identified(parameters))
+
+
+# JOINED The runs of a cell that were interrupted and can be resumed.
+
+LATEST = "latest"
+"""In the place of a run's name."""
+
+
+def run_to_resume(cell: Cell, named: str) -> RunFolder:
+    """A run by its folder or name, or the interrupted one in which something happened last.
+
+    Raises:
+        UsageError: there is none.
+    """
+    return _latest(cell) if named == LATEST else find_run(cell, named)
+
+
+def _latest(cell: Cell) -> RunFolder:
+    folder = runs_folder(cell)
+    runs = [RunFolder(path) for path in folder.iterdir()] if folder.is_dir() else []
+    interrupted = {run: entries[-1].at for run in runs if (entries := _entries_if_interrupted(run))}
+    if not interrupted:
+        raise UsageError(
+            "no run of this cell was interrupted", action=f"Name one; the cell's runs are in {folder}"
+        )
+    return max(interrupted, key=interrupted.__getitem__)
+
+
+def _entries_if_interrupted(run: RunFolder) -> Sequence[Entry]:
+    """The journal of a run that is not over; nothing where it cannot be read."""
+    if not run.journal.is_file():
+        return []
+    try:
+        entries = read_entries(run.journal)
+    except HexacellError:
+        return []
+    is_over = any(isinstance(entry.event, events.Ended) for entry in entries)
+    return [] if is_over else entries

@@ -6,11 +6,12 @@ from pathlib import Path
 
 from hexacell.checks.change_alarm import ChangeAlarm
 from hexacell.checks.check_result import CheckResult
-from hexacell.results.result import AcceptedResult
+from hexacell.results.result import AcceptedResult, LengthResult
+from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.layout import wrapped
-from hexacell.text.length import earlier_scale_line, scale_lines
-from hexacell.verdict.decision import Verdict
-from hexacell.verdict.verification import JudgedError, Verification, VerifiedAccuracy
+from hexacell.verdict.decision import JudgedError, Verdict
+from hexacell.verdict.length_check import LengthStatement, scale_words
+from hexacell.verdict.verification import Verification, VerifiedAccuracy
 
 
 def verification_text(verified: Verification) -> str:
@@ -99,3 +100,90 @@ def _comparison(verified: Verification) -> list[str]:
     means = f"{verified.before_mm:.2f} -> {verified.after_mm:.3f} mm"
     worse = ", significantly worse" if verified.is_worse else ""
     return [f"  mean deviation at held-out poses {means}{worse}"]
+
+
+# JOINED Text for the length scale: whether it was checked, and what was found.
+
+NAMED_SOURCES = 4
+"""So many of the sources of uncertainty are printed, the largest."""
+
+
+def not_checked(scale_of: str = "encoders") -> str:
+    """Where the length scale comes from, if nobody checked it."""
+    if scale_of == "encoders":
+        return "The length scale is that of the encoders; it was not checked."
+    return "The length scale is that of the drawing, within its tolerances, which U contains."
+
+
+def scale_lines(length: LengthResult | None, scale_of: str = "encoders") -> list[str]:
+    """What is known of the length scale; none where a check contradicts itself, which its test says."""
+    if length is None:
+        return [not_checked(scale_of)]
+    if not length.is_consistent:
+        return []
+    checked = f"length scale: checked over {length.distance_mm:.3f} mm: {scale_words(length)}"
+    return [checked, remedy(length)] if length.is_significant else [checked]
+
+
+def earlier_scale_line(length: LengthResult | None, scale_of: str = "encoders") -> str:
+    """What a check knows of the length scale, by the run of the result that it started from."""
+    if length is None or not length.is_consistent:
+        return not_checked(scale_of)
+    return f"length scale: as checked in that run: {scale_words(length)}"
+
+
+def length_text(stated: LengthStatement) -> str:
+    """A few lines: the verdict, the scale, what it does at the task, and what U consists of."""
+    result, error = stated.result, stated.error
+    lines = [f"verdict: {stated.verdict}"]
+    if not result.is_consistent:
+        return "\n".join([*lines, wrapped(f"  the length check says nothing: {result.reason}", indent=2)])
+    lines += [f"  {line}" for line in scale_lines(result)]
+    if error is not None:
+        size = f"{error.value:.3f} mm, U {error.expanded:.3f} ({error.rule})"
+        lines.append(f"  position error by that at the task poses: {size}")
+    largest = sorted(result.sources, key=lambda source: -source.um_m)[:NAMED_SOURCES]
+    named = ", ".join(f"{source.name} {source.um_m:.1f}" for source in largest)
+    return "\n".join([*lines, wrapped(f"  uncertainty, um/m, 1 sigma: {named}", indent=2)])
+
+
+def remedy(length: LengthResult) -> str:
+    """What to do about encoders that are not true to scale."""
+    text = (
+        f"No geometry corrects that: multiply the scale factor of all encoders by {length.factor:.6f}, at "
+        "the drives and in [encoders] measuring_step_nm, and calibrate again."
+    )
+    return wrapped(f"  {text}", indent=2).strip()
+
+
+# JOINED Text for what must be taught anew because of a new geometry.
+
+SMALLEST = 0.001
+"""Nothing below is printed, mm or deg: it is that of the numbers in a config."""
+
+
+def teaching_sentence(moved: TaskDisplacement) -> str:
+    """What must be taught anew, and what not; nothing if all that was taught stays within the limits."""
+    how_far = f"{_how_far(moved)} at the task poses"
+    if moved.is_within_limits:
+        return f"Nothing need be taught anew: taught points and frames move by at most {how_far}."
+    return (
+        f"Teach anew: Cartesian points, work and tool frames move by up to {how_far}. "
+        "Points taught by joints stay."
+    )
+
+
+def teaching_line(moved: TaskDisplacement) -> str:
+    """The same in a line of at most 80 columns."""
+    if moved.is_within_limits:
+        return f"Taught points and frames stay: they move by at most {_how_far(moved)}"
+    return f"Teach Cartesian points and frames anew: they move by up to {_how_far(moved)}"
+
+
+def _how_far(moved: TaskDisplacement) -> str:
+    return f"{_figure(moved.position_mm)} mm, {_figure(moved.orientation_deg)} deg"
+
+
+def _figure(value: float) -> str:
+    decimals = 1 if value >= 10.0 else 2 if value >= 1.0 else 3
+    return f"{max(value, SMALLEST):.{decimals}f}"

@@ -47,9 +47,8 @@ class ParameterRow:
         times = abs(self.change) / self.sigma
         if self.doubt:
             return self.doubt
-        if times < SIGNIFICANT_SIGMAS:
-            return f"unchanged ({times:.1f} sigma)"
-        return f"changed ({times:.0f} sigma)"
+        word = "unchanged" if times < SIGNIFICANT_SIGMAS else "changed"
+        return f"{word} ({times:.{1 if times < 99.95 else 0}f} sigma)"
 
     @property
     def label(self) -> str:

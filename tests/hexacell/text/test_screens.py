@@ -233,7 +233,7 @@ def test_a_check_shows_what_has_changed() -> None:
     check = CheckResult(verdict=Verdict.PASS, records=16, points=4, changes=changes)
     judged = events.ResultValidated(verdict=Verdict.PASS, line="pass", check=check)
     assert parameter_table(rows_of_run(fold([judged]), None))[1:] == (
-        "S1y                               +0.120    0.020  changed (6 sigma)",
+        "S1y                               +0.120    0.020  changed (6.0 sigma)",
         "l4                                -0.010    0.020  unchanged (0.5 sigma)",
     )
 

@@ -14,7 +14,6 @@ from drivers.simulated import robot
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
-from hexacell.design.continuous_design import pose_bound
 from hexacell.design.search_effort import SearchEffort
 from hexacell.services import search_effort
 from procedures.run import events
@@ -65,14 +64,6 @@ def choose_among_few(patch: pytest.MonkeyPatch) -> None:
     """Have the program's services choose among few poses, and the simulated robot move in few pieces."""
     patch.setattr(search_effort, "EFFORT", FEW_CHOICES)
     patch.setattr(robot, "LINE_STEPS", 8)
-    bound_roughly(patch)
-
-
-def bound_roughly(patch: pytest.MonkeyPatch) -> None:
-    """Search the best design roughly: how near to it the poses are is not under test."""
-    patch.setattr(pose_bound, "SPREAD", 64)
-    patch.setattr(pose_bound, "CLIMBING", 4)
-    patch.setattr(pose_bound, "MOST_CLIMBS", 2)
 
 
 @contextmanager

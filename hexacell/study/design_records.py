@@ -11,7 +11,6 @@ import numpy as np
 from hexacell.campaign.planner import Plan
 from hexacell.cell.model import CellSettings
 from hexacell.design.candidates import ReachableTargets, commands_for, reachable_targets
-from hexacell.design.continuous_design.pose_domain import PoseDomain
 from hexacell.design.criteria import D_OPTIMAL, covariance_update
 from hexacell.design.predicted_records import (
     GaugeZero,
@@ -21,6 +20,7 @@ from hexacell.design.predicted_records import (
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
+from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -114,7 +114,7 @@ def _selected(
     chosen = reachable_targets(belief, PoseBatch.at(ball, level))
     if not len(chosen):
         raise LimitError("the level pose cannot be reached at a point")
-    possible = PoseDomain(belief, _zero(belief, chosen)).spread(POSSIBLE, seed)
+    possible = possible_targets(belief, _zero(belief, chosen), POSSIBLE, seed)
     possible = possible[commands_for(belief, possible)[1]]
     while len(chosen) < count:
         records = predict_records(belief, _zero(belief, chosen), possible)
@@ -124,6 +124,24 @@ def _selected(
         belief = replace(belief, covariance=covariance_update(*at_best))
         chosen = ReachableTargets.concatenate([chosen, possible[np.array([best])]])
     return chosen, belief
+
+
+def possible_targets(belief: RobotBelief, zero: GaugeZero, count: int, seed: int) -> ReachableTargets:
+    """Those of ``count`` poses (a power of two) all over tilt and turn that the estimated robot can take.
+
+    The ball is where the gauges were zeroed, and the robot on its assembly mode of then.
+    """
+    from scipy.stats import qmc  # noqa: PLC0415 - half a second that only this function needs
+
+    heading, tilted, turned = qmc.Sobol(3, seed=seed).random(count).T
+    limits, zeros = belief.limits, np.zeros(count)
+    angle, heading = limits.tilt * np.sqrt(tilted), 2.0 * np.pi * heading
+    directions = np.stack([np.cos(heading), np.sin(heading), zeros], axis=-1)
+    turn = limits.turn * (2.0 * turned - 1.0)
+    tilts = rotations.from_vector(angle[:, None] * directions)
+    turns = rotations.from_vector(np.stack([zeros, zeros, turn], axis=-1))
+    poses = PoseBatch.at(zero.reference, limits.orientations(tilts @ turns))
+    return reachable_targets(belief, poses, zero.mode(belief))
 
 
 def _zero(belief: RobotBelief, chosen: ReachableTargets) -> GaugeZero:

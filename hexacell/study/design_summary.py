@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,6 @@ import numpy as np
 from hexacell.study.design_records import OrientationChoice
 from hexacell.study.design_trials import DesignOutcome, DesignTrial, RecordsAccuracy, run_design_trial
 from hexacell.study.tasks import Study
-
-RATED = 100
-"""Robots of which the efficiency of the design is computed."""
 
 SWEPT = 20
 """Robots of each sweep, at most."""
@@ -78,57 +75,35 @@ class ChoiceCurve:
 
 
 @dataclass(frozen=True, slots=True)
-class EfficiencySummary:
-    """Of the adaptive campaigns that were rated: medians, and the tenth that is worst.
-
-    ``certificate`` is the smallest of all. Efficiencies are certified ones.
-    """
-
-    robots: int
-    d: float
-    d_tenth: float
-    i: float
-    i_tenth: float
-    certificate: float
-
-
-@dataclass(frozen=True, slots=True)
 class DesignStudy:
     """All of it.
 
     Attributes:
         choices: by the way to choose orientations.
         sweeps: of adaptive campaigns, by the name and the value of what is varied.
-        efficiency: none where no robot was rated.
         noise_ratio: by how much the noise on the parameters is smaller than with other orientations, at the
             median of the robots that both identify.
     """
 
     choices: Mapping[str, ChoiceCurve]
     sweeps: Mapping[str, Mapping[float, Spread]]
-    efficiency: EfficiencySummary | None
     noise_ratio: Mapping[str, float]
 
 
 def design_trials_of(robots: int) -> dict[str, DesignTrial]:
     """All trials by their keys."""
-    trials = [
-        DesignTrial(number, choice, rates=choice is OrientationChoice.ADAPTIVE and number < RATED)
-        for number in range(robots)
-        for choice in OrientationChoice
-    ]
+    trials = [DesignTrial(number, choice) for number in range(robots) for choice in OrientationChoice]
     trials += [trial for name in SWEEPS for trials in _swept(name, robots).values() for trial in trials]
     return {trial.key: trial for trial in trials}
 
 
 def _swept(name: str, robots: int) -> dict[float, list[DesignTrial]]:
-    """The trials of a sweep by the value; the usual ones are rated ones of the comparison."""
+    """The trials of a sweep by the value; the usual ones are those of the comparison."""
     field, values = SWEEPS[name]
-    usual = DesignTrial(0)
 
     def trial(number: int, value: float) -> DesignTrial:
-        changed: dict[str, Any] = {field: value, "rates": value == getattr(usual, field)}
-        return replace(usual, number=number, **changed)
+        changed: dict[str, Any] = {field: value}
+        return DesignTrial(number, **changed)
 
     numbers = range(min(robots, SWEPT))
     return {float(value): [trial(number, value) for number in numbers] for value in values}
@@ -140,7 +115,7 @@ def design_summary(trials: Mapping[str, DesignTrial], outcomes: Mapping[str, Des
         choice: {
             one.number: outcomes[key]
             for key, one in trials.items()
-            if one == replace(DesignTrial(one.number, choice), rates=one.rates)
+            if one == DesignTrial(one.number, choice)
         }
         for choice in OrientationChoice
     }
@@ -156,7 +131,6 @@ def design_summary(trials: Mapping[str, DesignTrial], outcomes: Mapping[str, Des
     return DesignStudy(
         {choice.value: _curve(list(found.values())) for choice, found in compared.items()},
         sweeps,
-        _efficiency(list(adaptive.values())),
         {
             choice.value: _noise_ratio(adaptive, found)
             for choice, found in compared.items()
@@ -177,22 +151,6 @@ def _curve(outcomes: Sequence[DesignOutcome]) -> ChoiceCurve:
         {count: Spread.of([one for one in every if one.records == count]) for count in counts},
         _quantile([one.deviation_mm for one in outcomes if one.accuracies], 0.5),
         sum(one.outside for one in outcomes),
-    )
-
-
-def _efficiency(outcomes: Sequence[DesignOutcome]) -> EfficiencySummary | None:
-    rated = [one.efficiency for one in outcomes if one.efficiency is not None]
-    if not rated:
-        return None
-    by_d = [one.d.certified for one in rated]
-    by_i = [one.i.certified for one in rated if one.i is not None]
-    return EfficiencySummary(
-        len(rated),
-        _quantile(by_d, 0.5),
-        _quantile(by_d, 0.1),
-        _quantile(by_i, 0.5),
-        _quantile(by_i, 0.1),
-        min(one.certificate for one in rated),
     )
 
 

@@ -14,7 +14,6 @@ import numpy as np
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.design.design_efficiency import DesignEfficiency, design_efficiency
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
@@ -41,7 +40,6 @@ class DesignTrial:
         tilt_deg: largest tilt.
         noise_mm: of encoders and gauges.
         points: among which the records are divided.
-        rates: whether to compute the design's efficiency, which takes longer than all else.
     """
 
     number: int
@@ -50,13 +48,12 @@ class DesignTrial:
     tilt_deg: float = 45.0
     noise_mm: float = 0.01
     points: int = 5
-    rates: bool = False
 
     @property
     def key(self) -> str:
         """It and no other."""
         limits = f"{self.travel_mm:g} mm, {self.tilt_deg:g} deg, noise {self.noise_mm:g} mm"
-        return f"{self.choice}, {limits}, {self.points} points, {self.number}{', rated' * self.rates}"
+        return f"{self.choice}, {limits}, {self.points} points, {self.number}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +82,11 @@ class DesignOutcome:
         accuracies: with the records of the first two points, three, and so on.
         deviation_mm: the largest that a gauge had to show.
         outside: poses at which the ball left the travel.
-        efficiency: of the design, where it was wanted.
     """
 
     accuracies: tuple[RecordsAccuracy, ...] = ()
     deviation_mm: float = 0.0
     outside: int = 0
-    efficiency: DesignEfficiency | None = None
     reason: str = ""
 
     @property
@@ -108,12 +103,12 @@ def run_design_trial(trial: DesignTrial) -> DesignOutcome:
     random = np.random.default_rng([SEED, trial.number, 1])
     try:
         chosen = chosen_records(trial.choice, cell.settings, robot, truth, random)
-        return _outcome(trial, cell, chosen, truth)
+        return _outcome(cell, chosen, truth)
     except HexacellError as error:
         return DesignOutcome(reason=error.problem)
 
 
-def _outcome(trial: DesignTrial, cell: Cell, chosen: ChosenRecords, truth: Geometry) -> DesignOutcome:
+def _outcome(cell: Cell, chosen: ChosenRecords, truth: Geometry) -> DesignOutcome:
     points = chosen.measurements.points
     counts = [int(np.count_nonzero(points <= point)) for point in range(2, int(points.max()) + 1)]
     if not counts:
@@ -122,9 +117,8 @@ def _outcome(trial: DesignTrial, cell: Cell, chosen: ChosenRecords, truth: Geome
     accuracies = tuple(_accuracy(cell, chosen.robot, one, truth) for one in found if one is not None)
     deviations = [np.abs(record.deviation).max() for record in chosen.measurements.records]
     last = found[-1]
-    rated = _efficiency(cell, chosen.robot, last) if trial.rates and last is not None else None
     reason = "" if last is not None else f"its {len(points)} records do not determine the robot"
-    return DesignOutcome(accuracies, float(max(deviations)), chosen.outside, rated, reason)
+    return DesignOutcome(accuracies, float(max(deviations)), chosen.outside, reason)
 
 
 def _identified(chosen: ChosenRecords, count: int) -> Identification | None:
@@ -152,14 +146,6 @@ def _noise_mm(found: Identification) -> float:
     if variances[0] <= ROUNDING * variances[-1]:
         return float("inf")
     return float(np.sqrt(np.mean(np.sum(axes**2 / variances, axis=-1))))
-
-
-def _efficiency(cell: Cell, robot: Robot, found: Identification) -> DesignEfficiency:
-    belief = robot.belief(found)
-    error = Task.of(cell.settings, robot, belief).error(belief)
-    return design_efficiency(
-        belief, found, None if error is None else error.jacobian.reshape(-1, len(belief.free))
-    )
 
 
 @cache

@@ -8,7 +8,7 @@ from math import isfinite
 from typing import Any
 
 from hexacell.study.design_records import PAPER_DEG, RANDOM_DEG, OrientationChoice
-from hexacell.study.design_summary import ChoiceCurve, DesignStudy, EfficiencySummary, Spread
+from hexacell.study.design_summary import ChoiceCurve, DesignStudy, Spread
 from hexacell.text.layout import wrapped
 from hexacell.text.svg_drawing import AFTER, BEFORE, INK, as_svg, new_figure, plain_ticks
 
@@ -45,9 +45,6 @@ def design_lines(study: DesignStudy) -> Iterator[str]:
         yield from _choice_lines(name, curve)
     if ratios := ", ".join(f"{name} {ratio:.1f}" for name, ratio in study.noise_ratio.items()):
         yield wrapped(f"Noise on the parameters, times that of adaptive orientations: {ratios}.")
-    if study.efficiency is not None:
-        yield ""
-        yield wrapped(_efficiency_sentence(study.efficiency))
     for name, rows in study.sweeps.items():
         yield ""
         yield f"  {name:<24} {'error':<16} {'noise':<8} {'task':<8} robots"
@@ -66,15 +63,6 @@ def _choice_lines(name: str, curve: ChoiceCurve) -> Iterator[str]:
 def _spread(one: Spread) -> str:
     error = f"{one.largest_mm:.3g} ({one.most_mm:.3g})"
     return f"{error:<16} {one.sigma_mm:<8.3g} {one.task_mm:<8.3g}"
-
-
-def _efficiency_sentence(found: EfficiencySummary) -> str:
-    return (
-        f"Of the best continuous design for the known robot, adaptive campaigns of {found.robots} robots "
-        f"have a D-efficiency of {found.d:.2f} at the median (a tenth below {found.d_tenth:.2f}), and an "
-        f"I-efficiency at the task poses of {found.i:.2f} ({found.i_tenth:.2f}); certified to "
-        f"{100 * (1 - found.certificate):.0f} %."
-    )
 
 
 def design_document(study: DesignStudy) -> dict[str, Any]:

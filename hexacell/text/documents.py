@@ -124,7 +124,6 @@ def run_document(request: RunRequest, ended: events.Ended, state: RunState) -> d
         "verification": judged and judged.verification and judged.verification.model_dump(mode="json"),
         "check": judged and judged.check and judged.check.model_dump(mode="json"),
         "quick": found and found.quick and found.quick.model_dump(mode="json"),
-        "design": asdict(found.design) if found and found.design else None,
         "length": judged and judged.length and judged.length.model_dump(mode="json"),
         "measured_noise": noise and noise.noise.model_dump(mode="json"),
         "displacement": moved and moved.model_dump(mode="json"),

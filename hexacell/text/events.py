@@ -6,7 +6,6 @@ import numpy as np
 
 from hexacell.campaign.decisions import Forecast
 from hexacell.campaign.pilots import pilot_number
-from hexacell.text.design_statement import design_sentence
 from hexacell.text.layout import wrapped
 from hexacell.text.measured_noise import noise_and_averaging_text
 from hexacell.text.plan_draft import removed_summary
@@ -171,13 +170,8 @@ def _noise_text(measured: events.NoiseMeasured, state: RunState) -> str:
 
 
 def _identified_text(identified: events.Identified) -> str | None:
-    """How well the quick level knows the robot, and how good the choice of poses was."""
-    quick, design = identified.quick, identified.design
-    parts = (
-        None if quick is None else quick_accuracy_text(quick),
-        None if design is None else wrapped(design_sentence(design), indent=2),
-    )
-    return "\n".join(filter(None, parts)) or None
+    """How well the quick level knows the robot."""
+    return None if identified.quick is None else quick_accuracy_text(identified.quick)
 
 
 def confirmation_text(planned: events.ConfirmationPlanned) -> str:

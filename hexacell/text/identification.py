@@ -12,7 +12,6 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.noise.repeatability import Repeatability
 from hexacell.noise.variance_components import NoiseLevel, NoiseLevels
-from hexacell.text.design_statement import design_sentence
 from hexacell.text.layout import wrapped
 from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.parameters import parameter_rows, parameter_table
@@ -33,7 +32,6 @@ def identification_report(assessed: Assessment) -> str:
         _verdict_line(assessed),
         accuracy_table(assessed),
         budget_table(assessed.budget),
-        "" if assessed.design is None else wrapped(design_sentence(assessed.design)),
         wrapped(
             f"{len(found.free)} parameters from {found.records} records at {found.points} points; the "
             f"solver ended because {found.termination.value} ({found.solution.iterations} iterations)."

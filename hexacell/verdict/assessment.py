@@ -11,9 +11,6 @@ from hexacell.campaign.feasibility import UNDETERMINED_SHARE
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.design.decorrelation import DecorrelatingPose, decorrelating_poses
-from hexacell.design.design_efficiency import DesignEfficiency, design_efficiency
-from hexacell.errors import LimitError
-from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.correlations import CorrelatedPair, strongly_correlated
 from hexacell.identification.diagnostics.model_tests import PointPrediction, leave_one_point_out
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
@@ -57,8 +54,6 @@ class Assessment:
         measured_noise: at the start of the run that took the records; none where that is not known.
         possible_causes: of residuals that are too large, the largest share first.
         zeros: where these alone are identified; ``found`` is the estimate of all, which tests the data.
-        design: the information of the records beside the best design's; none where it is no result, or
-            where zeros alone are identified.
     """
 
     found: Identification
@@ -76,7 +71,6 @@ class Assessment:
     measured_noise: MeasuredNoise | None = None
     points: tuple[PointPrediction, ...] = ()
     zeros: IdentifiedZeros | None = None
-    design: DesignEfficiency | None = None
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -152,18 +146,7 @@ def assess(
         measured_noise=measured_noise,
         points=leave_one_point_out(found) if found.converged else (),
         zeros=zeros,
-        design=_design(task, belief, found) if found.converged and zeros is None else None,
     )
-
-
-def _design(task: Task, belief: RobotBelief, found: Identification) -> DesignEfficiency | None:
-    """None where the records of a point do not determine where its gauges were zeroed."""
-    error = task.error(belief)
-    predictions = None if error is None else error.jacobian.reshape(-1, len(belief.free))
-    try:
-        return design_efficiency(belief, found, predictions)
-    except LimitError:
-        return None
 
 
 def _is_doubtful(found: Identification) -> bool:

@@ -34,7 +34,6 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
         "correlated": _correlated(assessed),
         "accuracy": _accuracy(assessed),
         "uncertainty": assessed.budget and _budget(assessed.budget),
-        "design": assessed.design and asdict(assessed.design),
         "refused": assessed.refused,
         "possible_causes": [asdict(cause) for cause in assessed.possible_causes],
         "beyond_tolerance": [asdict(violation) for violation in assessed.tolerance_violations],

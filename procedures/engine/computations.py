@@ -66,7 +66,6 @@ class Computations:
             held_out_after=calibration.held_out_poses_after(identified, held_out),
             improvement=assessed.improvement,
             quick=calibration.quick.accuracy(measurements) if calibration.mode is Mode.QUICK else None,
-            design=assessed.design,
         )
 
     def with_replacements(self, refusal: events.PoseExcluded, state: RunState) -> events.PoseExcluded:

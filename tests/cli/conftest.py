@@ -19,7 +19,7 @@ from tests.cli.cell_folder import QUICK, SHORT, CellFolder, copy_cell
 from tests.cli.commands import Outcome, Start, run_command, started_in
 from tests.cli.terminal import Terminal
 from tests.made_once import made_once
-from tests.small_cell import FEW_CHOICES, bound_roughly
+from tests.small_cell import FEW_CHOICES
 
 
 @pytest.fixture
@@ -75,13 +75,7 @@ def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def rough_bound(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compare designs in this process with a bound that is searched roughly."""
-    bound_roughly(monkeypatch)
-
-
-@pytest.fixture
-def few_candidates(monkeypatch: pytest.MonkeyPatch, rough_bound: None) -> None:
+def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choose among few poses in this process, and check the plan on few; neither is under test."""
     monkeypatch.setattr(search_effort, "EFFORT", FEW_CHOICES)
 

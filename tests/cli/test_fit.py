@@ -15,8 +15,6 @@ from hexacell.kinematics.mechanisms.hexaglide import Hexaglide, hexaglide_geomet
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.csv_file import HEADER
 
-pytestmark = pytest.mark.usefixtures("rough_bound")
-
 SHAPES = {"S": (6, 3), "B": (6, 3), "l": (6,)}
 
 

@@ -9,7 +9,6 @@ from pydantic import BeforeValidator
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.checks.check_result import CheckResult
 from hexacell.checks.quick_level import QuickAccuracy
-from hexacell.design.design_efficiency import DesignEfficiency
 from hexacell.results.result import ExpectedImprovement, IdentificationResult
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.verdict.acceptance_gates import AcceptanceGate
@@ -43,7 +42,6 @@ class Identified(Frozen):
     ``held_out`` are measured at each point before and after, ``held_out_after`` only after: the robot
     cannot take them safely before it is calibrated. ``improvement`` is none where the robot can reach none
     of the task poses. ``quick`` is how well the quick level knows the robot; none in other runs.
-    ``design`` is how much the records know beside those of the best design; none in older runs.
     """
 
     kind: Literal["identified"] = "identified"
@@ -52,7 +50,6 @@ class Identified(Frozen):
     held_out_after: tuple[tuple[SixNumbers, ...], ...] = ()
     improvement: ExpectedImprovement | None = None
     quick: QuickAccuracy | None = None
-    design: DesignEfficiency | None = None
 
 
 class Proposed(Frozen):

@@ -11,8 +11,6 @@ from hexacell.campaign.decisions import CampaignState, StartPoint
 from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, are_counted, pilot_number, with_pilots
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.stopping_rules import StoppingRules
-from hexacell.design.continuous_design.optimality import DOptimality
-from hexacell.design.design_efficiency import CampaignMeasure
 from hexacell.identification.estimator import estimate_online
 from hexacell.measurements.records import MeasurementSet
 from tests.hexacell.campaign.conftest import Campaign
@@ -123,18 +121,3 @@ def test_records_that_do_not_determine_the_robot_reach_no_target_with_them(make_
     few = next(state for count, state in by_records.items() if count >= 10)
     assert rules.end_of_point(few, few.point or 0) is None, "24 equations of records, 60 with them"
     assert "within 100" in (rules.end_of_point(by_records[15], 2) or "")
-
-
-def test_a_point_of_a_reference_alone_neither_adds_to_a_design_nor_breaks_its_bound(
-    two_points, campaign
-) -> None:
-    """As where no pose surely kept the ball inside the travel."""
-    records = campaign[-1].state.measurements.records
-    first = MeasurementSet(tuple(one for one in records if one.point == 1))
-    both = MeasurementSet((*first.records, next(one for one in records if one.id == (2, 1))))
-    bounds = []
-    for measured in (first, both):
-        found = estimate_online(two_points.robot.problem(measured))
-        measure = CampaignMeasure.of(two_points.robot.belief(found), found)
-        bounds.append(measure.efficiency(DOptimality(), measure.bound(DOptimality())))
-    assert bounds[1].value == pytest.approx(bounds[0].value, rel=0.04)

@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
-from hexacell.design.design_efficiency import DesignEfficiency, Efficiency
 from hexacell.measurements.records import MeasurementSet
 from hexacell.study import design_trials
 from hexacell.study.design_records import ChosenRecords, OrientationChoice, chosen_records
@@ -23,11 +22,10 @@ def outcome(trial: DesignTrial) -> DesignOutcome:
     """Errors that grow with the robot's number, the noise, and the choice's place in the list."""
     factor = 1 + list(OrientationChoice).index(trial.choice)
     error = factor * (trial.number + 1) * trial.noise_mm
-    rated = DesignEfficiency(Efficiency(0.8, 0.97), Efficiency(0.5, 0.98)) if trial.rates else None
     accuracies = tuple(
         RecordsAccuracy(11 * points, error, 0.1 * error, 0.01 * error) for points in (2, 3, 4, 5)
     )
-    return DesignOutcome(accuracies, 4.0, 0, rated)
+    return DesignOutcome(accuracies, 4.0, 0)
 
 
 def study(robots: int):
@@ -45,9 +43,6 @@ def test_each_figure_is_of_its_own_trials() -> None:
     assert found.noise_ratio == pytest.approx(
         {"best fixed": 2.0, "sifted random": 3.0, "random": 4.0, "paper": 5.0}
     )
-    assert found.efficiency is not None
-    assert (found.efficiency.robots, found.efficiency.certificate) == (3, 0.97)
-    assert found.efficiency.d == pytest.approx(0.8 * 0.97)
 
 
 def test_sweeps_have_fewer_robots_and_none_is_calibrated_twice() -> None:
@@ -77,7 +72,6 @@ def test_robots_that_are_not_identified_are_counted() -> None:
 def test_the_study_is_shown() -> None:
     found = study(2)
     assert max(len(line) for part in design_lines(found) for line in part.splitlines()) <= 80
-    assert "D-efficiency of 0.78 at the median" in " ".join(" ".join(design_lines(found)).split())
     picture = design_picture(found)
     assert picture.startswith("<svg ")
     assert picture == design_picture(found)
@@ -85,7 +79,7 @@ def test_the_study_is_shown() -> None:
 
 def test_outcomes_are_kept_as_json_and_come_back() -> None:
     kept = TypeAdapter(DesignOutcome)
-    one = outcome(DesignTrial(0, rates=True))
+    one = outcome(DesignTrial(0))
     assert kept.validate_json(kept.dump_json(one)) == one
 
 

@@ -1,1 +1,0 @@
-"""Continuous (approximate) designs: the most information that records could have, with a certificate."""

@@ -19,7 +19,7 @@ KEYS = (
     "converged termination iterations records points residual_rms_mm chi2 dof geometry sigma covariance "
     "undetermined outliers frame expected_chi2 identifies parameters findings verdict goodness "
     "points_predicted noise "
-    "measured_noise repeatability correlated accuracy uncertainty design refused possible_causes "
+    "measured_noise repeatability correlated accuracy uncertainty refused possible_causes "
     "beyond_tolerance"
 )
 

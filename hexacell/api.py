@@ -15,13 +15,42 @@ Lengths are mm, angles in files deg. Errors are :class:`HexacellError`, with a m
 next action. Nothing here moves a robot.
 """
 
-from hexacell.cell.loader import Cell, load_cell
-from hexacell.errors import HexacellError
-from hexacell.measurements.csv_file import read_measurements
-from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.services.history.reported_run import ReportedRun, reported_run
-from hexacell.services.offline import NextPose, fit_measurements, next_pose
-from hexacell.verdict.assessment import Assessment
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hexacell.cell.loader import Cell, load_cell
+    from hexacell.errors import HexacellError
+    from hexacell.measurements.csv_file import read_measurements
+    from hexacell.measurements.records import MeasurementSet, Record
+    from hexacell.services.history.reported_run import ReportedRun, reported_run
+    from hexacell.services.offline import NextPose, fit_measurements, next_pose
+    from hexacell.verdict.assessment import Assessment
+else:
+    _MODULES = {
+        "Assessment": "verdict.assessment",
+        "Cell": "cell.loader",
+        "HexacellError": "errors",
+        "MeasurementSet": "measurements.records",
+        "NextPose": "services.offline",
+        "Record": "measurements.records",
+        "ReportedRun": "services.history.reported_run",
+        "fit_measurements": "services.offline",
+        "load_cell": "cell.loader",
+        "next_pose": "services.offline",
+        "read_measurements": "measurements.csv_file",
+        "reported_run": "services.history.reported_run",
+    }
+
+    def __getattr__(name):  # noqa: ANN001, ANN202 - not seen by type checkers, which see the imports above
+        """Import a name when it is first used: whoever fits records does not wait for the rest."""
+        if name not in _MODULES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        found = globals()[name] = getattr(import_module(f"hexacell.{_MODULES[name]}"), name)
+        return found
+
 
 __all__ = [
     "Assessment",

@@ -11,7 +11,8 @@ from hexacell.cell.loader import Cell
 from hexacell.errors import FileError
 from hexacell.runs.archived_documents import folder_stamps
 from hexacell.runs.run_folder import runs_folder
-from hexacell.services.history.past_runs import PastRun, past_runs
+from hexacell.services.history.past_runs import past_runs
+from hexacell.services.history.run_index import PastRun
 from hexacell.verdict.decision import Verdict
 
 

@@ -21,7 +21,8 @@ from hexacell.runs.run_folder import find_run, new_run
 from hexacell.screen.backend import RESUME, WITH_LENGTH
 from hexacell.screen.child_process import run_child
 from hexacell.screen.workplace import Preflight, TriedPlan
-from hexacell.services.history.past_runs import PastRun, compare_runs, parameter_trends, past_runs
+from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
+from hexacell.services.history.run_index import PastRun
 from hexacell.services.preflight.plan_draft import PlanPreview
 from hexacell.services.preflight.security_warnings import exposure_warnings
 from hexacell.services.recorded.journal_soundness import require_sound

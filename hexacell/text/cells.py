@@ -17,7 +17,7 @@ from hexacell.services.history.cell_status import (
     UnreadableCell,
     is_overdue_now,
 )
-from hexacell.services.history.past_runs import PastRun
+from hexacell.services.history.run_index import PastRun
 from hexacell.text.changes import legs_text
 from hexacell.text.history import error_text
 from hexacell.verdict.decision import Verdict

@@ -11,8 +11,8 @@ from xml.etree.ElementTree import Element, SubElement, indent, register_namespac
 from drivers.interfaces import DeviceIdentity
 from hexacell import __version__
 from hexacell.errors import UsageError
-from hexacell.services.history.past_runs import judged_accuracy
 from hexacell.services.history.reported_run import ReportedRun
+from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.text.parameters import rows_of_run
 from hexacell.text.report.report import (
     certificate_of,

@@ -11,8 +11,8 @@ from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPo
 from hexacell.dry_run.checks import QuickTrial
 from hexacell.results.run_comparison import ParameterTrend, RunComparison
 from hexacell.services.history.drift_history import DriftHistory, FoundChange
-from hexacell.services.history.past_runs import PastRun
 from hexacell.services.history.retention import Retention
+from hexacell.services.history.run_index import PastRun
 from hexacell.services.offline import NextPose, PlanTrial
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.services.schedule.schedules import Schedule

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hexacell.results.run_comparison import ParameterTrend, RunComparison
-from hexacell.services.history.past_runs import PastRun
 from hexacell.services.history.retention import Retention
+from hexacell.services.history.run_index import PastRun
 from hexacell.text.layout import wrapped
 from hexacell.text.parameters import parameter_table, rows_of_changes
 

@@ -18,8 +18,8 @@ from hexacell.runs.archived_documents import DocumentKind, StampedDocument
 from hexacell.runs.cell_lock import lock_holder
 from hexacell.runs.run_folder import runs_folder
 from hexacell.services.history.drift_history import DriftHistory, drift_history
-from hexacell.services.history.past_runs import PastRun, RunSummary, past_runs
-from hexacell.services.history.run_index import RunIndex
+from hexacell.services.history.past_runs import past_runs
+from hexacell.services.history.run_index import PastRun, RunIndex, RunSummary
 from hexacell.verdict.decision import Verdict
 
 CLOCKS_DIFFER = timedelta(minutes=5)

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hexacell.cell.loader import Cell
-from hexacell.checks.change_alarm import machine_causes
-from hexacell.drift.change_attribution import AttributedChange
-from hexacell.drift.drift_watch import StepAlarm, WatchResult, watch_runs
-from hexacell.drift.steady_drift import steady_drift_of_each
 from hexacell.kinematics.parameters import GeometricParameter
-from hexacell.results.run_comparison import DAY_S
-from hexacell.robot.model import robot_of
 from hexacell.runs.archived_documents import DocumentKind
 from hexacell.runs.run_folder import RunFolder
-from hexacell.services.history.run_evidence_document import EvidenceDocument, evidence_document
-from hexacell.services.history.run_index import RunIndex
+from hexacell.services.history.run_index import EvidenceDocument, RunIndex
 from hexacell.storage.atomic_files import sha256
+
+if TYPE_CHECKING:
+    from hexacell.drift.change_attribution import AttributedChange
+    from hexacell.drift.drift_watch import StepAlarm, WatchResult
+
+DAY_S = 86_400.0
 
 LEAST_DAYS = 3.0
 """Between the first and the last of some runs: what they say of shorter times is not said of a month."""
@@ -97,6 +97,11 @@ def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
     runs = _counted_runs(cell, index or RunIndex(cell))
     if not runs:
         return DriftHistory((), (), (), ())
+    # Imported here: a cell without runs needs nothing of the watch.
+    from hexacell.checks.change_alarm import machine_causes  # noqa: PLC0415
+    from hexacell.drift.drift_watch import watch_runs  # noqa: PLC0415
+    from hexacell.robot.model import robot_of  # noqa: PLC0415
+
     causes = machine_causes(robot_of(cell), len(runs[-1].evidence.weighted))
     days = [(run.at - runs[0].at).total_seconds() / DAY_S for run in runs]
     watched = watch_runs([run.evidence for run in runs], causes, days)
@@ -126,6 +131,8 @@ def _rates(
     first = watched.since.first
     if days[-1] - days[first] < LEAST_DAYS:
         return ()
+    from hexacell.drift.steady_drift import steady_drift_of_each  # noqa: PLC0415 - likewise
+
     found = steady_drift_of_each(watched.since.before, [run.evidence for run in runs[first:]], days[first:])
     is_steady = np.abs(found.scores) > found.limit
     numbers = zip(found.rates.tolist(), found.sigmas.tolist(), is_steady.tolist(), strict=True)
@@ -141,6 +148,8 @@ def _counted_runs(cell: Cell, index: RunIndex) -> list[EvidenceDocument]:
     settings = cell.settings
 
     def read(folder: RunFolder) -> EvidenceDocument | None:
+        from hexacell.services.history.run_evidence_document import evidence_document  # noqa: PLC0415
+
         return evidence_document(settings, folder)
 
     # What the noise or the effects are stated to be decides what the records say.

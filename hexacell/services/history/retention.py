@@ -17,8 +17,9 @@ from pathlib import Path
 from hexacell.cell.loader import Cell
 from hexacell.config.pending_write import held_config
 from hexacell.runs.run_folder import runs_folder
-from hexacell.services.history.past_runs import PastRun, is_applied_later, past_runs
-from hexacell.services.history.run_index import RunIndex
+from hexacell.services.history.past_runs import past_runs
+from hexacell.services.history.run_index import PastRun, RunIndex
+from hexacell.services.history.run_summary import is_applied_later
 from hexacell.storage.atomic_files import os_error_to_file_error
 
 LEAVING = ".leaving-"

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import base64
 from dataclasses import dataclass
-from datetime import datetime
-from typing import Self
 
 import numpy as np
 
-from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
 from hexacell.checks.change_alarm import leg_expansion, machine_records
-from hexacell.drift.run_evidence import RunEvidence
 from hexacell.errors import HexacellError
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.runs.run_folder import RunFolder
+from hexacell.services.history.run_index import EvidenceDocument
 from hexacell.services.recorded.journal_soundness import require_sound
 from hexacell.services.recorded.recorded_robot import started_robot
 from procedures.calibration.workflow import Calibration, Mode
@@ -29,40 +25,6 @@ from procedures.run.steps import Phase
 
 REFERENCE_C = 20.0
 """The temperature at which legs with thermometers have the lengths that runs are compared by."""
-
-
-class EvidenceDocument(Frozen):
-    """The evidence of one run, which ended ``at``; arrays as base64 of IEEE 754 doubles, little endian.
-
-    ``information`` has the upper triangle, row by row. The first ``free`` numbers of the state are the free
-    parameters, the others shared causes. ``celsius`` is the mean of all thermometers.
-    """
-
-    at: datetime
-    celsius: float | None
-    free: int
-    information: str
-    weighted: str
-
-    @classmethod
-    def of(cls, at: datetime, celsius: float | None, free: int, evidence: RunEvidence) -> Self:
-        """The document of an evidence."""
-        upper = evidence.information[np.triu_indices(len(evidence.weighted))]
-        return cls(
-            at=at,
-            celsius=celsius,
-            free=free,
-            information=_encoded(upper),
-            weighted=_encoded(evidence.weighted),
-        )
-
-    @property
-    def evidence(self) -> RunEvidence:
-        """The evidence again."""
-        weighted = _decoded(self.weighted)
-        upper = np.zeros((len(weighted), len(weighted)))
-        upper[np.triu_indices(len(weighted))] = _decoded(self.information)
-        return RunEvidence(upper + np.triu(upper, 1).T, weighted)
 
 
 def evidence_document(settings: CellSettings, folder: RunFolder) -> EvidenceDocument | None:
@@ -144,11 +106,3 @@ def _expansion(settings: CellSettings, counted: _CountedRun) -> Array:
     geometry = settings.mechanism.convention.geometry(counted.free)
     warmer = legs_warmer(settings.thermometers, counted.samples, [REFERENCE_C] * LEGS)
     return leg_expansion(geometry, settings.uncertainty.expansion_legs_um_m_k, warmer)
-
-
-def _encoded(values: Array) -> str:
-    return base64.b64encode(values.astype("<f8").tobytes()).decode()
-
-
-def _decoded(text: str) -> Array:
-    return np.frombuffer(base64.b64decode(text), dtype="<f8").astype(np.float64)

@@ -6,13 +6,19 @@ be used at all, everything is read from the folders.
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
-from typing import TYPE_CHECKING, TypeVar
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING, Self, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
+from hexacell.cell.fields import Frozen
 from hexacell.cell.loader import Cell
+from hexacell.kinematics.rotations import Array
 from hexacell.runs.archived_documents import (
     ArchiveUnavailable,
     DocumentKind,
@@ -20,8 +26,11 @@ from hexacell.runs.archived_documents import (
     folder_stamps,
 )
 from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.verification import VerifiedAccuracy
 
 if TYPE_CHECKING:
+    from hexacell.drift.run_evidence import RunEvidence
     from hexacell.runs.archive import Archive
 
 BATCH = 100
@@ -31,6 +40,88 @@ NOTHING = b""
 """What is kept of a run that has no such document."""
 
 Document = TypeVar("Document", bound=BaseModel)
+
+
+class RunSummary(Frozen):
+    """What a run was, by its folder alone: what the archive keeps of it.
+
+    Attributes:
+        began, ended: when its first and its last event were written, UTC.
+        mode: check, quick, optimise or length; empty where its journal cannot be read.
+        verdict: none where there is none.
+        accuracy: the errors at the task poses that the verdict is on; none where there is no such verdict.
+        line: how it ended, in words; why its journal cannot be read, if it cannot.
+        has_result: whether it identified a geometry of its own, with which no other result took part.
+        is_over: whether it has ended; one that has not can be resumed.
+        written_sha256: fingerprint of the controller's config as it wrote it; none where it wrote none.
+        has_written: whether it wrote the config at all, whatever was undone.
+        has_proposal: whether it has a proposal that is not in the config, and can be applied.
+        has_begun: whether it began at all; one that was refused each time did not.
+    """
+
+    began: datetime | None = None
+    ended: datetime | None = None
+    mode: str = ""
+    records: int = 0
+    verdict: Verdict | None = None
+    accuracy: VerifiedAccuracy | None = None
+    line: str = ""
+    has_result: bool = False
+    is_over: bool = False
+    written_sha256: str | None = None
+    has_written: bool = False
+    has_proposal: bool = False
+    has_begun: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class PastRun:
+    """One run of a cell; ``is_in_controller``: whether the controller's config is the one that it wrote."""
+
+    folder: RunFolder
+    summary: RunSummary
+    is_in_controller: bool = False
+
+    @property
+    def name(self) -> str:
+        """The name of its folder."""
+        return self.folder.path.name
+
+
+class EvidenceDocument(Frozen):
+    """The evidence of one run, which ended ``at``; arrays as base64 of IEEE 754 doubles, little endian.
+
+    ``information`` has the upper triangle, row by row. The first ``free`` numbers of the state are the free
+    parameters, the others shared causes. ``celsius`` is the mean of all thermometers.
+    """
+
+    at: datetime
+    celsius: float | None
+    free: int
+    information: str
+    weighted: str
+
+    @classmethod
+    def of(cls, at: datetime, celsius: float | None, free: int, evidence: RunEvidence) -> Self:
+        """The document of an evidence."""
+        upper = evidence.information[np.triu_indices(len(evidence.weighted))]
+        return cls(
+            at=at,
+            celsius=celsius,
+            free=free,
+            information=_base64(upper),
+            weighted=_base64(evidence.weighted),
+        )
+
+    @property
+    def evidence(self) -> RunEvidence:
+        """The evidence again."""
+        from hexacell.drift.run_evidence import RunEvidence  # noqa: PLC0415 - only where runs are watched
+
+        weighted = _doubles(self.weighted)
+        upper = np.zeros((len(weighted), len(weighted)))
+        upper[np.triu_indices(len(weighted))] = _doubles(self.information)
+        return RunEvidence(upper + np.triu(upper, 1).T, weighted)
 
 
 class RunIndex:
@@ -122,3 +213,11 @@ def _decoded(model: type[Document], kept: StampedDocument | None, stamp: str) ->
 def _encoded(document: BaseModel | None, stamp: str) -> StampedDocument:
     content = NOTHING if document is None else document.model_dump_json().encode()
     return StampedDocument(stamp, content)
+
+
+def _base64(values: Array) -> str:
+    return base64.b64encode(values.astype("<f8").tobytes()).decode()
+
+
+def _doubles(text: str) -> Array:
+    return np.frombuffer(base64.b64decode(text), dtype="<f8").astype(np.float64)

@@ -13,7 +13,8 @@ from hexacell.cell.loader import Cell
 from hexacell.cell.operation import Occasion
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, HexacellError
 from hexacell.services.history.cell_status import next_calibration_due
-from hexacell.services.history.past_runs import judged_accuracy, past_runs
+from hexacell.services.history.past_runs import past_runs
+from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.services.schedule.unattended_runs import raised_alarm
 from hexacell.verdict.decision import Verdict

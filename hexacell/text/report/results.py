@@ -13,8 +13,8 @@ import numpy as np
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.kinematics.rotations import Array
 from hexacell.results.run_comparison import compare_results
-from hexacell.services.history.past_runs import require_result
 from hexacell.services.history.reported_run import ReportedRun
+from hexacell.services.history.run_summary import require_result
 from hexacell.text.identification import SMALLEST_BUDGET_LINE_MM
 from hexacell.text.parameters import ParameterRow, rows_of_changes, rows_of_run
 from hexacell.text.planning import quick_accuracy_sentences

@@ -6,8 +6,8 @@ In the order and words of ISO/IEC 17025:2017, 7.8, where they apply.
 from __future__ import annotations
 
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.services.history.past_runs import judged_accuracy
 from hexacell.services.history.reported_run import ReportedRun
+from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.text.report.pages import Block, Chapter, Facts, Paragraph, Table, Tone
 from hexacell.text.verdict import not_checked, scale_lines, teaching_sentence
 from hexacell.uncertainty.statement import COVERAGE_FACTOR

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hexacell.cell.model import CellSettings
-from hexacell.services.history.past_runs import PastRun
+from hexacell.services.history.run_index import PastRun
 from hexacell.text.events import event_text
 from hexacell.text.history import NO_RUNS, history_head, history_line
 from hexacell.text.parameters import parameter_table, rows_of_run

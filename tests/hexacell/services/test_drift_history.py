@@ -11,7 +11,8 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.history import drift_history as module
 from hexacell.services.history.drift_history import DriftHistory, drift_history
-from hexacell.services.history.run_evidence_document import EvidenceDocument, evidence_document
+from hexacell.services.history.run_evidence_document import evidence_document
+from hexacell.services.history.run_index import EvidenceDocument
 from hexacell.text.changes import change_sentence, watch_text
 from tests.hexacell.services.proposed_runs import a_cell
 from tests.hexacell.services.recorded_nights import Nights

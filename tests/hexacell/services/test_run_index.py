@@ -40,7 +40,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         names.append(path.parent.name)
         return read_entries(path)
 
-    monkeypatch.setattr("hexacell.services.history.past_runs.read_entries", noted)
+    monkeypatch.setattr("hexacell.services.history.run_summary.read_entries", noted)
     return names
 
 

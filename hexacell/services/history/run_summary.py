@@ -1,0 +1,118 @@
+"""What a run was and found, read from its folder: its summary, its result, the accuracy that it judged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hexacell.config.receipt import RECEIPT, Receipt
+from hexacell.errors import HexacellError, UsageError
+from hexacell.results.result import IdentificationResult
+from hexacell.runs.run_folder import RunFolder, StartAttempts, read_attempts
+from hexacell.services.history.run_index import RunSummary
+from hexacell.services.write_back.proposals import later_approval
+from hexacell.verdict.verification import VerifiedAccuracy
+from procedures.journal.journal import read_entries, read_journal
+from procedures.journal.line_format import Entry
+from procedures.run import events
+from procedures.run.state import RunState, fold
+
+
+def run_summary(folder: RunFolder) -> RunSummary:
+    """The summary of a run, by its folder alone; why it cannot be read, where it cannot."""
+    try:
+        if not folder.journal.is_file() and (attempts := read_attempts(folder)) is not None:
+            return _summary_of_attempts(attempts)
+        entries = read_entries(folder.journal)
+    except HexacellError as error:
+        return RunSummary(line=str(error))
+    if not entries:
+        return RunSummary(line="its journal is empty")
+    state = fold(entry.event for entry in entries)
+    return RunSummary(
+        began=entries[0].at,
+        ended=entries[-1].at,
+        mode="" if state.started is None else state.started.mode,
+        records=sum(len(measured.samples) for measured in state.sets.values()),
+        verdict=None if state.judged is None else state.judged.verdict,
+        accuracy=judged_accuracy(state.judged),
+        line=_last_line(entries, state),
+        has_result=result_of_its_own(state) is not None,
+        is_over=state.ended is not None,
+        written_sha256=_written_sha256(folder),
+        has_written=(folder.path / RECEIPT).is_file(),
+        has_proposal=_has_open_proposal(folder, state),
+    )
+
+
+def _summary_of_attempts(refused: StartAttempts) -> RunSummary:
+    """Of a run that never began."""
+    first, last = refused.attempts[0].at, refused.last.at
+    return RunSummary(
+        began=first, ended=last, mode=refused.mode, line=refused.line, is_over=True, has_begun=False
+    )
+
+
+def is_applied_later(folder: RunFolder) -> bool:
+    """Whether a run's proposal was applied after it; also where the note of that is damaged."""
+    try:
+        return later_approval(folder) is not None
+    except HexacellError:
+        return True
+
+
+def state_of(folder: RunFolder) -> RunState:
+    """The state of a run as far as it got; empty where its journal cannot be read."""
+    try:
+        return fold(read_journal(folder.journal))
+    except HexacellError:
+        return RunState()
+
+
+def result_of_its_own(state: RunState) -> IdentificationResult | None:
+    """What its records alone identified; none where nothing was identified, and none of the quick level.
+
+    That of the quick level has the errors of the result that it started from: the two are no two witnesses.
+    """
+    is_quick = state.started is not None and state.started.mode == "quick"
+    return None if state.identified is None or is_quick else state.identified.result
+
+
+def require_result(state: RunState, run: str) -> IdentificationResult:
+    """What the records of a run alone identified; raises ``UsageError`` where there is no such result."""
+    result = result_of_its_own(state)
+    if result is None:
+        raise UsageError(
+            f"the run {run} identified no geometry of its own", action="Name calibrations, which do"
+        )
+    return result
+
+
+def judged_accuracy(judged: events.ResultValidated | None) -> VerifiedAccuracy | None:
+    """The errors at the task poses that a verdict is on; none where there is no such verdict."""
+    if judged is None:
+        return None
+    if judged.verification is not None:
+        return judged.verification.accuracy
+    return None if judged.check is None else judged.check.accuracy
+
+
+def _last_line(entries: Sequence[Entry], state: RunState) -> str:
+    if state.ended is not None:
+        return state.ended.line
+    last = entries[-1].event
+    reason = last.reason if isinstance(last, events.Interrupted) else "it is going on, or was killed"
+    return f"not over: {reason}"
+
+
+def _has_open_proposal(folder: RunFolder, state: RunState) -> bool:
+    """Whether what a run proposed was not written, or undone by the run itself."""
+    is_in_use = state.committed is not None and not state.rolled_back
+    is_applied = is_in_use or is_applied_later(folder)
+    return state.proposed is not None and folder.proposal.is_file() and not is_applied
+
+
+def _written_sha256(folder: RunFolder) -> str | None:
+    try:
+        return Receipt.of(folder.path).sha256_after
+    except HexacellError:
+        return None

@@ -13,8 +13,8 @@ from hexacell.config.write_back import commit
 from hexacell.runs.archive import INDEX, Archive
 from hexacell.runs.archived_documents import DocumentKind, StampedDocument
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.services.history.past_runs import PastRun, past_runs
-from hexacell.services.history.run_index import RunIndex
+from hexacell.services.history.past_runs import past_runs
+from hexacell.services.history.run_index import PastRun, RunIndex
 from procedures.journal.journal import Journal, read_entries
 from procedures.journal.line_format import Entry
 from procedures.run import events

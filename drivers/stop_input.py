@@ -14,8 +14,7 @@ from pathlib import Path
 import serial
 
 from drivers.interfaces import DeviceIdentity
-from drivers.serial.opening import opening_errors
-from drivers.serial.port import close_port
+from drivers.serial.opening import close_port, opening_errors
 from hexacell.cell.measuring import GuardSettings
 from hexacell.errors import HexacellError
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import threading
 import time
@@ -10,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from operator import itemgetter
-from typing import Self
 
 from hexacell.errors import FileError
 
@@ -41,11 +41,6 @@ class TraceEntry:
     direction: TrafficDirection
     data: bytes
 
-    @classmethod
-    def now(cls, line: str, direction: TrafficDirection, data: bytes) -> Self:
-        """Of bytes that are transferred at this moment."""
-        return cls(time.time(), line, direction, data)
-
     def __str__(self) -> str:
         """One line of text: time, line, direction, the bytes in hexadecimal and as characters."""
         return (
@@ -55,6 +50,30 @@ class TraceEntry:
 
 TraceRecorder = Callable[[TraceEntry], None]
 """Receives entries in the thread of a line; it must neither block nor raise."""
+
+_log = logging.getLogger("drivers.wire")
+
+
+class LineRecord:
+    """Passes the bytes of one line to a recorder, if there is one, and to the log (DEBUG)."""
+
+    def __init__(self, line: str, recorder: TraceRecorder | None) -> None:
+        self._line = line
+        self._recorder = recorder
+
+    @property
+    def is_on(self) -> bool:
+        """Whether anybody wants the bytes."""
+        return self._recorder is not None or _log.isEnabledFor(logging.DEBUG)
+
+    def add(self, direction: TrafficDirection, data: bytes) -> None:
+        """Record bytes that are transferred at this moment."""
+        if not data or not self.is_on:
+            return
+        entry = TraceEntry(time.time(), self._line, direction, data)
+        if self._recorder is not None:
+            self._recorder(entry)
+        _log.debug("%s", entry)
 
 
 class WireTrace:

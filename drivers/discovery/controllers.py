@@ -6,8 +6,9 @@ import asyncio
 from contextlib import suppress
 from dataclasses import dataclass
 
+from drivers.discovery import USUAL, SearchTimeouts
+
 LINUXCNCRSH_PORT = 5007
-TIMEOUT_S = 2.0
 GREETING = b"hello EMC hexacell 1.0\r\n"
 
 
@@ -20,10 +21,12 @@ class FoundController:
     greeting: str
 
 
-async def search_controller(host: str, port: int = LINUXCNCRSH_PORT) -> FoundController | None:
-    """The controller at an address; none if nothing answers there, or something else does."""
+async def search_controller(
+    host: str, port: int = LINUXCNCRSH_PORT, timeouts: SearchTimeouts = USUAL
+) -> FoundController | None:
+    """The controller at an address; None if nothing answers there, or something else does."""
     with suppress(OSError, TimeoutError):
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(timeouts.controller):
             reader, writer = await asyncio.open_connection(host, port)
             try:
                 writer.write(GREETING)

@@ -1,6 +1,7 @@
 """Which CAN adapters are there, and what is on a bus.
 
-It is listened to for a while, for encoders that are no CANopen nodes; then each of 127 node ids is asked.
+The bus is listened to for a while, for encoders that are not CANopen nodes; then each of 127 node ids is
+asked.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import Any
 
 import can
 
+from drivers.discovery import USUAL, SearchTimeouts
 from drivers.encoders.can_bus import EncoderBus, is_canopen
 from drivers.encoders.canopen_node import EncoderNode, Leg
 from drivers.encoders.object_dictionary import (
@@ -27,15 +29,10 @@ from drivers.encoders.object_dictionary import (
     DeviceType,
 )
 from drivers.errors import BusError
-from drivers.serial.port import NoAnswer, SerialPort
+from drivers.serial.port import SerialPort
+from drivers.serial.request_port import NoAnswer
 from hexacell.errors import HexacellError
 from hexacell.kinematics.parameters import JointUnit
-
-TIMEOUT_S = 0.5
-FIRST_RESPONSE_S = 2.0
-"""Longest wait for an adapter, and for the first node: on a busy computer they take their time."""
-
-LISTEN_S = 1.0
 
 SLCAN_LINE = {"baudrate": 115200}
 SLCAN_QUESTION = b"\rV\r"
@@ -44,104 +41,23 @@ SLCAN_VERSION = re.compile(rb"\a*V[0-9A-Fa-f]{4}\r")
 NETWORK_DEVICES = Path("/sys/class/net")
 ARPHRD_CAN = "280"
 """The type of a CAN interface (linux/if_arp.h)."""
+MAX_IDENTIFIERS = 64
+"""Identifiers of frames that are kept: a vehicle's bus has some hundreds."""
+NODE_SERVICES = (0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700)
+"""Identifiers to which a node adds its id (CiA 301, predefined connection set)."""
+BROADCASTS = (0x000, 0x080, 0x100)
+"""Identifiers of NMT, SYNC and TIME."""
 
 
 @dataclass(frozen=True, slots=True)
 class FoundNode:
-    """A CANopen node that answers. ``step``: nm a count, or counts a turn; none if it does not tell."""
+    """A CANopen node that answers. ``step``: nm a count, or counts a turn; None if it is not reported."""
 
     node: int
     description: str
     serial_number: int | None = None
     step: int | None = None
     unit: JointUnit | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class BusFindings:
-    """What is on a bus, or why it cannot be used. ``frames`` came by themselves, and of no such node."""
-
-    bus: Mapping[str, Any]
-    nodes: tuple[FoundNode, ...] = ()
-    frames: tuple[FoundFrame, ...] = ()
-    problem: str = ""
-
-
-def socketcan_interfaces() -> tuple[str, ...]:
-    """The CAN interfaces of the kernel."""
-    found = []
-    for device in sorted(NETWORK_DEVICES.glob("*")):
-        with suppress(OSError):
-            if (device / "type").read_text().strip() == ARPHRD_CAN:
-                found.append(device.name)
-    return tuple(found)
-
-
-def speaks_slcan(port: str) -> bool:
-    """Whether a CAN adapter with the slcan protocol answers on a serial port; it is asked its version."""
-    line = SerialPort(port, SLCAN_LINE, threading.Event())
-    with closing(line), suppress(HexacellError, NoAnswer):
-        line.open()
-        return SLCAN_VERSION.fullmatch(line.exchange(SLCAN_QUESTION, b"\r", FIRST_RESPONSE_S)) is not None
-    return False
-
-
-def search_bus(bus: Mapping[str, Any]) -> BusFindings:
-    """What sends by itself on a bus, and the nodes that answer, by node id."""
-    overheard = OverheardFrames()
-    try:
-        with closing(EncoderBus(bus, threading.Event(), accepts=overheard.accepts)) as opened:
-            return _findings(bus, opened, overheard)
-    except HexacellError as error:
-        return BusFindings(bus, problem=str(error))
-
-
-def _findings(bus: Mapping[str, Any], opened: EncoderBus, overheard: OverheardFrames) -> BusFindings:
-    try:
-        opened.listen(LISTEN_S)
-        frames = overheard.counted(LISTEN_S)
-        ids = responding_nodes(opened)
-        nodes = tuple(_described(opened, node) for node in ids)
-    except BusError as error:
-        raise BusError(
-            error.problem,
-            subject=opened.name,
-            action="Check cable and termination, or try another bit rate",
-        ) from error
-    return BusFindings(bus, nodes, of_no_node(frames, ids))
-
-
-def responding_nodes(bus: EncoderBus) -> list[int]:
-    """The nodes that respond to a question to each: until no further one does for a while."""
-    scanner = bus.network.scanner
-    scanner.search()
-    bus.wait_for(lambda: bool(scanner.nodes), FIRST_RESPONSE_S)
-    while bus.wait_for(lambda known=set(scanner.nodes): set(scanner.nodes) != known, TIMEOUT_S):  # type: ignore[misc]
-        pass
-    return sorted(set(scanner.nodes))
-
-
-def _described(bus: EncoderBus, number: int) -> FoundNode:
-    node = EncoderNode(Leg(0, number), bus, TIMEOUT_S)
-    kind = node.read_optional(DEVICE_TYPE)
-    if kind not in set(DeviceType):
-        profile = "" if kind is None else f", profile {kind & 0xFFFF}; encoders are {ENCODER_PROFILE}"
-        return FoundNode(number, f"no encoder that is known{profile}")
-    device = DeviceType(kind)
-    entries = [UNITS_PER_TURN] if device.unit is JointUnit.DEG else [MEASURING_STEP_SETTING]
-    steps = (node.read_optional(entry) for entry in (*entries, MEASURING_STEP))
-    step = next((value for value in steps if value is not None), None)
-    return FoundNode(number, device.description, node.read_optional(SERIAL_NUMBER), step, device.unit)
-
-
-MAX_IDENTIFIERS = 64
-"""So many are kept: a vehicle's bus has some hundreds."""
-
-OF_A_NODE = (0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700)
-"""Identifiers that a node adds its id to (CiA 301, predefined connection set)."""
-
-OF_ALL_NODES = (0x000, 0x080, 0x100)
-"""NMT, SYNC and TIME."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +77,16 @@ class FoundFrame:
     changes: bool
 
 
+@dataclass(frozen=True, slots=True)
+class BusFindings:
+    """What is on a bus, or why it cannot be used. ``frames`` came unasked, from no such node."""
+
+    bus: Mapping[str, Any]
+    nodes: tuple[FoundNode, ...] = ()
+    frames: tuple[FoundFrame, ...] = ()
+    problem: str = ""
+
+
 @dataclass(slots=True)
 class _Heard:
     latest: bytes
@@ -178,29 +104,99 @@ class OverheardFrames:
     def accepts(self, message: can.Message) -> bool:
         """Keep a frame; whether it is one for a CANopen network."""
         if message.is_rx and not message.is_remote_frame:
+            key, data = (message.arbitration_id, message.is_extended_id), bytes(message.data)
             with self._lock:
-                self._keep(message)
+                if key in self._heard or len(self._heard) < MAX_IDENTIFIERS:
+                    one = self._heard.setdefault(key, _Heard(data))
+                    one.changes = one.changes or data != one.latest
+                    one.latest, one.count = data, one.count + 1
         return is_canopen(message)
 
     def counted(self, seconds: float) -> tuple[FoundFrame, ...]:
-        """Those that were heard until now, in ``seconds``, by identifier."""
+        """The frames that were heard until now, in ``seconds``, by identifier."""
         with self._lock:
             return tuple(
                 FoundFrame(number, is_extended, len(one.latest), one.count / seconds, one.changes)
                 for (number, is_extended), one in sorted(self._heard.items())
             )
 
-    def _keep(self, message: can.Message) -> None:
-        key, data = (message.arbitration_id, message.is_extended_id), bytes(message.data)
-        if key not in self._heard and len(self._heard) == MAX_IDENTIFIERS:
-            return
-        one = self._heard.setdefault(key, _Heard(data))
-        one.changes = one.changes or data != one.latest
-        one.latest, one.count = data, one.count + 1
 
-
-def of_no_node(frames: Collection[FoundFrame], nodes: Collection[int]) -> tuple[FoundFrame, ...]:
-    """The frames that are not of these CANopen nodes."""
-    known = {service + node for service in OF_A_NODE for node in nodes}
-    known |= set(OF_ALL_NODES if nodes else ())
+def frames_of_no_node(frames: Collection[FoundFrame], nodes: Collection[int]) -> tuple[FoundFrame, ...]:
+    """The frames that these CANopen nodes do not send: of encoders with a DBC file, perhaps."""
+    known = {service + node for service in NODE_SERVICES for node in nodes}
+    known |= set(BROADCASTS if nodes else ())
     return tuple(one for one in frames if one.is_extended or one.identifier not in known)
+
+
+def socketcan_interfaces() -> tuple[str, ...]:
+    """The CAN interfaces of the kernel."""
+    found = []
+    for device in sorted(NETWORK_DEVICES.glob("*")):
+        with suppress(OSError):
+            if (device / "type").read_text().strip() == ARPHRD_CAN:
+                found.append(device.name)
+    return tuple(found)
+
+
+def speaks_slcan(port: str, timeouts: SearchTimeouts = USUAL) -> bool:
+    """Whether a CAN adapter with the slcan protocol answers on a serial port; it is asked its version."""
+    line = SerialPort(port, SLCAN_LINE, threading.Event())
+    with closing(line), suppress(HexacellError, NoAnswer):
+        line.open()
+        return SLCAN_VERSION.fullmatch(line.exchange(SLCAN_QUESTION, b"\r", timeouts.adapter)) is not None
+    return False
+
+
+def search_bus(bus: Mapping[str, Any], timeouts: SearchTimeouts = USUAL) -> BusFindings:
+    """What sends unasked on a bus, and the nodes that answer, by node id.
+
+    Args:
+        bus: settings for ``can.Bus``.
+        timeouts: longest waits.
+    """
+    overheard = OverheardFrames()
+    try:
+        with closing(EncoderBus(bus, threading.Event(), accepts=overheard.accepts)) as opened:
+            return _findings(bus, opened, overheard, timeouts)
+    except HexacellError as error:
+        return BusFindings(bus, problem=str(error))
+
+
+def _findings(
+    bus: Mapping[str, Any], opened: EncoderBus, overheard: OverheardFrames, timeouts: SearchTimeouts
+) -> BusFindings:
+    try:
+        opened.listen(timeouts.listen)
+        frames = overheard.counted(timeouts.listen)
+        ids = responding_nodes(opened, timeouts)
+        nodes = tuple(_described(opened, node, timeouts.node) for node in ids)
+    except BusError as error:
+        raise BusError(
+            error.problem,
+            subject=opened.name,
+            action="Check cable and termination, or try another bit rate",
+        ) from error
+    return BusFindings(bus, nodes, frames_of_no_node(frames, ids))
+
+
+def responding_nodes(bus: EncoderBus, timeouts: SearchTimeouts = USUAL) -> list[int]:
+    """The nodes that respond to a question to each: until no further one does for a while."""
+    scanner = bus.network.scanner
+    scanner.search()
+    bus.wait_for(lambda: bool(scanner.nodes), timeouts.adapter)
+    while bus.wait_for(lambda known=set(scanner.nodes): set(scanner.nodes) != known, timeouts.node):  # type: ignore[misc]
+        pass
+    return sorted(set(scanner.nodes))
+
+
+def _described(bus: EncoderBus, number: int, timeout_s: float) -> FoundNode:
+    node = EncoderNode(Leg(0, number), bus, timeout_s)
+    kind = node.read_optional(DEVICE_TYPE)
+    if kind not in set(DeviceType):
+        profile = "" if kind is None else f", profile {kind & 0xFFFF}; encoders are {ENCODER_PROFILE}"
+        return FoundNode(number, f"no encoder that is known{profile}")
+    device = DeviceType(kind)
+    entries = [UNITS_PER_TURN] if device.unit is JointUnit.DEG else [MEASURING_STEP_SETTING]
+    steps = (node.read_optional(entry) for entry in (*entries, MEASURING_STEP))
+    step = next((value for value in steps if value is not None), None)
+    return FoundNode(number, device.description, node.read_optional(SERIAL_NUMBER), step, device.unit)

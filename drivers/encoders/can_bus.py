@@ -14,7 +14,7 @@ import can
 import canopen
 
 from drivers.errors import BusError
-from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
+from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
 
 SLICE_S = 0.03
 """Longest wait without a check whether it was interrupted."""
@@ -52,7 +52,7 @@ class EncoderBus:
         self.condition = threading.Condition()
         self.health_check: Callable[[], None] = lambda: None
         self._interrupted = interrupted
-        self._trace = trace
+        self._wire = LineRecord(self.name, trace)
         self._accepts = accepts or is_canopen
         self._failure: Exception | None = None
         self._error_frames: deque[float] = deque(maxlen=ERROR_FRAMES)
@@ -141,9 +141,9 @@ class EncoderBus:
             raise self._error("does not accept a frame", error) from error
 
     def _record(self, direction: TrafficDirection, message: can.Message) -> None:
-        if self._trace is not None:
+        if self._wire.is_on:
             text = f"{message.arbitration_id:03X}#{bytes(message.data).hex().upper()}"
-            self._trace(TraceEntry.now(self.name, direction, text.encode()))
+            self._wire.add(direction, text.encode())
 
     def _error(self, what: str, cause: Exception) -> BusError:
         return BusError(

@@ -17,7 +17,7 @@ from drivers.errors import BusError, InvalidSampleError, PortLost, SilentNodeErr
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from drivers.serial.adapters import adapter_at
 from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort, RefusedRequest
-from drivers.serial.port import NoAnswer
+from drivers.serial.request_port import NoAnswer
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.described_devices import ModbusEncoderSettings
 from hexacell.cell.devices import EncoderSettings

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from typing import ClassVar
 
-from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import ValueOnlyGauge
 
 VALUE_FRAME = re.compile(rb"([+\- ])(?=.{9}\d )( *\d+\.\d+) ([ \"?])[<>=? ]?([SAGD ]?) {0,2}\r")
@@ -23,6 +23,7 @@ class HeidenhainGauge(ValueOnlyGauge):
     spec: ClassVar[ProtocolSpec] = ProtocolSpec(
         "heidenhain-nd", "Heidenhain ND", LineSettings(9600, 7, "E", 2), "-      5.23  =A\r\n"
     )
+    probe: ClassVar[Probe | None] = Probe(is_last=True)  # others add STX to the question after it
     value_request = b"\x02"
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:

@@ -2,7 +2,7 @@
 
 Line 9600 8N1 as delivered. ``M0`` requests all values at once: ``M0``, then a comma, sign, three digits,
 point and decimals in mm for each amplifier from number 00 on, carriage return and line feed; ``ER,M0,nn``
-is an error (DL-RS1A manual, pages 9 to 15). Values are within 199.9999; others are none.
+is an error (DL-RS1A manual, pages 9 to 15). Values are within 199.9999; others mean no value.
 """
 
 from __future__ import annotations
@@ -11,10 +11,8 @@ import re
 from typing import ClassVar
 
 from drivers.errors import EmptyChannel
-from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import ValueOnlyGauge
-from drivers.serial.shared_port import SharedSerialPorts
-from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
 
 FRAME = re.compile(rb"M0((?:,[+-]\d{3}\.\d{1,4}){1,15})\r")
@@ -28,11 +26,9 @@ class KeyenceGauge(ValueOnlyGauge):
     spec: ClassVar[ProtocolSpec] = ProtocolSpec(
         "keyence-dl-rs1a", "Keyence DL-RS1A", LineSettings(9600), "M0,+001.2345,-000.0010\r\n"
     )
+    probe: ClassVar[Probe | None] = None  # the question stops machines: it is a G code
+    has_channels: ClassVar[bool] = True
     value_request = b"M0\r\n"
-
-    def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
-        super().__init__(settings, ports)
-        self._place = self.channel = settings.channel
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
         if error := ERROR.fullmatch(frame):
@@ -44,14 +40,14 @@ class KeyenceGauge(ValueOnlyGauge):
         match = FRAME.fullmatch(frame)
         if match is None:
             raise FrameRejected(frame)
-        values = match[1].split(b",")[1:]
-        if not 1 <= self._place <= len(values):
+        values, place = match[1].split(b",")[1:], self.settings.channel
+        if not 1 <= place <= len(values):
             raise EmptyChannel(
-                f"has channel {self._place}, where {len(values)} amplifiers answer",
+                f"has channel {place}, where {len(values)} amplifiers answer",
                 subject=self.subject,
                 action="Correct channel in the cell file: 1 for the amplifier 00",
             )
-        value = values[self._place - 1]
+        value = values[place - 1]
         shown = DisplayedValue.of(value[:1], value[1:], value, Unit.MM)
         if abs(shown.value) >= LARGEST_MM:
             raise self._at_end(f"shows {shown.text}, no value, as at an end of its travel")

@@ -25,10 +25,10 @@ class IdHGauge(ValueOnlyGauge):
     spec: ClassVar[ProtocolSpec] = ProtocolSpec(
         "mitutoyo-id-h", "Mitutoyo ID-H", LineSettings(9600), "GN01,+0016.2345\r\n"
     )
+    has_channels: ClassVar[bool] = True
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         super().__init__(settings, ports)
-        self.channel = settings.channel
         self.value_request = b"GA%02d\r\n" % settings.channel
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:

@@ -7,16 +7,16 @@ answer cannot be told from that to the next request, so the line is silent for a
 from __future__ import annotations
 
 import struct
+from typing import ClassVar
 
 from drivers.errors import WrongAnswer
 from drivers.gauges.plausibility import decimals_of
-from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import ValueOnlyGauge
 from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort
-from drivers.serial.request_port import PortFactory
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
-from hexacell.errors import DeviceError, FileError
+from hexacell.errors import DeviceError
 
 FORMATS = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
 WORD = 2
@@ -26,18 +26,15 @@ class ModbusGauge(ValueOnlyGauge):
     """A length in the registers of a Modbus device; several may share a line."""
 
     terminator = b""
-    port_factory: PortFactory = ModbusPort
+    port_factory = ModbusPort
+    probe: ClassVar[Probe | None] = None
     spec = ProtocolSpec("modbus", "Modbus register", LineSettings(19200, parity="E"), "00 01 86 a0")
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         super().__init__(settings, ports)
-        if settings.modbus is None:
-            raise FileError(
-                "does not say in which register it is",
-                subject=self.subject,
-                action="Add modbus = { register = ... } to the gauge",
-            )
-        self._modbus = settings.modbus
+        self._modbus = self._described(
+            settings.modbus, "does not say in which register it is", "modbus = { register = ... }"
+        )
         self._format = struct.Struct(FORMATS[self._modbus.type])
         self.channel = settings.place_on_line
         self.value_request = REQUEST.pack(

@@ -1,10 +1,9 @@
 """Mitutoyo MUX-10 frames: one of several indicators behind a multiplexer.
 
-Line 9600 8N1. The channel number requests its value: ``0``, channel, ``A``, sign, eight
-characters of digits and point. An
-error is three digits beginning with 9: the last is 1 if no gauge answered, 8 if the multiplexer is
-busy. The second is 1 in the sources seen; the channel is accepted too. Nothing says the unit: five
-decimals are inches. Hold, direction and preset cannot be asked for.
+Line 9600 8N1. The channel number requests its value: ``0``, channel, ``A``, sign, eight characters of
+digits and point. An error is three digits beginning with 9: the last is 1 if no gauge answered, 8 if the
+multiplexer is busy. The second is 1 in the sources seen; the channel is accepted too. Nothing says the
+unit: five decimals are inches. Hold, direction and preset cannot be asked for.
 """
 
 from __future__ import annotations
@@ -15,7 +14,14 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from drivers.errors import EmptyChannel, GaugeAtEnd, GaugeSilent, WrongAnswer
-from drivers.gauges.protocol import DisplayedValue, FrameRejected, GaugeState, LineSettings, ProtocolSpec
+from drivers.gauges.protocol import (
+    DisplayedValue,
+    FrameRejected,
+    GaugeState,
+    LineSettings,
+    Probe,
+    ProtocolSpec,
+)
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
@@ -27,7 +33,6 @@ ERROR_FRAME = re.compile(rb"9(\d)(\d)\r")
 IDENTIFICATION_FRAME = re.compile(rb"([ -~]{4,60})\r")
 NO_GAUGE = 1
 BUSY = 8
-BUSY_PAUSE_S = 0.05
 BUSY_TRIES = 20
 
 
@@ -75,14 +80,16 @@ class Mux10Gauge(SerialGauge):
     spec: ClassVar[ProtocolSpec] = ProtocolSpec(
         "mux10", "Mitutoyo MUX-10 channel", LineSettings(9600), "01A+0000.123\r"
     )
+    probe: ClassVar[Probe | None] = Probe((19200, 4800, 2400, 38400, 57600, 115200))
+    has_channels: ClassVar[bool] = True
+    busy_pause_s: ClassVar[float] = 0.05
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         super().__init__(settings, ports)
-        self.channel = settings.channel
         self.value_request = b"%d\r" % settings.channel
 
     async def read_once(self) -> GaugeReading:
-        """As :meth:`SerialGauge.read_once`; a busy multiplexer counts as a garbled answer."""
+        """The value displayed at this moment, mm; a busy multiplexer counts as a garbled answer."""
         try:
             return await super().read_once()
         except MultiplexerBusy:
@@ -97,7 +104,7 @@ class Mux10Gauge(SerialGauge):
             try:
                 return await super()._read_value()
             except MultiplexerBusy:
-                await asyncio.sleep(BUSY_PAUSE_S)
+                await asyncio.sleep(self.busy_pause_s)
         raise DeviceError(
             "its multiplexer stays busy (918)",
             subject=self.subject,

@@ -1,7 +1,8 @@
-"""What a gauge protocol defines: the serial line, the display, the settings, and its error messages."""
+"""What a gauge protocol defines: the serial line, the display, the settings, and how a search finds it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 
@@ -9,7 +10,10 @@ from drivers.errors import GaugeSilent, WrongAnswer
 from hexacell.errors import DeviceError
 
 BIT_7 = 0x80
-TERMINATOR = b"\r"  # ends every request, and is the first line end of every answer
+TERMINATOR = b"\r"
+"""Ends every request, and is the first line end of every answer."""
+INCH_DECIMALS = 5
+"""No instrument resolves 10 nm, so a display with this many decimals shows inches."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +43,22 @@ class ProtocolSpec:
     vendors: str
     line: LineSettings
     example: str
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """How a search finds gauges of a protocol on a port of which nothing is known: it opens one.
+
+    Attributes:
+        other_baud_rates: of instruments that come set to other rates than the protocol's usual one.
+        is_last: asked after all others, because instruments of other protocols mistake its question.
+        channel_of: for gauges that send unasked: the channel whose value a frame is, None for other frames.
+            The line is then listened to, and nothing is asked.
+    """
+
+    other_baud_rates: tuple[int, ...] = ()
+    is_last: bool = False
+    channel_of: Callable[[bytes], int | None] | None = None
 
 
 def silent_gauge(subject: str, port: str, timeout_s: float, *, echo: bool) -> GaugeSilent:
@@ -87,9 +107,6 @@ class ImplausibleValue(FrameRejected):
         super().__init__(frame)
 
 
-INCH_DECIMALS = 5  # no instrument resolves 10 nm, so this many decimals are inches
-
-
 class Unit(StrEnum):
     """The unit an instrument is set to."""
 
@@ -99,7 +116,7 @@ class Unit(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class DisplayedValue:
-    """A displayed number; ``unit`` is none if the answer does not name it."""
+    """A displayed number; ``unit`` is None if the answer does not name it."""
 
     value: float
     decimals: int
@@ -117,8 +134,7 @@ class DisplayedValue:
     @property
     def apparent_unit(self) -> Unit:
         """The unit named in the answer, else the one inferred from the number of decimals."""
-        guess = Unit.INCH if self.decimals >= INCH_DECIMALS else Unit.MM
-        return self.unit or guess
+        return self.unit or (Unit.INCH if self.decimals >= INCH_DECIMALS else Unit.MM)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -17,6 +18,7 @@ from drivers.gauges.protocol import (
     FrameRejected,
     GaugeState,
     ImplausibleValue,
+    Probe,
     ProtocolSpec,
     Unit,
     silent_gauge,
@@ -24,8 +26,8 @@ from drivers.gauges.protocol import (
 )
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.serial.adapters import adapter_at
-from drivers.serial.port import NoAnswer, SerialPort
-from drivers.serial.request_port import PortFactory
+from drivers.serial.port import SerialPort
+from drivers.serial.request_port import NoAnswer, RequestPort
 from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, FileError
@@ -33,10 +35,9 @@ from hexacell.errors import DeviceError, FileError
 MAX_READINGS = 12  # enough for an oscillating ball to come to rest
 MAX_REQUESTS = 3
 MORE_STATES = 2  # the settings are asked for so often again before something is wrong with them
-OTHER_DECIMALS = "Press its in/mm key, or correct resolution_mm in the cell file"
-BEYOND_TRAVEL = "Check its cable; if its zero or preset key was pressed, open it again"
 
 Parsed = TypeVar("Parsed")
+Stated = TypeVar("Stated")
 
 
 class SerialGauge(ABC):
@@ -46,6 +47,11 @@ class SerialGauge(ABC):
     that :mod:`drivers.errors` gives them; a ``ZeroVoid`` is repeated until the gauge is opened again.
 
     Attributes:
+        spec: the protocol, its line and a typical answer.
+        probe: how a search finds such gauges; None if it must not ask: the cell file describes them, or the
+            question does something.
+        has_channels: several gauges share a port, each with its ``channel``.
+        normal_modes: modes, among those that the instrument reports, in which readings are valid.
         value_request: the request for the displayed value.
         terminator: ends an answer.
         port_factory: makes the line behind its port.
@@ -53,15 +59,18 @@ class SerialGauge(ABC):
     """
 
     spec: ClassVar[ProtocolSpec]
+    probe: ClassVar[Probe | None] = Probe()
+    has_channels: ClassVar[bool] = False
     normal_modes: ClassVar[frozenset[str]] = frozenset()
     value_request: bytes
     terminator: bytes = TERMINATOR
-    port_factory: PortFactory = SerialPort
+    port_factory: type[RequestPort] = SerialPort
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         self.settings = settings
-        self.channel: int | None = None
+        self.channel: int | None = settings.channel if self.has_channels else None
         self.subject = f"gauge {settings.name}"
+        self._log = logging.getLogger(f"drivers.gauges.{settings.name}")
         self._ports = ports
         self._port: SharedSerialPort | None = None
         self._session = 0
@@ -86,25 +95,33 @@ class SerialGauge(ABC):
         """Connect, identify, and refuse inches, hold, peak modes, a low battery and other decimals.
 
         Raises:
-            DeviceError: The port or the instrument is absent, or has wrong settings.
-            FileError: The settings of the port are refused, or another gauge uses it.
+            DeviceError: the port or the instrument is absent, or has wrong settings.
+            FileError: the settings of the port are refused, or another gauge uses it.
         """
         self._state = self._void = None
         self._history.begin()
         try:
             await self._connect()
-            state = await self._read_state_when_awake()
+            try:
+                state = await self._read_state()
+            except ZeroVoid:  # the request has switched it on; it is not zeroed yet
+                self._void = None
+                state = await self._read_state()
             for _ in range(MORE_STATES):  # a damaged answer is no setting
                 if not self._unusable(state):
                     break
                 state = await self._read_state()
             self._require_usable(state)
-            await self._require_stated_resolution()
-        except BaseException:
+            if self.settings.resolution_mm is not None:  # its decimals tell inches from millimetres
+                with suppress(GaugeAtEnd):
+                    await self._read_value()
+        except BaseException as error:
+            self._log.warning("cannot be opened: %s", error)
             await self.close()
             raise
         self._state = state
         description = state.identification or self.spec.vendors
+        self._log.info("opened on port %s: %s", self.settings.port, description)
         adapter = await asyncio.to_thread(adapter_at, self.settings.port or "")
         return DeviceIdentity(self.name, self.spec.protocol, description, port=adapter)
 
@@ -124,7 +141,7 @@ class SerialGauge(ABC):
             in_step.append(readings[-1])
             if (agreed := self._history.agreed(in_step)) is not None:
                 self._history.add(agreed)
-                return _reading(agreed)
+                return GaugeReading(agreed.value, agreed.text)
         raise GaugeUnsteady(
             f"readings do not agree{self._history.limit}: {', '.join(one.text for one in readings)}",
             subject=self.subject,
@@ -135,10 +152,11 @@ class SerialGauge(ABC):
         """The value displayed at this moment, mm, from a single query."""
         self._opened_state()
         try:
-            return _reading(self._plausible(await self._ask(self.value_request)))
+            shown = self._plausible(await self._ask(self.value_request))
         except FrameRejected as rejection:
             self._require_silence()
             raise self._rejected([rejection]) from rejection
+        return GaugeReading(shown.value, shown.text)
 
     async def check(self) -> None:
         """Query the settings again; a ``ZeroVoid`` if one has changed since ``open``."""
@@ -175,21 +193,14 @@ class SerialGauge(ABC):
     def _line_settings(self) -> dict[str, object]:
         return {**asdict(self.spec.line), **self.settings.serial}
 
-    async def _read_state_when_awake(self) -> GaugeState:
-        try:
-            return await self._read_state()
-        except ZeroVoid:  # the request has switched it on; it is not zeroed yet
-            self._void = None
-            return await self._read_state()
+    def _described(self, section: Stated | None, problem: str, example: str) -> Stated:
+        """The section of the cell file that describes a gauge of this protocol."""
+        if section is None:
+            raise FileError(problem, subject=self.subject, action=f"Add {example} to the gauge")
+        return section
 
     async def _read_value(self) -> DisplayedValue:
         return await self._query(self.value_request, self._plausible)
-
-    async def _require_stated_resolution(self) -> None:
-        """Read a value, if its decimals are known beforehand: they tell inches from millimetres."""
-        if self.settings.resolution_mm is not None:
-            with suppress(GaugeAtEnd):
-                await self._read_value()
 
     def _plausible(self, frame: bytes) -> DisplayedValue:
         """The value in an answer, which is in mm and fits to those before; raises as ``_parse_value``."""
@@ -197,9 +208,11 @@ class SerialGauge(ABC):
         if shown.apparent_unit is Unit.INCH:
             raise self._inch()
         if reason := self._history.other_decimals(shown):
-            raise ImplausibleValue(frame, self._wrong_setting(reason, OTHER_DECIMALS))
+            action = "Press its in/mm key, or correct resolution_mm in the cell file"
+            raise ImplausibleValue(frame, self._wrong_setting(reason, action))
         if reason := self._history.beyond_travel(shown):
-            raise ImplausibleValue(frame, WrongAnswer(reason, subject=self.subject, action=BEYOND_TRAVEL))
+            action = "Check its cable; if its zero or preset key was pressed, open it again"
+            raise ImplausibleValue(frame, WrongAnswer(reason, subject=self.subject, action=action))
         self._history.keep_decimals(shown)
         return shown
 
@@ -224,16 +237,18 @@ class SerialGauge(ABC):
             is_lone_line_end = bool(beside_echo) and not echo  # the answer before it was lost
             if beside_echo.strip() or is_lone_line_end:
                 raise FrameRejected(beside_echo) from missing
+            self._log.warning("no answer to %r within %g s", request, self.settings.timeout_s)
             raise silent_gauge(self.subject, port.url, self.settings.timeout_s, echo=echo) from missing
 
     def _require_silence(self) -> None:
         self._open_port().require_silence()
 
     def _rejected(self, rejections: Sequence[FrameRejected]) -> DeviceError:
-        """The error for a request whose answers were all rejected: what the most of them say.
+        """The error for a request whose answers were all rejected: what most of them say.
 
         A damaged digit looks like another resolution once; an instrument in inches does so each time.
         """
+        self._log.warning("rejected: %s", ", ".join(repr(one.frame) for one in rejections))
         implausible = [one for one in rejections if isinstance(one, ImplausibleValue)]
         if 2 * len(implausible) > len(rejections):
             return implausible[-1].error
@@ -247,7 +262,7 @@ class SerialGauge(ABC):
             raise error
 
     def _unusable(self, state: GaugeState) -> WrongSetting | None:
-        """Why readings in these settings are wrong; none if they are not."""
+        """Why readings in these settings are wrong; None if they are right."""
         if state.unit is Unit.INCH:
             return self._inch()
         if state.hold:
@@ -268,6 +283,7 @@ class SerialGauge(ABC):
 
     def _voided(self, problem: str) -> ZeroVoid:
         """The error to raise, now and by every later reading until it is opened again."""
+        self._log.warning("%s: its zero is void", problem)
         self._void = ZeroVoid(problem, subject=self.subject, action="Open it again and zero it again")
         return self._void
 
@@ -290,12 +306,11 @@ class SerialGauge(ABC):
         return self._port
 
 
-def _reading(shown: DisplayedValue) -> GaugeReading:
-    return GaugeReading(shown.value, shown.text)
-
-
 class ValueOnlyGauge(SerialGauge):
-    """Its unit, where the value tells it, and its decimals are all that can be checked."""
+    """A gauge of which only the displayed value can be asked.
+
+    Its unit, where the value names it, and its decimals are all that can be checked.
+    """
 
     async def _read_state(self) -> GaugeState:
         try:

@@ -49,7 +49,7 @@ class StreamingGauge(ValueOnlyGauge):
         """Whose frame it is."""
 
     async def read(self) -> GaugeReading:
-        """As :meth:`drivers.gauges.serial_gauge.SerialGauge.read`, of values that came afterwards."""
+        """The displayed value, mm, as soon as readings agree that all came afterwards."""
         self._begin()
         return await super().read()
 
@@ -59,7 +59,7 @@ class StreamingGauge(ValueOnlyGauge):
         return await super().read_once()
 
     async def check(self) -> None:
-        """As :meth:`drivers.gauges.serial_gauge.SerialGauge.check`; only what every value tells."""
+        """Compare what every value shows, unit and decimals, with what it was at ``open``."""
         self._begin()
         await super().check()
 
@@ -110,4 +110,4 @@ class StreamingGauge(ValueOnlyGauge):
         )
 
     def _require_silence(self) -> None:
-        """There is none."""
+        """Nothing: frames that come unasked are told apart by their time."""

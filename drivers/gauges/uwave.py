@@ -11,10 +11,8 @@ from __future__ import annotations
 import re
 from typing import ClassVar
 
-from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec, Unit
 from drivers.gauges.streaming import Origin, StreamingGauge
-from drivers.serial.shared_port import SharedSerialPorts
-from hexacell.cell.devices import GaugeSettings
 
 VALUE_FRAME = re.compile(rb"DT1(\d{4})([+-])(?=.{11}[MI])(\d+\.\d+)([MI])")
 HEADER = re.compile(rb"DT1(\d{4})")
@@ -23,7 +21,7 @@ UNITS = {b"M": Unit.MM, b"I": Unit.INCH}
 
 
 def channel_of(frame: bytes) -> int | None:
-    """The channel whose value a frame is; none if it is no value, to the last byte."""
+    """The channel whose value a frame is; None if it is no value, to the last byte."""
     match = VALUE_FRAME.fullmatch(frame)
     return None if match is None else int(match[1])
 
@@ -34,11 +32,9 @@ class UwaveGauge(StreamingGauge):
     spec: ClassVar[ProtocolSpec] = ProtocolSpec(
         "uwave", "Mitutoyo U-WAVE", LineSettings(57600), "DT10002-0000000.001M\r"
     )
+    probe: ClassVar[Probe | None] = Probe(channel_of=channel_of)
+    has_channels: ClassVar[bool] = True
     usual_delay_s: ClassVar[float] = 0.5  # its radio, and the transmitter's own interval
-
-    def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
-        super().__init__(settings, ports)
-        self.channel = settings.channel
 
     def _origin(self, frame: bytes) -> Origin:
         if header := HEADER.match(frame):

@@ -2,7 +2,7 @@
 
 The section ``visa`` of the gauge says what is asked for a value, what a unit of it is, and which settings
 the instrument must have. Numbers are those of SCPI-99, volume 1, 7.2.1: 9.9E37 is infinity, 9.91E37 is
-none.
+no number.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 from drivers.errors import PortLost, WrongSetting
 from drivers.gauges.plausibility import decimals_of
@@ -23,18 +23,19 @@ from drivers.gauges.protocol import (
     FrameRejected,
     GaugeState,
     LineSettings,
+    Probe,
     ProtocolSpec,
     Unit,
 )
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.libraries import optional
+from drivers.serial.framing import FRAME_LIMIT
 from drivers.serial.opening import SLICE_S, lost_port
-from drivers.serial.port import FRAME_LIMIT, NoAnswer
-from drivers.serial.request_port import LibraryPort, PortFactory
+from drivers.serial.request_port import WORST_LATENCY_S, NoAnswer, RequestPort
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.wire_trace import TraceRecorder, TrafficDirection
 from hexacell.cell.devices import GaugeSettings
-from hexacell.errors import DeviceError, FileError
+from hexacell.errors import DeviceError
 
 EXTRA = "visa"
 PURE_PYTHON = "@py"
@@ -53,7 +54,7 @@ INFINITE = 9.9e37
 NO_NUMBER = 9.91e37
 
 
-class VisaPort(LibraryPort):
+class VisaPort(RequestPort):
     """One VISA resource; ``settings`` are ``backend`` and, of a serial one, those of the line.
 
     Sockets and serial lines are read byte by byte, so that closing never waits long, and are silent for
@@ -67,7 +68,7 @@ class VisaPort(LibraryPort):
         settings: Mapping[str, object],
         closing: threading.Event,
         recorder: TraceRecorder | None = None,
-        worst_latency_s: float = 2.0,
+        worst_latency_s: float = WORST_LATENCY_S,
     ) -> None:
         super().__init__(url, settings, closing, recorder, worst_latency_s)
         self._is_stream = any(word in url.upper() for word in BYTE_STREAMS)
@@ -76,12 +77,7 @@ class VisaPort(LibraryPort):
         self._gap_s = SURPLUS_S
 
     def open(self) -> int:
-        """Open the resource unless it is open; how often it has been opened.
-
-        Raises:
-            UsageError: PyVISA is not installed.
-            PortLost: the resource cannot be opened.
-        """
+        """Open the resource unless it is open; how often it has been opened."""
         self.require_not_closed()
         if self._resource is None:
             self._visa = optional("pyvisa", EXTRA, self.subject)
@@ -91,12 +87,7 @@ class VisaPort(LibraryPort):
         return self.open_count
 
     def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
-        """Send ``request``; its answer up to ``terminator``.
-
-        Raises:
-            NoAnswer: none came in time.
-            PortLost: the resource is not open, or was lost.
-        """
+        """Send ``request``; its answer up to ``terminator``."""
         self.require_not_closed()
         if self._resource is None:
             raise lost_port(self.subject, self.url, "it is not open", "Connect it")
@@ -204,27 +195,19 @@ class VisaPort(LibraryPort):
 class VisaGauge(SerialGauge):
     """A length that an instrument with SCPI measures."""
 
+    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
+        "visa", "instrument with SCPI", LineSettings(9600), "+1.23450000E-03\n"
+    )
+    probe: ClassVar[Probe | None] = None
     terminator = b"\n"
-    port_factory: PortFactory = VisaPort
+    port_factory = VisaPort
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         super().__init__(settings, ports)
-        if settings.visa is None:
-            raise FileError(
-                "does not say what is asked",
-                subject=self.subject,
-                action="Add visa = { ask = ... } to the gauge",
-            )
-        self._visa = settings.visa
+        self._visa = self._described(settings.visa, "does not say what is asked", "visa = { ask = ... }")
         self.channel = settings.channel if self._visa.has_channel else None
         self.value_request = self._visa.question(settings.channel).encode("latin-1") + b"\n"
         self._decimals = decimals_of(settings.resolution_mm or 0.001)
-        self._spec = ProtocolSpec("visa", "instrument with SCPI", LineSettings(9600), "+1.23450000E-03\n")
-
-    @property
-    def spec(self) -> ProtocolSpec:  # type: ignore[override]
-        """Of the instrument; its line is that of the cell file."""
-        return self._spec
 
     def _line_settings(self) -> dict[str, object]:
         return {**self.settings.serial, "backend": self._visa.backend}

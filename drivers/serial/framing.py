@@ -1,4 +1,4 @@
-"""Frames among received bytes."""
+"""Frames among received bytes: of answers, and of a line that sends unasked."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import re
 from collections import deque
 from dataclasses import dataclass
 
-LINE_ENDS = b"\r\n\0"  # and the NUL bytes that lines put before a frame when they are switched
-LINE_END_BYTES = frozenset({b"\r", b"\n", b"\0"})
+LINE_ENDS = b"\r\n\0"
+"""Ends of lines, and the NUL bytes that lines put before a frame when they are switched."""
+LINE_END = re.compile(rb"[\r\n\0]+")
+LOG_LENGTH = 256
+FRAME_LIMIT = 256
 
 
 def cut_frame(received: bytes, request: bytes, terminator: bytes) -> tuple[bytes, bytes] | None:
@@ -19,7 +22,7 @@ def cut_frame(received: bytes, request: bytes, terminator: bytes) -> tuple[bytes
     """
     body = received.lstrip(LINE_ENDS).removeprefix(request).lstrip(LINE_ENDS)
     words = request.rstrip(LINE_ENDS)
-    if words and body[len(words) :][:1] in LINE_END_BYTES:
+    if words and LINE_END.match(body, len(words)):
         body = body.removeprefix(words).lstrip(LINE_ENDS)
     head, end, rest = body.partition(terminator)
     return (head + end, rest) if end else None
@@ -28,11 +31,6 @@ def cut_frame(received: bytes, request: bytes, terminator: bytes) -> tuple[bytes
 def is_copies(surplus: bytes, frame: bytes) -> bool:
     """Whether ``surplus`` is nothing, or ``frame`` once more or several times."""
     return not surplus.replace(frame, b"").strip(LINE_ENDS) if frame else not surplus.strip(LINE_ENDS)
-
-
-LINE_END = re.compile(rb"[\r\n\0]+")
-LOG_LENGTH = 256
-FRAME_LIMIT = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +50,12 @@ class StreamedFrame:
 class FrameLog:
     """The latest frames. Bytes that nobody read for a while are as old as the last look at the line.
 
-    A frame that comes twice at once is one: a copy confirms nothing.
+    A frame that comes twice at once is one: a copy confirms nothing. ``count`` is how many there were.
     """
 
     def __init__(self) -> None:
+        self.count = 0
         self._frames: deque[StreamedFrame] = deque(maxlen=LOG_LENGTH)
-        self._count = 0
         self._begun = b""
         self._begun_after_s = 0.0
 
@@ -69,8 +67,8 @@ class FrameLog:
         before = b""
         for line in lines:
             if line and line != before:
-                self._count += 1
-                self._frames.append(StreamedFrame(self._count, self._begun_after_s, line))
+                self.count += 1
+                self._frames.append(StreamedFrame(self.count, self._begun_after_s, line))
             before = line or before
             self._begun_after_s = came_after_s
         self._begun = begun[-FRAME_LIMIT:]
@@ -78,8 +76,3 @@ class FrameLog:
     def after(self, number: int) -> tuple[StreamedFrame, ...]:
         """The frames after one, oldest first."""
         return tuple(frame for frame in tuple(self._frames) if frame.number > number)
-
-    @property
-    def count(self) -> int:
-        """How many frames there were."""
-        return self._count

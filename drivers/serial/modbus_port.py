@@ -17,8 +17,7 @@ from typing import Any
 from drivers.libraries import optional
 from drivers.serial.framing import is_copies
 from drivers.serial.opening import lost_port, opened_port
-from drivers.serial.port import NoAnswer
-from drivers.serial.request_port import LibraryPort
+from drivers.serial.request_port import WORST_LATENCY_S, NoAnswer, RequestPort
 from drivers.wire_trace import TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError
 
@@ -51,7 +50,7 @@ class RefusedRequest(DeviceError):
     """A device answers that it cannot do what it is asked."""
 
 
-class ModbusPort(LibraryPort):
+class ModbusPort(RequestPort):
     """One serial line with Modbus devices; ``settings`` are those of the line."""
 
     def __init__(
@@ -60,7 +59,7 @@ class ModbusPort(LibraryPort):
         settings: Mapping[str, object],
         closing: threading.Event,
         recorder: TraceRecorder | None = None,
-        worst_latency_s: float = 2.0,
+        worst_latency_s: float = WORST_LATENCY_S,
     ) -> None:
         super().__init__(url, settings, closing, recorder, worst_latency_s)
         self._line: dict[str, Any] = {name: settings[name] for name in LINE_KEYS if name in settings}
@@ -69,13 +68,7 @@ class ModbusPort(LibraryPort):
         self._received = self._frame = b""
 
     def open(self) -> int:
-        """Open the line unless it is open; how often it has been opened.
-
-        Raises:
-            UsageError: pymodbus is not installed.
-            PortLost: the line is absent, in use, or cannot be opened.
-            FileError: pyserial does not accept the URL or a setting.
-        """
+        """Open the line unless it is open; how often it has been opened."""
         self.require_not_closed()
         if self._client is None:
             self._modbus = optional("pymodbus", EXTRA, self.subject)

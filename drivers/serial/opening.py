@@ -1,4 +1,4 @@
-"""Opens a serial port with pyserial, for this program's exchanges or for those of a library."""
+"""Opens a serial port with pyserial; what it raises becomes an error with the next action."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import errno
 import termios
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import serial
 
@@ -14,11 +14,24 @@ from drivers.errors import PortLost
 from hexacell.errors import FileError
 
 SLICE_S = 0.05
+"""Longest wait, s, without a look whether the port is to be closed."""
 WRITE_SLICE_S = 0.2
 OPEN_TRIES = 20
-WITHOUT_WRITE_TIMEOUT = (
-    "rfc2217://"  # pyserial has none there, and refuses to open with one (its issue 412)
-)
+WITHOUT_WRITE_TIMEOUT = "rfc2217://"
+"""pyserial has no write time-out there, and refuses to open with one (its issue 412)."""
+
+_ABSENT = ("is absent", "Plug it in or correct port in the cell file")
+_NOT_PERMITTED = ("may not be opened by this user", "Let the user into the group that owns it")
+_IN_USE = ("is in use", "Close the other program that has it open")
+_CAUSES = {
+    errno.ENOENT: _ABSENT,
+    errno.ENODEV: _ABSENT,
+    errno.ENXIO: _ABSENT,
+    errno.EACCES: _NOT_PERMITTED,
+    errno.EPERM: _NOT_PERMITTED,
+    errno.EBUSY: _IN_USE,
+    errno.EAGAIN: _IN_USE,
+}
 
 
 def opened_port(
@@ -31,7 +44,7 @@ def opened_port(
     """The port, open; ``settings`` are those of pyserial, ``dtr`` and ``rts``. ``closing`` interrupts it.
 
     Raises:
-        PortLost: The port is absent, in use, or cannot be opened, or ``closing`` is set.
+        PortLost: the port is absent, in use, or cannot be opened, or ``closing`` is set.
         FileError: pyserial does not accept the URL or a setting.
     """
     attempts = 0
@@ -43,7 +56,9 @@ def opened_port(
             try:
                 port.open()
             except termios.error as error:
-                if attempts == OPEN_TRIES or not _refuses_parity(error):
+                # A pseudo-terminal refuses parity until its server has reset its speed: glibc's tcsetattr
+                # fails if it has nothing left to change (pyserial issue 196).
+                if attempts == OPEN_TRIES or error.args[:1] != (errno.EINVAL,):
                     raise
                 if closing.wait(SLICE_S):
                     raise PortLost(f"port {url} is closed", subject=subject) from error
@@ -62,32 +77,18 @@ def _configured(url: str, given: Mapping[str, object]) -> serial.Serial:
     return port
 
 
-def _refuses_parity(error: termios.error) -> bool:
-    """Whether a pseudo-terminal refused parity, as it does until its server has reset its speed.
-
-    glibc's ``tcsetattr`` succeeds if it changed anything at all, so the first open passes and the
-    next one, with nothing left to change, fails (pyserial issue 196).
-    """
-    return bool(error.args[:1] == (errno.EINVAL,))
-
-
-_ABSENT = ("is absent", "Plug it in or correct port in the cell file")
-_NOT_PERMITTED = ("may not be opened by this user", "Let the user into the group that owns it")
-_IN_USE = ("is in use", "Close the other program that has it open")
-
-_CAUSES = {
-    errno.ENOENT: _ABSENT,
-    errno.ENODEV: _ABSENT,
-    errno.ENXIO: _ABSENT,
-    errno.EACCES: _NOT_PERMITTED,
-    errno.EPERM: _NOT_PERMITTED,
-    errno.EBUSY: _IN_USE,
-    errno.EAGAIN: _IN_USE,
-}
+def close_port(port: serial.Serial) -> None:
+    """Close a port, even if it was lost."""
+    # pyserial's socket:// forgets its socket unclosed if the far side has reset the connection
+    connection = getattr(port, "_socket", None)
+    with suppress(OSError, termios.error):
+        port.close()
+    if connection is not None:
+        connection.close()
 
 
 def lost_port(subject: str, url: str, reason: str, action: str = "Plug it in") -> PortLost:
-    """The error for the port ``url``, which was open."""
+    """The error for a port that was open, or should be."""
     return PortLost(
         f"port {url} was lost ({reason})",
         subject=subject,
@@ -100,7 +101,7 @@ def opening_errors(subject: str, url: str) -> Iterator[None]:
     """Convert the errors of opening the port ``url``.
 
     Raises:
-        PortLost: The port is absent, in use, or cannot be opened.
+        PortLost: the port is absent, in use, or cannot be opened.
         FileError: pyserial does not accept the URL or a setting.
     """
     try:

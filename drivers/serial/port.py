@@ -9,41 +9,27 @@ from __future__ import annotations
 import termios
 import threading
 import time
-from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from math import inf
 
 import serial
 
-from drivers.errors import PortLost
-from drivers.serial.framing import LINE_ENDS, FrameLog, cut_frame, is_copies
-from drivers.serial.opening import lost_port, opened_port
+from drivers.serial.framing import FRAME_LIMIT, LINE_ENDS, FrameLog, cut_frame, is_copies
+from drivers.serial.opening import close_port, lost_port, opened_port
 from drivers.serial.parity import have_terminal_check, in_software
-from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
+from drivers.serial.request_port import WORST_LATENCY_S, NoAnswer, RequestPort
+from drivers.wire_trace import TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError
 
-WORST_LATENCY_S = 2.0
 FRAME_GAP_S = 0.1
-FRAME_LIMIT = 256
 CHUNK_LIMIT = 4096
 SILENCE_ATTEMPTS = 5  # a line may take this many times the required silence to become silent
 CAREFUL_EXCHANGES = 20  # after bytes that nobody asked for, so many wait whether a frame was the only one
 EXCHANGE_TRIES = 3
 
 
-class NoAnswer(Exception):
-    """No complete frame in time; ``received`` is what came, the echo of the request included.
-
-    Never shown to users.
-    """
-
-    def __init__(self, received: bytes) -> None:
-        self.received = received
-        super().__init__(received)
-
-
-class SerialPort:
+class SerialPort(RequestPort):
     """One serial port: requests and their responses, kept synchronized.
 
     A late response must never be taken for that of the next request. After a time-out, therefore, the
@@ -53,10 +39,7 @@ class SerialPort:
     an instrument, or a multiplexer that sends twice, would put all later responses out of step.
 
     Attributes:
-        unsolicited: bytes that came without a request or too late; the latest ones only.
-        log: what came unasked, of a device that sends by itself.
-        surplus_count: how often bytes had come before a request, copies included: the response to the one
-            before may have been such bytes.
+        log: the frames that came unasked, of a device that sends by itself.
     """
 
     def __init__(
@@ -67,32 +50,19 @@ class SerialPort:
         recorder: TraceRecorder | None = None,
         worst_latency_s: float = WORST_LATENCY_S,
     ) -> None:
-        self.url = url
-        self.subject = f"port {url}"
-        self.unsolicited: deque[bytes] = deque(maxlen=64)
-        self._settings = dict(settings)
+        super().__init__(url, settings, closing, recorder, worst_latency_s)
         self._parity = in_software(self._settings)
-        self._closing = closing
-        self._recorder = recorder
-        self._worst_latency_s = worst_latency_s
         self._port: serial.Serial | None = None
-        self.open_count = 0
         self._asked_at = 0.0
         self._last_traffic = 0.0
         self._silence_s = 0.0
         self._surplus = self._last_frame = b""
         self._careful = 0
-        self.surplus_count = 0
         self.log = FrameLog()
         self._empty_at = -inf
 
     def open(self) -> int:
-        """Open the port unless it is open and usable; how often it has been opened.
-
-        Raises:
-            DeviceError: The port is absent, in use, or refused.
-            FileError: pyserial does not accept the URL or a setting.
-        """
+        """Open the port unless it is open and usable; how often it has been opened."""
         if self._port is not None and not self._is_alive(self._port):
             self.close()
         if self._port is None:
@@ -104,13 +74,9 @@ class SerialPort:
         return self.open_count
 
     def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
-        """Send ``request``; the first complete frame after it, as :func:`cut_frame` gives it.
+        """Send ``request``; the first complete frame after it.
 
-        Raises:
-            NoAnswer: No complete frame within ``timeout_s``. The next exchange then waits until no
-                late response can come.
-            DeviceError: The port is not open, was lost, or is being closed, or the device sends
-                continuously.
+        After ``NoAnswer`` the next exchange waits until no late response can come.
         """
         if self._port is None:
             raise lost_port(self.subject, self.url, "it is not open")
@@ -144,11 +110,6 @@ class SerialPort:
         """Wait for a short silence of the line before the next request."""
         self._silence_s = max(self._silence_s, FRAME_GAP_S)
 
-    def require_not_closed(self) -> None:
-        """Raise if this program has closed the port or is closing it."""
-        if self._closing.is_set():
-            raise PortLost(f"port {self.url} is closed", subject=self.subject)
-
     def close(self) -> None:
         """Close the port; closing twice is harmless."""
         if self._port is not None:
@@ -169,7 +130,7 @@ class SerialPort:
         surplus, self._surplus = self._surplus, b""
         self._require_silence_after(surplus)
         deadline = time.monotonic() + SILENCE_ATTEMPTS * max(self._silence_s, FRAME_GAP_S)
-        while self._since_traffic_s() < self._silence_s or port.in_waiting:
+        while time.monotonic() - self._last_traffic < self._silence_s or port.in_waiting:
             if time.monotonic() > deadline:
                 raise self._not_silent()
             surplus += self._read(port)
@@ -183,7 +144,7 @@ class SerialPort:
         """Whether nothing but copies of ``frame`` comes with it, until the line is silent."""
         surplus, self._surplus = self._surplus, b""
         deadline = time.monotonic() + SILENCE_ATTEMPTS * FRAME_GAP_S
-        while self._since_traffic_s() < FRAME_GAP_S and time.monotonic() < deadline:
+        while time.monotonic() - self._last_traffic < FRAME_GAP_S and time.monotonic() < deadline:
             surplus += self._read(port)
         self._keep_unsolicited(surplus)
         if not surplus.strip(LINE_ENDS):
@@ -202,9 +163,6 @@ class SerialPort:
         if not is_copies(surplus, self._last_frame):
             self.unsolicited.append(surplus)
 
-    def _since_traffic_s(self) -> float:
-        return time.monotonic() - self._last_traffic
-
     def _frame(self, port: serial.Serial, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
         received = b""
         while len(received) <= FRAME_LIMIT and time.monotonic() < self._asked_at + timeout_s:
@@ -220,17 +178,11 @@ class SerialPort:
         self.require_not_closed()
         data = port.read(1)
         if data:
-            data += self._waiting(port)
+            while len(data) <= CHUNK_LIMIT and (count := port.in_waiting):
+                data += port.read(count)
             self._last_traffic = time.monotonic()
             self._record(TrafficDirection.RECEIVED, data)
         return data if self._parity is None else self._parity.decode(data)
-
-    def _waiting(self, port: serial.Serial) -> bytes:
-        """The bytes that are in the buffer already."""
-        data = b""
-        while len(data) < CHUNK_LIMIT and (count := port.in_waiting):
-            data += port.read(count)
-        return data
 
     def _send(self, port: serial.Serial, request: bytes) -> None:
         self.require_not_closed()
@@ -241,10 +193,6 @@ class SerialPort:
         # the response shows whether the request arrived.
         with suppress(serial.SerialTimeoutException):
             port.write(request)
-
-    def _record(self, direction: TrafficDirection, data: bytes) -> None:
-        if data and self._recorder is not None:
-            self._recorder(TraceEntry.now(self.url, direction, data))
 
     @contextmanager
     def _port_errors(self) -> Iterator[None]:
@@ -260,13 +208,3 @@ class SerialPort:
             subject=self.subject,
             action="Switch its continuous output off, or correct port and protocol in the cell file",
         )
-
-
-def close_port(port: serial.Serial) -> None:
-    """Close a port, even if it was lost."""
-    # pyserial's socket:// forgets its socket unclosed if the far side has reset the connection
-    connection = getattr(port, "_socket", None)
-    with suppress(OSError, termios.error):
-        port.close()
-    if connection is not None:
-        connection.close()

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from drivers.serial.framing import FrameLog
-from drivers.serial.port import WORST_LATENCY_S, SerialPort
-from drivers.serial.request_port import PortFactory
+from drivers.serial.port import SerialPort
+from drivers.serial.request_port import WORST_LATENCY_S, RequestPort
 from drivers.wire_trace import TraceRecorder
 from drivers.worker_thread import Result, WorkerThread
 from hexacell.errors import FileError
@@ -30,7 +30,7 @@ class SharedSerialPort:
         settings: Mapping[str, object],
         trace: TraceRecorder | None = None,
         worst_latency_s: float = WORST_LATENCY_S,
-        factory: PortFactory = SerialPort,
+        factory: type[RequestPort] = SerialPort,
     ) -> None:
         self.url = url
         self._settings = settings
@@ -143,7 +143,7 @@ class SharedSerialPorts:
         settings: Mapping[str, object],
         *,
         channel: int | None = None,
-        factory: PortFactory = SerialPort,
+        factory: type[RequestPort] = SerialPort,
     ) -> SharedSerialPort:
         """The port at ``url``, not opened yet if ``gauge`` is the first one to use it.
 

@@ -13,6 +13,8 @@ NUMBER = re.compile(  # a number as instruments send it
     r"[+-]?\d+(\.\d*)?"
 )
 
+DESCRIBED_GAUGES = frozenset({"request", "stream", "visa", "modbus"})
+"""Protocols of gauges that a section of the cell file describes, of the same name."""
 
 Wire = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[\x00-\xff]*$")]
 """Text on a line, one byte a character, which may be control characters."""

@@ -61,10 +61,6 @@ class GaugeAxis:
         return self.sign * coordinate_mm
 
 
-WITH_CHANNELS = frozenset({"mux10", "uwave", "mitutoyo-id-h", "keyence-dl-rs1a"})
-"""Protocols in which several gauges share a port."""
-
-
 class GaugeSettings(Section):
     """One dial indicator."""
 
@@ -120,12 +116,9 @@ class GaugeSettings(Section):
         return self
 
     @property
-    def shares_line(self) -> bool:
-        """Whether others may be on its port, told apart by their channels."""
-        if self.modbus is not None:
-            return True
-        described = self.stream or self.visa
-        return self.protocol in WITH_CHANNELS or (described is not None and described.has_channel)
+    def described(self) -> RequestSettings | StreamSettings | VisaSettings | ModbusSettings | None:
+        """The section that describes it; None if its driver knows all."""
+        return self.request or self.stream or self.visa or self.modbus
 
     @property
     def place_on_line(self) -> int:

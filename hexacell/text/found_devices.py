@@ -15,7 +15,6 @@ from hexacell.kinematics.parameters import JointUnit
 from hexacell.services.devices.device_diagnosis import DeviceDiagnosis, Failure, SeriesFigures
 from hexacell.services.devices.device_search import (
     LEGS,
-    UNTRIED,
     SearchFindings,
     encoder_keys,
     found_bank,
@@ -47,7 +46,7 @@ def search_lines(found: SearchFindings) -> Iterator[str]:
     for port, on_it in zip(found.ports, found.gauges, strict=True):
         yield from _port_lines(port, on_it, found.buses)
     if any(_is_silent(on_it, found.buses) for on_it in found.gauges):
-        others = ", ".join(sorted(UNTRIED - {"stream"}))
+        others = ", ".join(found.untried)
         yield f"Not tried where nothing answers: {others}, which the cell file describes (docs/drivers.md)."
     if not found.buses:
         yield "No CAN adapter: plug it in, or name a bus with --can."

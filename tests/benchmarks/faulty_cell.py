@@ -11,8 +11,8 @@ import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import simulated_instrument
-from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.bank import instrument_class
+from drivers.simulated.gauges.instruments import Indicator
 from drivers.simulated.gauges.server import LineFault
 from drivers.wire_trace import WireTrace
 from hexacell.cell.devices import GaugeSettings, LinearEncoderSettings
@@ -73,7 +73,7 @@ class FaultyCell:
             settings = GaugeSettings(name=axis, axis=axis, protocol=protocol, port=axis, timeout_s=0.5)
             indicator = Indicator(partial(self.plungers_mm.__getitem__, place), settings.travel_mm)
             self.indicators[axis] = indicator
-            self.lines[axis] = InstrumentLine(simulated_instrument(protocol, {1: indicator}), Damage())
+            self.lines[axis] = InstrumentLine(instrument_class(protocol)({1: indicator}), Damage())
             gauge = load(Group.GAUGES, protocol)(settings, self.ports)
             mounted.append(MountedGauge(gauge, settings.mounting))
         have_lines(monkeypatch, self.lines, LineTime(elsewhere_s=lambda: self.elapsed_s))

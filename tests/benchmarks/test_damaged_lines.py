@@ -21,8 +21,8 @@ import pytest
 from drivers.gauges import plausibility
 from drivers.interfaces import EncoderSample, Gauge, GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import simulated_instrument
-from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.bank import instrument_class
+from drivers.simulated.gauges.instruments import Indicator
 from drivers.wire_trace import WireTrace
 from hexacell.cell.described_devices import RequestSettings
 from hexacell.cell.devices import GaugeSettings
@@ -146,7 +146,7 @@ class Cell:
         have_lines(
             monkeypatch,
             {
-                url: InstrumentLine(simulated_instrument(protocol, some, ID_H), self.damage)
+                url: InstrumentLine(instrument_class(protocol)(some, ID_H), self.damage)
                 for url, some in by_port.items()
             },
         )

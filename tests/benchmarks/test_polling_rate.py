@@ -18,9 +18,8 @@ import pytest
 
 from drivers.interfaces import Gauge
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_instrument
-from drivers.simulated.gauges.indicator import Indicator
-from drivers.simulated.gauges.instruments import Instrument
+from drivers.simulated.gauges.bank import SimulatedGaugeBank, instrument_class
+from drivers.simulated.gauges.instruments import Indicator, Instrument
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
@@ -98,7 +97,7 @@ async def _in_process(cell: Cell, call: str, monkeypatch) -> tuple[float, float]
         by_port.setdefault(str(one.port), {})[one.channel] = Indicator(lambda: SHOWN_MM)
     lines = {}
     for one in cell.gauges:
-        instrument = simulated_instrument(one.protocol, by_port[str(one.port)])
+        instrument = instrument_class(one.protocol)(by_port[str(one.port)])
         lines[str(one.port)] = InstrumentLine(
             instrument, Damage(), latency_s=cell.latency_s, byte_s=cell.byte_s(instrument)
         )

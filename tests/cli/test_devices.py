@@ -9,11 +9,13 @@ import threading
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
 from serial.tools import list_ports
 
+from drivers.discovery import SearchTimeouts
 from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from hexacell.cell.described_devices import DbcSettings, StreamSettings, VisaSettings
@@ -22,6 +24,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import ExitCode
+from hexacell.services.devices.device_search import SearchRequest
 from tests.cli.terminal import ended, start_at
 from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 
@@ -66,10 +69,10 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulated instruments share a busy machine with other tests; real ones answer at once."""
-    monkeypatch.setattr("drivers.discovery.gauges.TIMEOUT_S", 2.0)
-    monkeypatch.setattr("drivers.discovery.encoders.TIMEOUT_S", 2.0)
-    monkeypatch.setattr("drivers.discovery.encoders.FIRST_RESPONSE_S", 30.0)
-    monkeypatch.setattr("drivers.discovery.controllers.TIMEOUT_S", 10.0)
+    longer = SearchTimeouts(gauge=2.0, node=2.0, adapter=30.0, controller=10.0)
+    monkeypatch.setattr(
+        "hexacell.cli.commands.devices.SearchRequest", partial(SearchRequest, timeouts=longer)
+    )
 
 
 @pytest.mark.usefixtures("no_ports")

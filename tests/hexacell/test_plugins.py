@@ -56,7 +56,7 @@ def test_every_kind_that_hexacell_itself_announces() -> None:
     own = {group: plugins.names(group) for group in Group}
     assert own == {
         Group.GAUGES: GAUGES,
-        Group.SIMULATED_GAUGES: (),
+        Group.SIMULATED_GAUGES: GAUGES,
         Group.ENCODERS: ("cia406", "controller", "dbc", "modbus"),
         Group.CONTROLLERS: ("linuxcncrsh",),
         Group.THERMOMETERS: ("sysfs",),

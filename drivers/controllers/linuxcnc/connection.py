@@ -22,7 +22,7 @@ from drivers.controllers.linuxcnc.protocol import (
     parse_response,
 )
 from drivers.errors import ConnectionLost, ResponseTimeout
-from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
+from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError, UsageError
 
 _CLIENT = "hexacell 1.0"
@@ -52,7 +52,7 @@ class Connection:
     ) -> None:
         self.server = ""
         self.send_turn: Callable[[], contextlib.AbstractAsyncContextManager[None]] = contextlib.nullcontext
-        self._recorder = recorder
+        self._wire = LineRecord(address.name, recorder)
         self._address = address
         self._timeouts = timeouts
         self._reader = reader
@@ -233,10 +233,8 @@ class Connection:
         return data
 
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
-        if self._recorder is None or not data:
-            return
-        data = without_passwords(data, self._address)  # traces are handed to others
-        self._recorder(TraceEntry.now(self._address.name, direction, data))
+        if self._wire.is_on:
+            self._wire.add(direction, without_passwords(data, self._address))  # traces are handed to others
 
 
 def without_passwords(data: bytes, address: Address) -> bytes:

@@ -31,7 +31,6 @@ class ModbusScales(Instrument):
 
     baudrate: ClassVar[int] = 19200
     bits_a_byte: ClassVar[int] = 11
-    at_end: ClassVar[bytes] = b""
 
     def __init__(self, described: ModbusEncoderSettings, counts: Counts, *, has_gaps: bool = True) -> None:
         super().__init__({})
@@ -62,12 +61,6 @@ class ModbusScales(Instrument):
         if None in wanted:
             return refusal(device, function)
         return answer(device, function, struct.pack(f">{number}H", *wanted))
-
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
-        """Nothing of this: it has no display."""
-        del value, inch
-        return b""
 
     def _is_silent(self, device: int) -> bool:
         return any(self._described.devices[leg - 1] == device for leg in self.silent_legs)

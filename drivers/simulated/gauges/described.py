@@ -6,8 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import ClassVar
 
-from drivers.simulated.gauges.indicator import MM_PER_INCH, Indicator
-from drivers.simulated.gauges.instruments import Instrument, SingleIndicator
+from drivers.simulated.gauges.instruments import MM_PER_INCH, Indicator, Instrument, SingleIndicator
 from hexacell.cell.described_devices import DescribedFrame, RequestSettings, StreamSettings, VisaSettings
 
 
@@ -20,11 +19,6 @@ class ByRequest(SingleIndicator):
         super().__init__(indicators)
         self._asked = request.ask.encode("latin-1")
         self._template = _Template(request)
-
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
-        """Without an example a plain number."""
-        return f"{value:+.{5 if inch else 3}f}\r".encode()
 
     def split(self, received: bytes) -> tuple[list[bytes], bytes]:
         """What it is asked need not end like a line: it may be one control character."""
@@ -46,21 +40,15 @@ class Streaming(Instrument):
     """One that sends by itself, or several behind one receiver."""
 
     period_s: ClassVar[float | None] = 0.05
-    at_end: ClassVar[bytes] = b""
 
     def __init__(self, indicators: Mapping[int, Indicator], described: StreamSettings) -> None:
         super().__init__(indicators)
         self._template = _Template(described)
 
     def answer(self, command: bytes) -> bytes:
-        """None: it does not listen."""
+        """Nothing: it does not listen."""
         del command
         return b""
-
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
-        """Without an example a plain number."""
-        return f"{value:+.{5 if inch else 3}f}\r\n".encode()
 
     def _value(self, channel: int) -> bytes:
         shown = self.indicators[channel].shown()
@@ -126,17 +114,11 @@ class Scpi(Instrument):
         if shown is None:
             return self.at_end
         mm = shown * MM_PER_INCH if self.indicators[channel].inch else shown
-        return self.format_value(channel, mm / self._settings.mm_per_unit, inch=False)
+        return b"%+.8E\n" % (mm / self._settings.mm_per_unit)
 
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
-        """Nine digits."""
-        del inch
-        return b"%+.8E\n" % value
-
-
-def visa_resource(url: str) -> str:
-    """The VISA resource of a simulated line."""
-    if match := SOCKET.fullmatch(url):
-        return f"TCPIP::{match[1]}::{match[2]}::SOCKET"
-    return f"ASRL{url}::INSTR"
+    @classmethod
+    def address(cls, url: str) -> str:
+        """The VISA resource of a line."""
+        if match := SOCKET.fullmatch(url):
+            return f"TCPIP::{match[1]}::{match[2]}::SOCKET"
+        return f"ASRL{url}::INSTR"

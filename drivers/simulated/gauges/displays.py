@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from drivers.simulated.gauges.indicator import MM_PER_INCH
-from drivers.simulated.gauges.instruments import Instrument, SingleIndicator
+from drivers.simulated.gauges.instruments import MM_PER_INCH, Instrument, SingleIndicator
 
 
 class IdH(Instrument):
     """Mitutoyo ID-H indicators in a chain, each with its number; silent at an end of the travel."""
 
-    at_end: ClassVar[bytes] = b""
+    has_channels: ClassVar[bool] = True
 
     def answer(self, command: bytes) -> bytes:
         """The value of the indicator with that number."""
@@ -50,6 +49,7 @@ class HeidenhainNd(SingleIndicator):
 class KeyenceDlRs1a(Instrument):
     """Amplifiers that answer together; their channels are counted from 1, without gaps."""
 
+    has_channels: ClassVar[bool] = True
     at_end: ClassVar[bytes] = b"+999.9999"
 
     def answer(self, command: bytes) -> bytes:
@@ -87,10 +87,10 @@ class Uwave(Instrument):
 
     baudrate: ClassVar[int] = 57600
     period_s: ClassVar[float | None] = 0.05
-    at_end: ClassVar[bytes] = b""
+    has_channels: ClassVar[bool] = True
 
     def answer(self, command: bytes) -> bytes:
-        """None: the commands of its own program are not simulated."""
+        """Nothing: the commands of its own program are not simulated."""
         del command
         return b""
 

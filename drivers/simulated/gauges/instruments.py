@@ -1,13 +1,121 @@
-"""Simulated instruments: indicators behind their protocols, of which the drivers send questions only."""
+"""Simulated dial indicators, and the bases of the instruments that are made of them, one protocol a class.
+
+An instrument is announced in the entry point group ``hexacell.simulated_gauges``, under its protocol.
+"""
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from math import copysign
 from typing import ClassVar
 
-from drivers.simulated.gauges.indicator import Indicator
+from hexacell.cell.devices import GaugeSettings
+
+MM_PER_INCH = 25.4
+PUSH_MM = 6.0
+OFF_MIDDLE_MM = 3.8
+
+PlungerPosition = Callable[[], float]
+"""The plunger position now, mm from the middle of its travel, with noise.
+
+Called from the thread of the line.
+"""
+
+
+class Indicator:
+    """One instrument. Its settings and its power are attributes.
+
+    ``held_mm`` is the value on hold, ``peak_mm`` the largest one while it shows that.
+    """
+
+    def __init__(self, plunger: PlungerPosition, travel_mm: float = 12.5) -> None:
+        self.inch = False
+        self.reversed = False
+        self.battery_low = False
+        self.preset_mm = 0.0
+        self.powered = True
+        self.held_mm: float | None = None
+        self._plunger = plunger
+        self._travel_mm = travel_mm
+        self._offset_mm = 0.0
+        self._at_end = False
+        self._jammed_mm: float | None = None
+        self.peak_mm: float | None = None
+        self._pushed_mm = 0.0
+        self._off_middle_mm = 0.0
+
+    def shown(self) -> float | None:
+        """The number on the display, mm or inch; None with the plunger at an end of its travel."""
+        value = self._live_mm() if self.held_mm is None else self.held_mm
+        if value is None:
+            return None
+        if self.peak_mm is not None:
+            value = self.peak_mm = max(self.peak_mm, value)
+        return value / MM_PER_INCH if self.inch else value
+
+    def set_hold(self, *, on: bool) -> None:
+        """Hold the display, without effect at an end of the travel; or end the hold."""
+        self.held_mm = self._live_mm() if on else None
+
+    def set_peak(self, *, on: bool) -> None:
+        """Show the largest value since then, or the present one again."""
+        self.peak_mm = self._live_mm() if on else None
+
+    def set_battery_low(self, *, on: bool) -> None:
+        """Report a low battery, or a good one."""
+        self.battery_low = on
+
+    def set_zeroed(self, *, on: bool) -> None:
+        """Press the zero key; what it did stays."""
+        if on:
+            self.recall_preset()
+
+    def recall_preset(self) -> None:
+        """Set the display to the preset value; with a preset of 0 this is the zero key."""
+        self._offset_mm += self.preset_mm - (self._live_mm() or 0.0)
+
+    def switch_on(self) -> None:
+        """Switch on: no hold, and the zero at the present plunger position."""
+        self.powered = True
+        self.set_hold(on=False)
+        self._offset_mm = 0.0
+        self._offset_mm = -(self._live_mm() or 0.0)
+
+    def set_at_end(self, *, on: bool) -> None:
+        """Move the plunger to an end of its travel, or back."""
+        self._at_end = on
+
+    def set_frozen(self, *, on: bool) -> None:
+        """Jam the plunger at its position, or free it; the instrument still answers."""
+        self._jammed_mm = self._plunger() if on else None
+
+    def set_pushed(self, *, on: bool) -> None:
+        """Push the plunger farther than a ball on its plate could, or release it."""
+        self._pushed_mm = -copysign(PUSH_MM, self._plunger()) if on else 0.0
+
+    def set_reversed(self, *, on: bool) -> None:
+        """Count in the other direction, or as it should."""
+        self.reversed = on
+
+    def set_inch(self, *, on: bool) -> None:
+        """Show inches, or mm."""
+        self.inch = on
+
+    def exchange_with(self, other: Indicator) -> None:
+        """Put each of two instruments where the other one is."""
+        self._plunger, other._plunger = other._plunger, self._plunger
+
+    def set_off_middle(self, *, on: bool) -> None:
+        """Clamp the instrument by its stem so far from where it belongs, or as it belongs."""
+        self._off_middle_mm = OFF_MIDDLE_MM if on else 0.0
+
+    def _live_mm(self) -> float | None:
+        free = self._plunger() + self._off_middle_mm + self._pushed_mm
+        position = free if self._jammed_mm is None else self._jammed_mm
+        if self._at_end or abs(position) > self._travel_mm / 2:
+            return None
+        return (-position if self.reversed else position) + self._offset_mm
 
 
 class Instrument(ABC):
@@ -18,17 +126,25 @@ class Instrument(ABC):
 
     baudrate: ClassVar[int] = 9600
     bits_a_byte: ClassVar[int] = 10  # with start, parity and stop bits
-    at_end: ClassVar[bytes]
+    at_end: ClassVar[bytes] = b""
     """The answer with the plunger at an end of its travel."""
     introduction: ClassVar[bytes] = b""
     """What it sends when it is switched on."""
     command_end: ClassVar[bytes] = b"\r"
     """Ends each command."""
     period_s: ClassVar[float | None] = None
-    """How often it sends unasked; none if it waits for a command."""
+    """How often it sends unasked; None if it waits for a command."""
+
+    has_channels: ClassVar[bool] = False
+    """Several gauges share the line, each with its channel."""
 
     def __init__(self, indicators: Mapping[int, Indicator]) -> None:
         self.indicators = dict(indicators)
+
+    @classmethod
+    def shares_line(cls, gauge: GaugeSettings) -> bool:
+        """Whether other gauges may be on the line of this one."""
+        return cls.has_channels or getattr(gauge.described, "has_channel", False)
 
     def split(self, received: bytes) -> tuple[list[bytes], bytes]:
         """Whole commands among received bytes, without their ends, and the rest."""
@@ -44,46 +160,20 @@ class Instrument(ABC):
         values = (self._value(channel) for channel, one in self.indicators.items() if one.powered)
         return tuple(value for value in values if value)
 
+    @classmethod
+    def address(cls, url: str) -> str:
+        """What the cell file names as the port of a line at ``url``."""
+        return url
+
     @staticmethod
-    @abstractmethod
     def format_value(channel: int, value: float, *, inch: bool) -> bytes:
-        """The answer with a value, mm or inch."""
+        """The answer with a value, mm or inch; for instruments whose values say what else they need."""
+        raise NotImplementedError
 
     def _value(self, channel: int) -> bytes:
         indicator = self.indicators[channel]
         shown = indicator.shown()
         return self.at_end if shown is None else self.format_value(channel, shown, inch=indicator.inch)
-
-
-class Mux10(Instrument):
-    """A multiplexer with MUX-10 frames: answers a channel number with the value of its indicator.
-
-    It answers the next ``busy`` requests with an error.
-    """
-
-    at_end: ClassVar[bytes] = b"912\r"
-
-    def __init__(self, indicators: Mapping[int, Indicator]) -> None:
-        super().__init__(indicators)
-        self.busy = 0
-
-    def answer(self, command: bytes) -> bytes:
-        """A data frame or an error; nothing if the command is no channel number and not ``V``."""
-        if command == b"V":
-            return b"MUX-10F SIMULATED\r"
-        if not command.isdigit():
-            return b""
-        if self.busy:
-            self.busy -= 1
-            return b"918\r"
-        indicator = self.indicators.get(int(command))
-        return self._value(int(command)) if indicator and indicator.powered else b"911\r"
-
-    @staticmethod
-    def format_value(channel: int, value: float, *, inch: bool) -> bytes:
-        """A data frame: eight characters of digits and point, the sign apart."""
-        sign = b"-" if value < 0 else b"+"
-        return b"0%dA%s%08.*f\r" % (channel, sign, 5 if inch else 3, abs(value))
 
 
 class SingleIndicator(Instrument):
@@ -101,132 +191,3 @@ class SingleIndicator(Instrument):
     @abstractmethod
     def _reply(self, command: str) -> bytes:
         """The answer while it is on."""
-
-
-class Sylvac(SingleIndicator):
-    """Sylvac's opto-RS duplex protocol: a command that is obeyed has no answer."""
-
-    baudrate: ClassVar[int] = 4800
-    bits_a_byte: ClassVar[int] = 11
-    at_end: ClassVar[bytes] = b"ERR3\r"
-    introduction: ClassVar[bytes] = b"SY276.1\r"
-
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
-        """A micrometre or 10 microinches are the last digit."""
-        return b"%+.*f\r" % (5 if inch else 3, value)
-
-    def _reply(self, command: str) -> bytes:
-        """Commands may be in lower case and with blanks."""
-        word = command.replace(" ", "").upper()
-        if word in {"?", "PRI"}:
-            return self._value(1)
-        if word.endswith("?"):
-            return self._settings().get(word, "ERR1").encode("ascii") + b"\r"
-        return b"" if self._obeys(word) else b"ERR1\r"
-
-    def _settings(self) -> dict[str, str]:
-        indicator = self.indicator
-        return {
-            "UNI?": "IN" if indicator.inch else "MM",
-            "ID?": "SY276",
-            "MOD?": "NOR" if indicator.peak_mm is None else "MAX",
-            "STO?": "STO0" if indicator.held_mm is None else "STO1",
-            "CHA?": "CHA-" if indicator.reversed else "CHA+",
-            "PRE?": f"PRE {indicator.preset_mm:+.3f}",
-            "BAT?": "BAT0" if indicator.battery_low else "BAT1",
-        }
-
-    def _obeys(self, word: str) -> bool:
-        """Carry out a command; whether it is one."""
-        indicator = self.indicator
-        match word:
-            case "MM" | "IN":
-                indicator.inch = word == "IN"
-            case "CHA+" | "CHA-":
-                indicator.reversed = word == "CHA-"
-            case "STO0" | "STO1":
-                indicator.set_hold(on=word == "STO1")
-            case "PRE":
-                indicator.recall_preset()
-            case "OFF":
-                indicator.powered = False
-            case _:
-                return word.startswith("PRE") and self._set_preset(word[3:])
-        return True
-
-    def _set_preset(self, number: str) -> bool:
-        try:
-            self.indicator.preset_mm = float(number)
-        except ValueError:
-            return False
-        return True
-
-
-class Cdi(SingleIndicator):
-    """The serial ASCII protocol of CDI and Starrett, with the parameters that can falsify a value."""
-
-    at_end: ClassVar[bytes] = b"OUT OF BOUNDS\r\n"
-
-    def __init__(self, indicators: Mapping[int, Indicator]) -> None:
-        super().__init__(indicators)
-        self._without_effect = {"011": 0, "040": 0}  # mode and ratio are only stored
-
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
-        """Sign, eight characters filled up with blanks, and the unit."""
-        sign = b"-" if value < 0 else b"+"
-        number = b"%8.*f" % (5 if inch else 4, abs(value))
-        return sign + number + (b", IN\r\n" if inch else b", MM\r\n")
-
-    def _reply(self, command: str) -> bytes:
-        """Parameters are asked for as ``?p013`` and set as ``p013=2``."""
-        match command:
-            case "R":
-                return self._value(1)
-            case "C":
-                self.indicator.recall_preset()
-                return b"SUCCESS\r\n"
-            case "H":
-                self.indicator.set_hold(on=self.indicator.held_mm is None)
-                return b"SUCCESS\r\n"
-        return self._parameter(command)
-
-    def _parameter(self, command: str) -> bytes:
-        match = re.fullmatch(r"(\?)?[pP](\d{3})(?:=(.*))?", command)
-        parameters = self._parameters()
-        if match is None or match[2] not in parameters:
-            return b"NOT FOUND\r\n"
-        asked, number, setting = match.groups()
-        return b"%d\r\n" % parameters[number] if asked else self._set(number, setting or "")
-
-    def _parameters(self) -> dict[str, int]:
-        indicator = self.indicator
-        peak = {} if indicator.peak_mm is None else {"011": 1}
-        return self._without_effect | {
-            "013": 1 if indicator.inch else 2,
-            "019": int(indicator.reversed),
-            "021": int(indicator.held_mm is not None),
-            **peak,
-        }
-
-    def _set(self, number: str, setting: str) -> bytes:
-        if not setting.isdigit():
-            return b"NON NUMERIC\r\n"
-        value = int(setting)
-        if value not in {"011": range(3), "013": range(1, 3)}.get(number, range(2)):
-            return b"OUT OF BOUNDS\r\n"
-        match number:
-            case "013":
-                self.indicator.inch = value == 1
-            case "019":
-                self.indicator.reversed = value == 1
-            case "021":
-                self.indicator.set_hold(on=value == 1)
-            case _:
-                self._without_effect[number] = value
-        return b"SUCCESS\r\n"
-
-
-INSTRUMENTS: dict[str, type[Instrument]] = {"sylvac": Sylvac, "mux10": Mux10, "cdi": Cdi}
-"""By the protocol in the cell file."""

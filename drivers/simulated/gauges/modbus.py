@@ -6,8 +6,7 @@ import struct
 from collections.abc import Mapping
 from typing import ClassVar
 
-from drivers.simulated.gauges.indicator import MM_PER_INCH, Indicator
-from drivers.simulated.gauges.instruments import Instrument
+from drivers.simulated.gauges.instruments import MM_PER_INCH, Indicator, Instrument
 from hexacell.cell.described_devices import ModbusSettings
 
 PACKED = {"int16": ">h", "uint16": ">H", "int32": ">i", "uint32": ">I", "float32": ">f"}
@@ -18,7 +17,7 @@ class Modbus(Instrument):
 
     baudrate: ClassVar[int] = 19200
     bits_a_byte: ClassVar[int] = 11
-    at_end: ClassVar[bytes] = b""
+    has_channels: ClassVar[bool] = True
 
     def __init__(self, indicators: Mapping[int, Indicator], settings: ModbusSettings) -> None:
         super().__init__(indicators)
@@ -49,12 +48,6 @@ class Modbus(Instrument):
         is_float = settings.type == "float32"
         data = struct.pack(PACKED[settings.type], number if is_float else round(number))
         return data[2:] + data[:2] if settings.word_order == "little" else data
-
-    @staticmethod
-    def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
-        """A micrometre a count."""
-        del inch
-        return struct.pack(">i", round(1000 * value))
 
 
 REQUEST_BYTES = 8

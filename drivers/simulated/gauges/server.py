@@ -49,6 +49,7 @@ class GaugeLineServer(Closeable):
         self.instrument = instrument
         self.faults = faults or LineFaults(late_s=0.0)
         self.url = line.url
+        self.address = instrument.address(line.url)
         self._line = line
         self._clock = clock
         self._latency_s = latency_s

@@ -1,4 +1,7 @@
-"""What is connected to this computer: serial ports with gauges, CAN buses with nodes, a controller."""
+"""What is connected to this computer, and a draft of a cell file from it.
+
+Serial ports with gauges, CAN buses with nodes, a controller.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from drivers.discovery import USUAL, SearchTimeouts
 from drivers.discovery.controllers import FoundController, search_controller
 from drivers.discovery.encoders import (
     BusFindings,
@@ -16,14 +20,13 @@ from drivers.discovery.encoders import (
     socketcan_interfaces,
     speaks_slcan,
 )
-from drivers.discovery.gauges import FoundGauge, PortFindings, search_port
+from drivers.discovery.gauges import FoundGauge, PortFindings, probe_of, search_port
 from drivers.serial.adapters import SerialPortFound, serial_ports
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.plugins import Group, load, names
-from hexacell.services.devices.first_cell import DESCRIBED, GAUGE_AXES, CellDraft, Document, FoundKeys
+from hexacell.services.devices.first_cell import GAUGE_AXES, CellDraft, Document, FoundKeys
 
-UNTRIED = DESCRIBED | {"keyence-dl-rs1a"}
-"""Protocols that are not tried: the cell file describes them, or the question stops machines (``M0``)."""
+LEGS = 6
 
 
 @dataclass(frozen=True)
@@ -31,53 +34,63 @@ class SearchRequest:
     """Where to look.
 
     Attributes:
-        ports: serial ports or pyserial URLs; none: all of this computer.
+        ports: serial ports or pyserial URLs; all of this computer if there are none.
         buses: settings of CAN buses beside those that are found.
         bitrate: of the buses that are found, bit/s.
         controller: host and port.
+        timeouts: longest waits.
     """
 
     ports: tuple[str, ...] = ()
     buses: tuple[dict[str, Any], ...] = ()
     bitrate: int = 500_000
     controller: tuple[str, int] = ("127.0.0.1", 5007)
+    timeouts: SearchTimeouts = USUAL
 
 
 @dataclass(frozen=True)
 class SearchFindings:
-    """What was found. ``ports`` are those that were looked at, also where nothing answered."""
+    """What was found.
+
+    Attributes:
+        ports: those that were looked at, also where nothing answered.
+        untried: protocols in which nothing was asked.
+    """
 
     ports: tuple[SerialPortFound, ...]
     gauges: tuple[PortFindings, ...]
     buses: tuple[BusFindings, ...]
     controller: FoundController | None
+    untried: tuple[str, ...] = ()
 
 
 async def search_devices(request: SearchRequest) -> SearchFindings:
     """Ask at every place, all ports at once; takes some seconds."""
     ports = tuple(SerialPortFound(port, port, "") for port in request.ports) or serial_ports()
-    factories = {name: load(Group.GAUGES, name) for name in names(Group.GAUGES) if name not in UNTRIED}
+    factories = {name: load(Group.GAUGES, name) for name in names(Group.GAUGES)}
     gauges, controller = await asyncio.gather(
-        asyncio.gather(*(search_port(port.port, factories) for port in ports)),
-        search_controller(*request.controller),
+        asyncio.gather(*(search_port(port.port, factories, request.timeouts) for port in ports)),
+        search_controller(*request.controller, request.timeouts),
     )
     silent = [found.port for found in gauges if not found.gauges and not found.problem]
-    return SearchFindings(ports, tuple(gauges), await _buses(request, silent), controller)
+    # Numbers that come unasked are reported in any case, and stream is what describes them.
+    untried = tuple(name for name in factories if probe_of(factories[name]) is None and name != "stream")
+    return SearchFindings(ports, tuple(gauges), await _buses(request, silent), controller, untried)
 
 
 async def _buses(request: SearchRequest, silent_ports: Sequence[str]) -> tuple[BusFindings, ...]:
     """The CAN buses: of the kernel, behind adapters on ports where no gauge answers, and those named."""
-    adapters = await asyncio.gather(*(asyncio.to_thread(speaks_slcan, port) for port in silent_ports))
+    timeouts = request.timeouts
+    adapters = await asyncio.gather(
+        *(asyncio.to_thread(speaks_slcan, port, timeouts) for port in silent_ports)
+    )
     slcan = [port for port, answers in zip(silent_ports, adapters, strict=True) if answers]
     buses: list[dict[str, Any]] = [
         *({"interface": "socketcan", "channel": name} for name in socketcan_interfaces()),
         *({"interface": "slcan", "channel": port, "bitrate": request.bitrate} for port in slcan),
         *request.buses,
     ]
-    return tuple(await asyncio.gather(*(asyncio.to_thread(search_bus, bus) for bus in buses)))
-
-
-LEGS = 6
+    return tuple(await asyncio.gather(*(asyncio.to_thread(search_bus, bus, timeouts) for bus in buses)))
 
 
 def draft_of(found: SearchFindings, path: Path) -> CellDraft:
@@ -117,7 +130,7 @@ def unknown_encoders(found: SearchFindings) -> BusFindings | None:
 
 
 def gauge_keys(gauge: FoundGauge) -> Document:
-    """What a gauge told beside its address: its channel, its line and the last digit of its display."""
+    """What a gauge reported beside its address: its channel, its line and the last digit of its display."""
     decimals = len(gauge.shown.rstrip("<=>, M").partition(".")[2])
     channel = {} if gauge.channel is None else {"channel": gauge.channel}
     line = {} if gauge.baudrate is None else {"serial": {"baudrate": gauge.baudrate}}
@@ -125,7 +138,7 @@ def gauge_keys(gauge: FoundGauge) -> Document:
 
 
 def encoder_keys(nodes: tuple[FoundNode, ...]) -> Document:
-    """What encoders told beside their ids, where all six told it: what a count is, and their numbers."""
+    """What all six encoders reported beside their ids: what a count is, and their serial numbers."""
     steps = {node.step for node in nodes}
     numbers = [node.serial_number for node in nodes]
     keys: Document = {}

@@ -13,6 +13,7 @@ import tomlkit
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.by_mechanism import cell_model
+from hexacell.cell.described_devices import DESCRIBED_GAUGES
 from hexacell.cell.loader import load_cell, validated
 from hexacell.cell.robot import DEFAULT_MECHANISM
 from hexacell.config.toml_format import NativeToml
@@ -169,9 +170,6 @@ POINT_OFFSETS = (
 HELD_OUT_OFFSETS = ((-0.5, -0.25, -0.5), (0.5, 0.5, 0.0), (0.0, -0.5, 0.25))
 """Of the ball, in units of its largest distance from the middle: as in Table 3 of the paper."""
 
-DESCRIBED = frozenset({"request", "stream", "visa", "modbus"})
-"""Protocols of gauges of which the cell file must say more than one answer does."""
-
 Document = dict[str, Any]
 Setting = Callable[[Document, str], None]
 """Puts an answer into a document; raises ``ValueError`` with what is expected."""
@@ -253,7 +251,7 @@ def _six(given: str) -> list[int]:
 
 
 def _protocol(given: str) -> str:
-    known = [name for name in names(Group.GAUGES) if name not in DESCRIBED]
+    known = [name for name in names(Group.GAUGES) if name not in DESCRIBED_GAUGES]
     if given.strip() not in known:
         raise ValueError(f"it is one of {', '.join(known)}")
     return given.strip()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from drivers.discovery.gauges import OTHER_BAUD_RATES, FoundGauge, search_port
+from drivers.discovery.gauges import FoundGauge, search_port
 from drivers.errors import GaugeSilent
+from drivers.gauges.mux10 import Mux10Gauge
+from drivers.gauges.protocol import Probe
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
@@ -43,12 +45,15 @@ class AtOneRate:
 async def test_a_multiplexer_is_asked_at_other_baud_rates_once_nothing_answers() -> None:
     class Gauge(AtOneRate):
         asked: ClassVar[list[Any]] = []
+        probe: ClassVar[Probe | None] = Mux10Gauge.probe
 
     found = await search_port(ABSENT, {"mux10": Gauge})
     assert found.gauges == (
         FoundGauge("mux10", ABSENT, "a multiplexer", None, "01A+0001.250", "", baudrate=RATE),
     )
-    assert Gauge.asked == [None, *OTHER_BAUD_RATES["mux10"][: OTHER_BAUD_RATES["mux10"].index(RATE) + 1]]
+    assert Gauge.probe is not None
+    rates = Gauge.probe.other_baud_rates
+    assert Gauge.asked == [None, *rates[: rates.index(RATE) + 1]]
 
 
 async def test_other_protocols_are_asked_at_their_own_rate_alone() -> None:

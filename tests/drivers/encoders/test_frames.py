@@ -10,7 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.discovery.encoders import MAX_IDENTIFIERS, FoundFrame, OverheardFrames, of_no_node, search_bus
+from drivers.discovery.encoders import (
+    MAX_IDENTIFIERS,
+    FoundFrame,
+    OverheardFrames,
+    frames_of_no_node,
+    search_bus,
+)
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
 
 STRANGER, EXTENDED = 0x321, 0x18FF0001
@@ -51,7 +57,7 @@ def test_a_bus_full_of_identifiers_fills_no_memory() -> None:
 @given(nodes=NODE_IDS, service=st.sampled_from([0x80, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700]))
 def test_no_frame_of_a_node_is_told(nodes: set[int], service: int) -> None:
     frames = [FoundFrame(service + node, False, 4, 1.0, changes=False) for node in range(1, 128)]
-    told = {one.identifier - service for one in of_no_node(frames, nodes)}
+    told = {one.identifier - service for one in frames_of_no_node(frames, nodes)}
     assert told == set(range(1, 128)) - nodes
 
 
@@ -94,5 +100,5 @@ def test_a_bus_of_another_bit_rate_is_told() -> None:
 @pytest.mark.parametrize("number", [0x000, 0x080, 0x100])
 def test_frames_of_all_nodes_are_told_only_where_there_are_none(number: int) -> None:
     one = FoundFrame(number, False, 0, 1.0, changes=False)
-    assert of_no_node([one], []) == (one,)
-    assert of_no_node([one], [5]) == ()
+    assert frames_of_no_node([one], []) == (one,)
+    assert frames_of_no_node([one], [5]) == ()

@@ -10,7 +10,7 @@ from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, Z
 from drivers.gauges.cdi import CdiError, CdiGauge, Parameter, parse_parameter, parse_value
 from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
-from drivers.simulated.gauges.instruments import Cdi
+from drivers.simulated.gauges.indicators import Cdi
 
 VALUE = b"+  2.1380, MM\r\n"
 PARAMETERS = {b"?p011\r": b"0\r\n", b"?p019\r": b"0\r\n", b"?p021\r": b"0\r\n", b"?p040\r": b"0\r\n"}

@@ -16,8 +16,8 @@ from drivers.gauges.mitutoyo_id_h import IdHGauge
 from drivers.gauges.protocol import FrameRejected
 from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import simulated_instrument
-from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.bank import instrument_class
+from drivers.simulated.gauges.instruments import Indicator
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, HexacellError
 
@@ -104,7 +104,7 @@ def test_what_its_twin_answers_is_read_and_damage_is_rejected_or_a_number(
     factory, protocol, question, value, noise, place
 ):
     channel = 7 if factory is IdHGauge else 1
-    twin = simulated_instrument(protocol, {channel: Indicator(lambda: value)})
+    twin = instrument_class(protocol)({channel: Indicator(lambda: value)})
     settings = GaugeSettings(name="x", axis="x", protocol=protocol, channel=channel)
     gauge = factory(settings, SharedSerialPorts())
     frame = twin.answer(question.strip(b"\r\n\x02")).partition(gauge.terminator)[0] + gauge.terminator

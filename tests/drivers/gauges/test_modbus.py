@@ -17,8 +17,8 @@ from pydantic import ValidationError
 from drivers.errors import GaugeAtEnd, GaugeSilent, PortLost
 from drivers.gauges.modbus import ModbusGauge
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_instrument
-from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.bank import SimulatedGaugeBank, instrument_class
+from drivers.simulated.gauges.instruments import Indicator
 from drivers.simulated.gauges.modbus import crc
 from drivers.wire_trace import WireTrace
 from hexacell.cell.described_devices import ModbusSettings
@@ -174,7 +174,7 @@ def test_what_the_simulated_device_holds_is_understood(count, order):
         GaugeSettings(name="x", axis="x", protocol="modbus", modbus=found), SharedSerialPorts()
     )
     indicator = Indicator(lambda: float(count), travel_mm=1e10)
-    twin = simulated_instrument("modbus", {1 << 16: indicator}, found)
+    twin = instrument_class("modbus")({1 << 16: indicator}, found)
     request = bytes.fromhex("01 04 00 00 00 02")
     assert gauge._parse_value(twin.answer(request + crc(request))[3:-2]).value == count
 

@@ -12,7 +12,7 @@ from drivers.gauges import mux10
 from drivers.gauges.mux10 import MultiplexerError, Mux10Gauge, parse_identification, parse_value
 from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
-from drivers.simulated.gauges.instruments import Mux10
+from drivers.simulated.gauges.indicators import Mux10
 from hexacell.errors import DeviceError, FileError
 
 VALUE = b"02A+0000.123\r"
@@ -35,7 +35,7 @@ async def opened(dialogue, gauge):
 
 @pytest.fixture
 def no_pause(monkeypatch):
-    monkeypatch.setattr(mux10, "BUSY_PAUSE_S", 0.0)
+    monkeypatch.setattr(Mux10Gauge, "busy_pause_s", 0.0)
 
 
 # Frames

@@ -11,8 +11,8 @@ from drivers.errors import GaugeAtEnd, WrongAnswer, WrongSetting
 from drivers.gauges.described import RequestGauge
 from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import simulated_instrument
-from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.bank import instrument_class
+from drivers.simulated.gauges.instruments import Indicator
 from hexacell.cell.described_devices import RequestSettings
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError
@@ -116,7 +116,7 @@ def test_descriptions_that_cannot_be_are_refused(change):
 @given(st.floats(-6.0, 6.0), st.sampled_from([ID_H, AMPLIFIER]))
 def test_what_the_simulated_gauge_answers_is_understood(value, description):
     request = RequestSettings(**description)
-    twin = simulated_instrument("request", {1: Indicator(lambda: value)}, request)
+    twin = instrument_class("request")({1: Indicator(lambda: value)}, request)
     settings = GaugeSettings(name="x", axis="x", protocol="request", port="wire", request=request)
     shown = RequestGauge(settings, SharedSerialPorts())._parse_value(
         twin.answer(request.ask.rstrip("\r\n").encode())
@@ -127,16 +127,14 @@ def test_what_the_simulated_gauge_answers_is_understood(value, description):
 
 def test_the_simulated_one_is_asked_by_what_is_no_line_too():
     described = RequestSettings.model_validate(ID_H | {"ask": "\x02"})
-    twin = simulated_instrument("request", {1: Indicator(lambda: 1.5)}, described)
+    twin = instrument_class("request")({1: Indicator(lambda: 1.5)}, described)
     commands, rest = twin.split(b"\x02\x02")
     assert (commands, rest) == ([b"\x02"] * 2, b"")
     assert twin.answer(commands[0]) == b"GN01,+0001.5000\r\n"
 
 
 def test_the_simulated_one_hears_a_question_that_comes_in_parts():
-    twin = simulated_instrument(
-        "request", {1: Indicator(lambda: 1.5)}, RequestSettings.model_validate(ID_H)
-    )
+    twin = instrument_class("request")({1: Indicator(lambda: 1.5)}, RequestSettings.model_validate(ID_H))
     commands, rest = twin.split(b"GA01\r")
     assert commands == []
     commands, rest = twin.split(rest + b"\n")

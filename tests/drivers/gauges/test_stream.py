@@ -11,8 +11,8 @@ from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer
 from drivers.gauges.described import StreamGauge
 from drivers.gauges.streaming import Origin
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import simulated_instrument
-from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.bank import instrument_class
+from drivers.simulated.gauges.instruments import Indicator
 from hexacell.cell.described_devices import StreamSettings
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError
@@ -106,7 +106,7 @@ def test_descriptions_that_cannot_be_are_refused(change):
 @given(st.floats(-6.0, 6.0), st.integers(1, 99), st.sampled_from([CALIPER, RECEIVER]))
 def test_what_the_simulated_gauge_sends_is_understood(value, channel, description):
     described = StreamSettings(**description)
-    [frame] = simulated_instrument("stream", {channel: Indicator(lambda: value)}, described).unasked()
+    [frame] = instrument_class("stream")({channel: Indicator(lambda: value)}, described).unasked()
     gauge = StreamGauge(
         GaugeSettings(name="x", axis="x", protocol="stream", channel=channel, stream=described),
         SharedSerialPorts(),

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.gauges.sylvac import BATTERY, IDENTIFICATION, PRESET, SylvacError, parse_value
-from drivers.simulated.gauges.instruments import Sylvac
+from drivers.simulated.gauges.indicators import Sylvac
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from drivers.serial.port import NoAnswer
+from drivers.serial.request_port import NoAnswer
 from drivers.serial.shared_port import SharedSerialPort
 from hexacell.errors import DeviceError
 from tests.drivers.serial.shared_port.fake_port import FOREVER_S, SOON_S, FakePort, opened, written

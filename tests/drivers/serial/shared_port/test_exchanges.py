@@ -3,7 +3,8 @@
 import pytest
 import serial
 
-from drivers.serial.port import FRAME_LIMIT, NoAnswer
+from drivers.serial.framing import FRAME_LIMIT
+from drivers.serial.request_port import NoAnswer
 from drivers.serial.shared_port import SharedSerialPort
 from drivers.wire_trace import TrafficDirection, WireTrace
 from hexacell.errors import DeviceError

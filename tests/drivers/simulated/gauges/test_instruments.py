@@ -2,8 +2,8 @@
 
 import pytest
 
-from drivers.simulated.gauges.indicator import Indicator
-from drivers.simulated.gauges.instruments import Cdi, Mux10, Sylvac
+from drivers.simulated.gauges.indicators import Cdi, Mux10, Sylvac
+from drivers.simulated.gauges.instruments import Indicator
 
 
 class Ball:

@@ -18,8 +18,8 @@ from drivers.gauges.sylvac import SylvacGauge
 from drivers.gauges.uwave import UwaveGauge
 from drivers.gauges.visa import VisaGauge
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_instrument
-from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.bank import SimulatedGaugeBank, instrument_class
+from drivers.simulated.gauges.instruments import Indicator
 from drivers.simulated.gauges.server import GaugeLineServer
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from hexacell.cell.devices import GaugeSettings
@@ -125,7 +125,7 @@ async def cell(*args, **kwargs):
 
 
 def served(protocol, plunger=lambda: 1.0, transport="pty", factor=FAST, name="gauge", **pace):
-    instrument = simulated_instrument(protocol, {1: Indicator(plunger)})
+    instrument = instrument_class(protocol)({1: Indicator(plunger)})
     line = PtyLine(name) if transport == "pty" else SocketLine()
     return GaugeLineServer(instrument, line, CellClock(factor), **({"latency_s": 0.02} | pace))
 

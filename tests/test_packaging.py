@@ -82,7 +82,15 @@ def test_the_wheel_announces_the_program_and_the_plugins(unpacked: Path) -> None
     announced = information(unpacked, "entry_points.txt")
     assert "[console_scripts]\nhexacell = hexacell.__main__:main" in announced
     groups = set(re.findall(r"^\[(hexacell\..*)\]$", announced, flags=re.MULTILINE))
-    names = ("gauges", "encoders", "controllers", "thermometers", "config_formats", "mechanisms")
+    names = (
+        "gauges",
+        "simulated_gauges",
+        "encoders",
+        "controllers",
+        "thermometers",
+        "config_formats",
+        "mechanisms",
+    )
     assert groups == {f"hexacell.{name}" for name in names}
 
 

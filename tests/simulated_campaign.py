@@ -47,6 +47,11 @@ class SimulatedCampaign(VirtualCampaign):
         """What is known of the robot, beside its records."""
         return self.plan.robot
 
+    @property
+    def largest_mm(self) -> float:
+        """The largest deviation on any axis."""
+        return max(float(np.abs(record.deviation).max()) for record in self.measurements.records)
+
     def _go_to_point(self, start: StartPoint) -> None:
         """Go to another point, over level poses if the straight line is not clear."""
         if not self._trail:

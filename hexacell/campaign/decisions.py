@@ -20,11 +20,11 @@ class CampaignState:
 
     Attributes:
         measurements: the records so far, in the order they were measured.
-        point: the point at which the gauges are, counted from 1; none between points.
+        point: the point at which the gauges are, counted from 1; None between points.
         done: points that are not to be measured any more.
-        present: the pose last commanded, in the controller's frames; none if it is not known.
+        present: the pose last commanded, in the controller's frames; None if it is not known.
         rejections: records of the present point that could not be taken.
-        zero_mm: what the gauges showed along base x, y, z when they were zeroed there; none if that
+        zero_mm: what the gauges showed along base x, y, z when they were zeroed there; None if that
             is not known.
         pilots: records that only steer the choice of poses.
     """
@@ -57,11 +57,11 @@ class Forecast(Frozen):
     """The predicted error at the worst task pose, 1 sigma, mm: now, after this record, at the end.
 
     Attributes:
-        now_mm: by the records so far.
-        next_mm: with the proposed record.
-        end_mm: once everything that is still planned is measured.
-        records: that are still planned, the proposed one included, and the ``minutes`` they will take.
-        systematic_mm: standard uncertainty by the systematic effects there, at the end; none where it is
+        now_mm: error by the records so far.
+        next_mm: error with the proposed record.
+        end_mm: error once everything that is still planned is measured.
+        records: number of records still planned, the proposed one included, and the ``minutes`` of them.
+        systematic_mm: standard uncertainty by the systematic effects there, at the end; None where it is
             not known.
     """
 
@@ -73,7 +73,7 @@ class Forecast(Frozen):
     systematic_mm: float | None = None
 
     def expanded_mm(self, error_mm: float) -> float | None:
-        """U (k = 2) for one of the predicted errors; none where the systematic effects are not known."""
+        """U (k = 2) for one of the predicted errors; None where the systematic effects are not known."""
         return None if self.systematic_mm is None else COVERAGE_FACTOR * hypot(error_mm, self.systematic_mm)
 
     @property
@@ -107,7 +107,7 @@ class MeasurePose:
         joints: joint variables that the controller will go to, mm.
         deviation: what the gauges should show, mm along base x, y, z, and ``sigma``.
         gain: information on the parameters, nat.
-        forecast: none where there are no task poses to predict errors at.
+        forecast: None where there are no task poses to predict errors at.
         via: poses to pass on the path without measuring, in the controller's frames.
     """
 

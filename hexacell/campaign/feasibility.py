@@ -21,13 +21,13 @@ from hexacell.robot.pose_limits import broken_limits
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 
 LARGEST_SHARE = 0.5
-"""Of these robots, that may be unable to take the reference of a point."""
+"""Share of the robots within the tolerances that may be unable to take the reference of a point."""
 
 NAMES_SHOWN = 4
 
 UNDETERMINED_SHARE = 0.25
-"""Of all parameters. If fewer stay as uncertain as drawn, the result reports them; if more, the plan is
-refused."""
+"""Share of all parameters: if fewer stay as uncertain as drawn, the result reports them; if more, the plan
+is refused."""
 
 
 def reach_failures(plan: Plan) -> Iterator[HexacellError]:
@@ -57,7 +57,7 @@ def _out_of_travel(plan: Plan, name: str, point: int, pose: Pose) -> Iterator[He
 
 
 def too_few_records(plan: Plan) -> Iterator[HexacellError]:
-    """That points, orientations and budget give fewer equations than there are parameters."""
+    """The failure that points, orientations and budget give fewer equations than there are parameters."""
     unknowns = plan.robot.unknowns
     planned = plan.forecaster.planned(CampaignState())
     equations = sum(3 * (records - 1) for records in planned.values())
@@ -98,7 +98,7 @@ def _records_needed(plan: Plan, unknowns: int) -> int:
 def optimisation_failures(plan: Plan) -> Iterator[list[HexacellError]]:
     """What prevents a plan whose poses can be reached from identifying the geometry.
 
-    Yields the failures after each part of the work, often none, so that the caller may stop in between.
+    Yields the failures after each part of the work, often an empty list: the caller may stop in between.
     """
     any_failure = False
     for found in measuring_failures(plan):
@@ -119,7 +119,7 @@ def measuring_failures(plan: Plan) -> Iterator[list[HexacellError]]:
 def unreachable_share(plan: Plan) -> dict[int, float]:
     """At each point the share of robots within the tolerances that cannot reach its reference.
 
-    Nor do those that would have a passive joint or a leg beyond its limits there.
+    Robots that would have a passive joint or a leg beyond its limits there do not reach it either.
     """
     references = plan.robot.from_commands([plan.reference_pose(point) for point in plan.points])
     robots = robots_within_tolerances(
@@ -205,7 +205,7 @@ def _expected_zero(plan: Plan, belief: RobotBelief, point: int) -> GaugeZero:
 
 
 def _undetermined_parameters(plan: Plan) -> Iterator[HexacellError]:
-    """That even well spread poses within the limits leave many parameters as uncertain as drawn."""
+    """The failure that even well spread poses leave many parameters as uncertain as drawn."""
     names = plan.robot.mechanism.convention.free_names()
     before, predicted = plan.robot.prior, plan.predicted_belief().covariance
     after = np.sqrt(np.diag(predicted))

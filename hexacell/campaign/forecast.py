@@ -67,7 +67,7 @@ class Forecaster:
     systematic_mm: Callable[[], float | None] = lambda: None
 
     def worst_error(self, state: CampaignState, belief: RobotBelief) -> float | None:
-        """The error at the worst task pose now, 1 sigma, mm; none without task poses."""
+        """The error at the worst task pose now, 1 sigma, mm; None without task poses."""
         error = self._error(state, belief)
         return None if error is None else error.worst(belief.covariance)
 
@@ -99,7 +99,7 @@ class Forecaster:
         )
 
     def _error(self, state: CampaignState, belief: RobotBelief) -> TaskError | None:
-        """At the end, with zeros alone by the records that there are and those that are planned."""
+        """The error at the end; with zeros alone by the records that there are and those planned."""
         if self.task.held is None:
             return self.task.error(belief)
         sets = self.planned_sets()
@@ -157,7 +157,7 @@ class Forecaster:
         return add_information(belief.covariance, np.sum(added, axis=0))
 
     def _information(self, belief: RobotBelief, points: frozenset[int]) -> PlannedInformation:
-        """Of the planned sets of some points; the last one is kept, for a decision asks for it twice."""
+        """The information of some points' planned sets; the last is kept, as decisions ask twice for it."""
         last = self._last_information
         if not last or last[0][0] is not belief or last[0][1] != points:
             last[:] = [(belief, points, PlannedInformation.of(self._sets_at(points), belief))]
@@ -180,9 +180,10 @@ class Forecaster:
         error: TaskError,
         point: int,
     ) -> list[tuple[float, float]]:
-        """What different numbers of records at a point would do.
+        """What different numbers of records at a point would gain.
 
-        What each record takes off the worst error, mm, and all of them off the mean square a minute.
+        For each number, what a record takes off the worst error, mm, and all of them off the mean square a
+        minute.
         """
         is_begun = state.point == point
         most = self._most(state, point, len(state.measurements), state.begun_points)
@@ -240,7 +241,7 @@ class PlannedInformation:
         return information
 
     def added(self, state: CampaignState, point: int, records: int) -> Array:
-        """What more records at a point would add; those it has count for its zero only."""
+        """The information that more records at a point add; those it has count for its zero only."""
         before = state.records_at(point)
         added = self.information(point, before + records)
         return added - self.information(point, before) if before else added

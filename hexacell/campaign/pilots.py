@@ -1,14 +1,14 @@
 """Pilot records, which steer the choice of poses while little is known of the robot, and nothing else.
 
 At the first point poses are chosen nearly blindly: only small rotations surely keep the ball inside the
-gauges' travel, and they tell little. To measure the noise the robot leaves the first reference several
-times anyway, and comes back. When it leaves it for chosen poses, and the gauges are read there, the records
-that follow tell nearly as much as if the robot were known. That a design for a nonlinear model begins with
-some runs that only make it possible is usual (Box & Hunter, Sequential Design of Experiments for Nonlinear
-Models, 1965).
+gauges' travel, and they are little informative. To measure the noise the robot leaves the first reference
+several times anyway, and comes back. When it leaves it for chosen poses, and the gauges are read there, the
+records that follow are nearly as informative as if the robot were known. That a design for a nonlinear
+model begins with some runs that only make it possible is usual (Box & Hunter, Sequential Design of
+Experiments for Nonlinear Models, 1965).
 
-Estimates while measuring take pilot records as others. The identification has none of them: they are from
-before the noise is measured, and from before it is decided of how many windows a record is the mean.
+Estimates while measuring use pilot records as others. The identification uses no pilot records: they are
+from before the noise is measured, and from before it is decided of how many windows a record is the mean.
 """
 
 from __future__ import annotations
@@ -21,17 +21,16 @@ from hexacell.kinematics.rotations import Mask
 from hexacell.measurements.records import MeasurementSet, Record
 
 FIRST_PILOT = MOST_POSES + 1
-"""The orientation of the first of them, which no record has."""
-
+"""Orientation number of the first pilot pose, which no record has."""
 
 CAUTION = 3.0
-"""By how much the noise may exceed what is stated, as far as pilot poses are concerned."""
+"""Factor by which the noise may exceed what is stated while pilot poses are chosen."""
 
 PER_DEPARTURE, MOST_PILOTS = 3, 14
 """Pilot poses before the robot comes back to the reference, and in all."""
 
 PER_DEPARTURE_TO_A_LIST, MOST_TO_A_LIST = 4, 24
-"""The same where a file lists the poses to measure: more must be known before the first of them is safe."""
+"""Where a file lists the poses to measure, more must be known before the first of them is safe."""
 
 
 def pilots_per_departure(is_listed: bool) -> int:
@@ -40,13 +39,13 @@ def pilots_per_departure(is_listed: bool) -> int:
 
 
 def most_pilots(departures: int, is_listed: bool) -> int:
-    """At how many in all, if the reference is left so often."""
+    """At how many poses in all, if the reference is left so often."""
     most = MOST_TO_A_LIST if is_listed else MOST_PILOTS
     return min(most, departures * pilots_per_departure(is_listed))
 
 
 def pilot_number(orientation: int) -> int | None:
-    """The number, from 1, of the pilot pose that an orientation means; none of another pose."""
+    """The number, from 1, of the pilot pose that an orientation means; None for another pose."""
     return orientation - MOST_POSES if orientation >= FIRST_PILOT else None
 
 

@@ -23,7 +23,7 @@ from hexacell.campaign.decisions import (
     MeasurePose,
     StartPoint,
 )
-from hexacell.campaign.forecast import Forecaster, select_sets
+from hexacell.campaign.forecast import Forecaster, PlannedInformation, select_sets
 from hexacell.campaign.online_estimate import OnlineEstimate, OnlineEstimator, RecordEstimator
 from hexacell.campaign.pilots import (
     CAUTION,
@@ -59,11 +59,11 @@ class Plan:
     """The plan of one cell.
 
     Attributes:
-        pose_list: poses to visit; none where they are to be selected.
+        pose_list: poses to visit; None where they are to be selected.
         effort: of the search for poses.
         with_forecast: whether to forecast for every record what it gains at the task poses.
-        estimator: of the robot from the records; none for the usual one.
-        goal: what the records are for; none to identify the geometry as well as the settings ask for.
+        estimator: estimates the robot from the records; None for the usual one.
+        goal: what the records are for; None to identify the geometry as well as the settings ask for.
         earlier: what the systematic effects did to an earlier result that is the prior, by their names.
         left_points: points that are not measured, counted from 1.
         most_turned: the largest angle from a point's reference to a selected pose, rad, by the estimate.
@@ -101,20 +101,27 @@ class Plan:
         return self._estimator.estimate(state.steering)
 
     def pilot_pose(self, state: CampaignState) -> MeasurePose | None:
-        """Where to read the gauges next, only to steer the choice of poses; none where that is not wanted.
+        """Where to read the gauges next, only to steer the choice of poses; None where that is not wanted.
 
-        It is, at the first point, while the robot leaves the reference to measure its noise, as long as
-        little is known of it.
+        It is wanted at the first point, while the robot leaves the reference to measure its noise, as long
+        as little is known of it.
 
         Raises:
             HexacellError: no geometry fits the records.
         """
-        is_first = state.point is not None and len(state.measurements) == 1
+        point, is_first = state.point, len(state.measurements) == 1
         most = most_pilots(self.settings.noise.revisits, self.pose_list is not None)
         is_enough = len(state.pilots) >= most or state.rejections > 0
-        if not is_first or is_enough or self.goal is not None:
+        if point is None or not is_first or is_enough or self.goal is not None:
             return None
-        return self.cautious._pilot_pose(state, state.point or 0)
+        cautious = self.cautious
+        estimate = cautious.estimate(state)
+        try:
+            if is_well_known(estimate.belief, estimate.gauge_zero(point)):
+                return None
+            return replace(cautious._next_pose(state, point), orientation=FIRST_PILOT + len(state.pilots))
+        except LimitError:
+            return None
 
     @property
     def pilots_per_departure(self) -> int:
@@ -123,7 +130,7 @@ class Plan:
 
     @cached_property
     def cautious(self) -> Plan:
-        """The same before the noise is measured, which may be larger than stated; poses are not listed."""
+        """This plan before the noise is measured, which may be larger than stated; poses are not listed."""
         robot, effort = replace(self.robot, noise=self.robot.noise.scaled(CAUTION)), self.effort
         listed = self.pose_list.at(self.points[0]) if self.pose_list is not None else ()
         turns = (listed[0].angle_to(pose) for pose in listed)
@@ -137,15 +144,6 @@ class Plan:
             most_turned=max(turns, default=np.pi),
         )
 
-    def _pilot_pose(self, state: CampaignState, point: int) -> MeasurePose | None:
-        estimate = self.estimate(state)
-        try:
-            if is_well_known(estimate.belief, estimate.gauge_zero(point)):
-                return None
-            return replace(self._next_pose(state, point), orientation=FIRST_PILOT + len(state.pilots))
-        except LimitError:
-            return None
-
     def allows_provisional(self, state: CampaignState) -> bool:
         """Whether the robot is known well enough for the controller to command with the estimate.
 
@@ -156,14 +154,12 @@ class Plan:
         if found is None:
             return False
         at_last = found.poses[[-1]], found.problem.joints[[-1]]
-        is_known = belief.orientation_sigma(*at_last) <= PROVISIONAL_SIGMA
-        return is_known and self._is_better_than_commanding(belief)
-
-    def _is_better_than_commanding(self, belief: RobotBelief) -> bool:
-        """Whether the geometry that commands errs by more at the task poses than the estimate may."""
+        if belief.orientation_sigma(*at_last) > PROVISIONAL_SIGMA:
+            return False
         error = self.task.error(belief)
         if error is None:
             return True
+        # Whether the geometry that commands errs by more at the task poses than the estimate may.
         change = belief.free - self.robot.free_parameters
         return error.largest(change) > error.worst(belief.covariance)
 
@@ -203,7 +199,7 @@ class Plan:
         return self.poses_at(point)[0]
 
     def route(self, state: CampaignState, start: Pose, end: Pose) -> tuple[Pose, ...] | None:
-        """Level poses by way of which clear lines lead from one pose to another; none if there are none.
+        """Level poses by way of which clear lines lead from one pose to another; None if there are none.
 
         Poses are in the controller's frames. The gauges are not at the ball.
         """
@@ -253,6 +249,14 @@ class Plan:
             self.robot.belief(), balls, plan.orientations, plan.seed, self.effort.planned_candidates
         )
 
+    def information_per_record(self, belief: RobotBelief) -> Array:
+        """The information (p, p), 1/mm^2, of a record of the planned sets on average."""
+        information = PlannedInformation.of(self.planned_sets, belief)
+        sizes = {point: len(self.planned_sets[point - 1]) for point in self.points}
+        total = np.sum([information.information(point, size) for point, size in sizes.items()], axis=0)
+        mean: Array = total / sum(sizes.values())
+        return mean
+
     @cached_property
     def forecaster(self) -> Forecaster:
         """Forecasts what further records gain."""
@@ -267,7 +271,7 @@ class Plan:
 
     @cached_property
     def systematic_mm(self) -> float | None:
-        """Standard uncertainty by the systematic effects at the end; none where it is not known."""
+        """Standard uncertainty by the systematic effects at the end; None where it is not known."""
         sets = [self.planned_sets[point - 1] for point in self.points]
         return planned_systematic_mm(self.robot, self.task, sets, self.earlier)
 
@@ -297,7 +301,7 @@ class Plan:
         return self._start(worthwhile[0])
 
     def _worthwhile(self, state: CampaignState, points: list[int]) -> list[int]:
-        """Those of some points that gain enough, the next one first."""
+        """The points that gain enough, the next one first."""
         plan = self.settings.identification
         if not plan.least_gain_mm and not plan.choose_points:
             return points
@@ -339,21 +343,17 @@ class Plan:
         """
         last, progress = self._last_out_of_reach, (state.measurements.records, state.done, state.point)
         if not last or last[0][0] != progress:
-            last[:] = [(progress, self._find_out_of_reach(state))]
+            others = [point for point in self.points if point not in state.done and point != state.point]
+            safe = self._safe(state, others)
+            unsafe = [point for point in others if point not in safe]
+            possible = [] if unsafe == others else self._safe(state, unsafe, certainly=False)
+            last[:] = [(progress, frozenset(unsafe) - frozenset(possible))]
         return last[0][1]
 
-    def _find_out_of_reach(self, state: CampaignState) -> frozenset[int]:
-        others = [point for point in self.points if point not in state.done and point != state.point]
-        safe = self._safe(state, others)
-        unsafe = [point for point in others if point not in safe]
-        if unsafe == others:
-            return frozenset(unsafe)
-        return frozenset(unsafe) - frozenset(self._safe(state, unsafe, certainly=False))
-
     def _safe(self, state: CampaignState, points: list[int], *, certainly: bool = True) -> list[int]:
-        """Those of some points whose reference the robot, as it is known by now, takes within the limits.
+        """The points whose reference the robot, as it is known by now, takes within the limits.
 
-        ``certainly``: or only as the estimate has it.
+        With ``certainly`` false, only as the estimate has it.
         """
         if not points or not len(state.measurements):
             return points  # by the drawing it does, as preflight has checked
@@ -366,7 +366,7 @@ class Plan:
         return [point for point, is_safe in zip(points, stands, strict=True) if is_safe]
 
     def _reachable(self, state: CampaignState, points: list[int]) -> list[int]:
-        """Those of some points to which clear lines lead from the present pose; all where that is unknown.
+        """The points to which clear lines lead from the present pose; all where that is unknown.
 
         While little is known of the robot, some lines may be too near a limit that are clear later.
         """

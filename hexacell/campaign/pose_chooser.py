@@ -33,11 +33,11 @@ WELL_KNOWN_SIGMA = np.radians(0.5)
 informative."""
 
 FIRST_TURN = np.radians(0.3)
-"""Of the first pose of all, rad. Of robots within the tolerances that can stand at the first reference, two
-in a thousand have less than a degree left there to the end of a passive joint, and nothing tells which."""
+"""Turn of the first pose of all, rad: two in a thousand robots within the tolerances that can stand at the
+first reference have less than a degree left there to the end of a passive joint, and none shows it."""
 
 SMALL_TILT_SHARE = 0.1
-"""Of the largest tilt, for candidates where none of full size is safe."""
+"""Share of the largest tilt, for candidates where none of full size is safe."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +45,11 @@ class PoseChooser:
     """Chooses poses for one cell.
 
     Attributes:
-        pose_list: poses to visit; none where they are to be selected.
+        pose_list: poses to visit; None where they are to be selected.
         task: where the robot has to be accurate.
-        effort: of the search.
+        effort: of the search for poses.
         known_then: gives the covariance (p, p) once all that is planned is measured but the next record,
-            which has to gain beside it as soon as the robot is well known; none where the plan may end
+            which has to gain beside it as soon as the robot is well known; None where the plan may end
             sooner.
         most_turned: the largest angle from the reference to a selected pose, rad, by the estimate.
     """
@@ -140,7 +140,11 @@ class PoseChooser:
         count = self.effort.candidates // (2 if well_known else 1)
         amplitudes = Amplitudes.MOSTLY_LARGE if well_known else Amplitudes.ALL_SCALES
         tilt, turn = min(tilt_share * limits.tilt, most), min(limits.turn, most)
-        turns = candidates.orientations(count, tilt, self._seed(state), amplitudes, turn)
+        # The seed differs for every record and every attempt, and is the same when they are repeated.
+        point = state.point or 0
+        attempt = state.records_at(point) + 100 * state.rejections + 10_000 * len(state.pilots)
+        seed = self.settings.identification.seed + 1000 * point + attempt
+        turns = candidates.orientations(count, tilt, seed, amplitudes, turn)
         allowed: Array = turns[np.linalg.norm(rotations.to_vector(turns), axis=1) <= most]
         return allowed
 
@@ -154,12 +158,6 @@ class PoseChooser:
             return Criterion(columns @ columns.T)
         error = self.task.error(belief) if name == "task" else None
         return D_OPTIMAL if error is None else Criterion(error.weight())
-
-    def _seed(self, state: CampaignState) -> int:
-        """Different for every record and every attempt, and the same when they are repeated."""
-        point = state.point or 0
-        attempt = state.records_at(point) + 100 * state.rejections + 10_000 * len(state.pilots)
-        return self.settings.identification.seed + 1000 * point + attempt
 
 
 def is_well_known(belief: RobotBelief, zero: GaugeZero) -> bool:

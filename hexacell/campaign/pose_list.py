@@ -1,4 +1,4 @@
-"""A fixed list of poses instead of selected ones: read from a file, visited where it is safe.
+"""A fixed list of poses instead of selected ones, read from a file and visited where it is safe.
 
 The file has the columns ``point,orientation,x,y,z,a,b,c`` of a measurement file, in the controller's
 frames, mm and deg. Points are those of the cell file; a point's first row is its reference. The
@@ -28,12 +28,12 @@ class PoseList:
         return sum(map(len, self.poses))
 
     def at(self, point: int) -> tuple[Pose, ...]:
-        """Those of a point, its reference first."""
+        """The poses of a point, its reference first."""
         return self.poses[point - 1]
 
 
 def pose_list_of(cell: Cell) -> PoseList | None:
-    """The list that a cell file names, relative to itself; none if poses are to be selected.
+    """The list that a cell file names, relative to itself; None if poses are to be selected.
 
     Raises:
         FileError: it cannot be read, or its points are not those of the cell file.

@@ -14,24 +14,24 @@ from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.measurements.records import MeasurementSet
 
 REFUSALS = 3
-"""Records of one point that may leave the travel before the point is given up."""
+"""Number of records of one point that may leave the travel before the point is given up."""
 
 
 class Goal(Protocol):
     """What a campaign is for, if it is not the accuracy of the identified geometry."""
 
     def reached(self, measurements: MeasurementSet) -> str | None:
-        """Why the records are enough; none if they are not."""
+        """The reason why the records are enough; None if they are not."""
         ...
 
     def reached_at(self, point: int, measurements: MeasurementSet) -> str | None:
-        """Why a point needs no more records, although others may; none if it does."""
+        """The reason why a point needs no more records, although others may; None if it does."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoppingRules:
-    """The rules of one plan. Each gives the reason to stop, or none."""
+    """The rules of one plan, each of which gives the reason to stop, or None."""
 
     settings: CellSettings
     forecaster: Forecaster
@@ -41,17 +41,14 @@ class StoppingRules:
     def end_of_campaign(self, state: CampaignState) -> str | None:
         """Between points: why no other point is to be begun, whichever it is."""
         sizes = self.forecaster.sizes(state)
-        count = len(sizes)
         if all(state.records_at(point) >= size for point, size in sizes.items()):
-            return f"all {count} points are measured"
-        reached = (
-            self._target_reached(state) if self.goal is None else self.goal.reached(state.measurements)
-        )
-        if reason := self._budget_used(state, points=1, records=2) or reached:
+            return f"all {len(sizes)} points are measured"
+        if reason := self._budget_used(state, points=1, records=2):
             return reason
-        if state.done.issuperset(sizes):
-            return f"all {count} points are measured as far as they could be"
-        return None
+        reached = self.goal.reached(state.measurements) if self.goal else self._target_reached(state)
+        if reached is None and state.done.issuperset(sizes):
+            return f"all {len(sizes)} points are measured as far as they could be"
+        return reached
 
     def end_of_point(self, state: CampaignState, point: int) -> str | None:
         """At a point: why no more records are to be taken there, whichever they are."""
@@ -69,7 +66,7 @@ class StoppingRules:
     def little_gain(self, proposed: MeasurePose) -> str | None:
         """Why a proposed record is not worth its time.
 
-        Of zeros alone none is judged: what is held makes most of the error, and no record lowers that.
+        None with zeros alone: what is held makes most of the error, and no record lowers that.
         """
         if self.forecaster.task.held is not None:
             return None
@@ -79,13 +76,13 @@ class StoppingRules:
         return f"no record here would gain {least:g} mm at the task poses"
 
     def _budget_used(self, state: CampaignState, *, points: int, records: int) -> str | None:
-        """That so many more points and records cannot be paid."""
+        """Whether so many more points and records cannot be afforded, in words."""
         budget = self.forecaster.budget
         left = budget.records_left(len(state.measurements), state.begun_points + points)
         return None if left >= records else f"the budget of {budget.description} is used"
 
     def _target_reached(self, state: CampaignState) -> str | None:
-        """That the accuracy asked for is reached."""
+        """Whether the accuracy asked for is reached, in words."""
         target = self.settings.identification.target_mm
         if target is None or not len(state.measurements):
             return None
@@ -101,7 +98,7 @@ class StoppingRules:
         return f"the predicted error at the task poses is {worst:.3f} mm, within {target:g}"
 
     def _another_point(self, state: CampaignState, point: int) -> str | None:
-        """That another point is worth more, if points are to be chosen."""
+        """Whether another point is worth more, if points are to be chosen, in words."""
         sizes = self.forecaster.sizes(state)
         others = [other for other in sizes if other not in state.done and other != point]
         if not self.settings.identification.choose_points or not others:

@@ -32,7 +32,7 @@ class TaskError:
     Attributes:
         jacobian: (n, 3, p) of positions, mm, without what another choice of frames would explain.
         held: parameters that are not identified, if any: their tolerances are part of every error.
-        gain: with which the others are then identified (p, p).
+        gain: (p, p) with which the others are then identified.
     """
 
     jacobian: Array
@@ -41,7 +41,7 @@ class TaskError:
 
     @property
     def of_estimate(self) -> TaskError:
-        """Of the estimate of all parameters, which records improve whatever is held."""
+        """The error of the estimate of all parameters, which records improve whatever is held."""
         return TaskError(self.jacobian)
 
     def variances(self, covariance: Array) -> Array:
@@ -66,7 +66,7 @@ class TaskError:
         return float(np.linalg.norm(self.jacobian @ change, axis=-1).max())
 
     def mean_square(self, covariance: Array) -> float:
-        """Over all poses, mm^2."""
+        """Mean over all poses, mm^2."""
         return float(self.variances(covariance).mean())
 
 
@@ -104,27 +104,26 @@ class Task:
         scale: ScaleObservation | None = None,
         zeros: IdentifiedZeros | None = None,
     ) -> UncertaintyBudget | None:
-        """What is not known of the errors; none if the estimated robot can take no task pose.
+        """The uncertainty of the errors; None if the estimated robot can take no task pose.
 
-        ``earlier``, ``scale``, ``zeros``: see :meth:`UncertaintyBudget.of`.
+        ``earlier``, ``scale`` and ``zeros`` are those of :meth:`UncertaintyBudget.of`.
         """
         reached = self.reachable(belief)
         if not len(reached.poses) or not len(reached.workspace):
             return None
-        poses, workspace = reached.poses, reached.workspace
         return UncertaintyBudget.of(
             found,
             belief,
             effects,
-            task=poses,
-            workspace=workspace,
+            task=reached.poses,
+            workspace=reached.workspace,
             earlier=earlier,
             scale=scale,
             zeros=zeros,
         )
 
     def error(self, belief: RobotBelief, recorded: PoseBatch | None = None) -> TaskError | None:
-        """How the error depends on the parameters; none if the estimated robot can take no task pose.
+        """How the error depends on the parameters; None if the estimated robot can take no task pose.
 
         Zeros alone are those with which the ``recorded`` poses will err least; without them, those of the
         workspace.
@@ -135,7 +134,7 @@ class Task:
         return TaskError(jacobian[:, :3], self.held, self._gain(belief, recorded))
 
     def _gain(self, belief: RobotBelief, recorded: PoseBatch | None) -> Array | None:
-        """As :class:`IdentifiedZeros` has it of records."""
+        """The gain with which the parameters that are not held are identified; None if all are."""
         if self.held is None:
             return None
         poses = _reachable(belief, self.workspace if recorded is None else recorded)
@@ -146,7 +145,7 @@ class Task:
     def jacobian(self, belief: RobotBelief) -> Array | None:
         """Derivatives (n, 6, p) of positions, mm, and rotation vectors, rad, by the free parameters.
 
-        Without what another choice of frames would explain; none if no task pose can be taken.
+        Without what another choice of frames would explain; None if no task pose can be taken.
         """
         both = PoseBatch.concatenate([self.poses, self.workspace])
         taken = _are_taken(belief, both)
@@ -157,7 +156,6 @@ class Task:
 
 
 def _reachable(belief: RobotBelief, poses: PoseBatch) -> PoseBatch:
-    """The poses that the estimated robot reaches."""
     return poses[np.flatnonzero(_are_taken(belief, poses))]
 
 
@@ -179,7 +177,7 @@ def planned_systematic_mm(
         robot: with its effects.
         task: where it counts.
         sets: planned poses at each point, the reference first, in the convention's frames.
-        earlier: see :meth:`~hexacell.uncertainty.budget.UncertaintyBudget.of`.
+        earlier: what the effects did to an earlier result that is the prior, by their names.
     """
     effects = [effect for effect in robot.effects if effect.size]
     if not effects:

@@ -179,12 +179,13 @@ def machine_causes(robot: Robot, states: int) -> Causes:
 def _state_covariance(
     covariance: Array, effects: tuple[Effect, ...], earlier: Mapping[str, Array], states: int
 ) -> Array:
-    """Of the truth about an estimate with a covariance (p, p) of noise, and of the shared causes (k).
+    """The covariance of the truth about an estimate, whose noise is (p, p), and of the shared causes (k).
 
     A cause b that made the estimate err by ``K b`` is the same now: the truth is at ``-K b``.
     """
     free = len(covariance)
-    acting = [one for one in effects if _is_shared(one) and one.name in earlier]
+    shared = [one for one in effects if one.size and one.occurrence is Occurrence.CONSTANT]
+    acting = [one for one in shared if not one.is_estimated and one.name in earlier]
     columns = [np.zeros((free, 0)), *(one.size * earlier[one.name] for one in acting)]
     moved = np.concatenate(columns, axis=1)
     if moved.shape[1] != states - free:  # the cell file states other effects now
@@ -192,10 +193,6 @@ def _state_covariance(
     causes = np.eye(states - free)
     both = np.block([[covariance + moved @ moved.T, -moved], [-moved.T, causes]])
     return np.asarray(both)
-
-
-def _is_shared(effect: Effect) -> bool:
-    return bool(effect.size) and not effect.is_estimated and effect.occurrence is Occurrence.CONSTANT
 
 
 def leg_expansion(geometry: Geometry, um_per_m_k: float, warmer: Array) -> Array:

@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 
-from hexacell.campaign.forecast import PlannedInformation
 from hexacell.campaign.online_estimate import OnlineEstimator, RecordEstimator
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
@@ -44,10 +43,10 @@ class Check:
     """The check of one robot against limits of the errors at its task poses.
 
     Attributes:
-        before: the last accepted result, and its drift since; none without such a result.
+        before: the last accepted result, and its drift since; None without such a result.
         limits: at the worst task pose.
         budget: most records, references included.
-        listed: poses to measure; none if they are chosen.
+        listed: poses to measure; None if they are chosen.
         effects: the systematic ones. A check shares the constant ones with the result before it, so that
             its records do not reduce them.
         earlier: what these did to that result, as errors (p, k) of its free parameters by effect.
@@ -82,18 +81,18 @@ class Check:
         )
 
     def reached(self, measurements: MeasurementSet) -> str | None:
-        """That the records are enough: see :class:`~hexacell.campaign.stopping_rules.Goal`."""
+        """The reason why the records are enough for the whole check; None if they are not."""
         _, records = np.unique(measurements.points, return_counts=True)
         is_enough = np.count_nonzero(records > 1) >= FEWEST_POINTS
         return self._decided(measurements) if is_enough else None
 
     def reached_at(self, point: int, measurements: MeasurementSet) -> str | None:
-        """That the records are enough, but perhaps at too few points."""
+        """The reason why a point needs no more records, though others may; None if it does."""
         is_measured = np.count_nonzero(measurements.points == point) > 1
         return self._decided(measurements) if is_measured else None
 
     def statement(self, measurements: MeasurementSet) -> CheckStatement | None:
-        """What is said by some records; none if the estimated robot can take no task pose.
+        """The statement by some records; None if the estimated robot can take no task pose.
 
         Raises:
             IdentifiabilityError: the records do not belong to this robot.
@@ -107,7 +106,7 @@ class Check:
     def final_statement(
         self, measurements: MeasurementSet, effects: tuple[Effect, ...] | None = None
     ) -> CheckStatement | None:
-        """The same at the end of the check, where what is not decided is not evaluated.
+        """The statement at the end of the check, where what is not decided is not evaluated.
 
         ``effects`` are the systematic ones as they are known by then, if not as before.
 
@@ -122,7 +121,7 @@ class Check:
         return replace(stated, verdict=Verdict.NOT_EVALUATED, further_records=further)
 
     def predicted_error(self, measurements: MeasurementSet) -> float | None:
-        """The error predicted at the worst task pose, 1 sigma, mm; none if no task pose can be taken.
+        """The error predicted at the worst task pose, 1 sigma, mm; None if no task pose can be taken.
 
         Raises:
             IdentifiabilityError: the records do not belong to this robot.
@@ -148,8 +147,9 @@ class Check:
         estimates = self._errors(likeliest, effects), self._errors(guarded, effects)
         if estimates[0] is None or estimates[1] is None:
             return None
-        errors = estimates[0].errors
-        is_consistent = _is_consistent(likeliest)
+        errors, found = estimates[0].errors, likeliest.estimate.identification
+        # Whether the residuals are not too large for the stated noise.
+        is_consistent = found is None or found.goodness.agreement is not ChiSquareVerdict.TOO_LARGE
         verdict = guarded_verdict(errors, estimates[1].errors, self.limits)
         return CheckStatement(
             estimate=likeliest.estimate,
@@ -177,13 +177,9 @@ class Check:
         first, second = self._errors(likeliest, effects), self._errors(guarded, effects)
         if first is None or second is None:
             return None
-        sets = replace(self.plan, settings=self.settings).planned_sets
-        planned = PlannedInformation.of(sets, likeliest.estimate.belief)
-        total = np.sum(
-            [planned.information(point, len(sets[point - 1])) for point in self.plan.points], axis=0
-        )
-        size = sum(len(sets[point - 1]) for point in self.plan.points)
-        return records_to_decide(first, second, self.limits, total / size)
+        whole = replace(self.plan, settings=self.settings)
+        each = whole.information_per_record(likeliest.estimate.belief)
+        return records_to_decide(first, second, self.limits, each)
 
     @cached_property
     def _drifting(self) -> DriftEstimator | None:
@@ -201,7 +197,7 @@ class Check:
 def check_settings(settings: CellSettings, budget: int, left_points: int = 0) -> CellSettings:
     """A cell's settings with those of a check, of ``budget`` records, in the place of the calibration's.
 
-    So many of the points are not measured.
+    ``left_points`` is the number of points that are not measured.
     """
     plan = settings.identification
     points = len(plan.points) - left_points
@@ -230,9 +226,3 @@ def identified_before(robot: Robot, covariance: Array, drift_mm: float) -> Ident
     sigma = drift_sigma(mechanism, drift_mm, robot.tolerances)
     drift = drift_covariance(mechanism, geometry, sigma)
     return IdentifiedBefore(mechanism, geometry, covariance[np.ix_(rows, rows)], drift)
-
-
-def _is_consistent(estimate: ScaledEstimate) -> bool:
-    """Whether the residuals are not too large for the stated noise."""
-    found = estimate.estimate.identification
-    return found is None or found.goodness.agreement is not ChiSquareVerdict.TOO_LARGE

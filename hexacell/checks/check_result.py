@@ -39,14 +39,14 @@ class CheckResult(Frozen):
     """What a check says of the robot as it is now.
 
     Attributes:
-        accuracy: errors of the controller's geometry; none where the robot can take none of the task poses.
+        accuracy: errors of the controller's geometry; None where the robot can take no task pose.
         is_consistent: whether the residuals agree with the stated noise, however far the robot drifted.
-        further_records: about how many more would decide; none where none would, or nothing is open.
-        earlier_run, earlier_at: the accepted result that it started from; none where that is the drawing.
+        further_records: about how many more would decide; None where no number would, or nothing is open.
+        earlier_run, earlier_at: the accepted result that it started from; None where that is the drawing.
         drift_scale: how many times as large as stated the drift since then is.
         changes: of the free parameters, in the mechanism's frame convention.
         left_out: records that the others prove false.
-        alarm: the test of a change by the first records; none where the robot was not identified before, or
+        alarm: the test of a change by the first records; None where the robot was not identified before, or
             where there were fewer.
     """
 
@@ -65,7 +65,7 @@ class CheckResult(Frozen):
 
     @property
     def significant_change(self) -> ParameterChange | None:
-        """The most significant change; none where all may be chance."""
+        """The most significant change; None where all may be chance."""
         most = max(self.changes, key=lambda one: one.significance, default=None)
         return most if most is not None and most.significance >= SIGNIFICANT_SIGMAS else None
 

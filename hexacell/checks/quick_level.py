@@ -11,9 +11,6 @@ from bisect import bisect_left
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
-from hexacell.campaign.forecast import PlannedInformation
 from hexacell.campaign.planner import Plan
 from hexacell.cell.fields import Frozen
 from hexacell.checks.check import Check, check_settings
@@ -22,21 +19,20 @@ from hexacell.design.criteria import add_information
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.problem.data_requirements import is_overdetermined
 from hexacell.identification.problem.problem import Prior
-from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.geometry_drift import IdentifiedBefore
 from hexacell.verdict.check_statement import MOST_FURTHER_RECORDS
 
-TOLD_RECORDS = (12, 24, 48)
-"""So many more records have their gain told."""
+FURTHER_RECORDS = (12, 24, 48)
+"""Numbers of further records whose gain is stated."""
 
 AS_ACCURATE = 1.02
-"""Times the error that the last calibration left: nobody measures for two hundredths of it."""
+"""Largest error in multiples of what the last calibration left: nobody measures for two hundredths."""
 
 
 class FurtherRecords(Frozen):
-    """What more records would leave: the predicted error at the worst task pose, 1 sigma, mm."""
+    """The predicted error at the worst task pose, 1 sigma, mm, that more records would leave."""
 
     records: int
     error_mm: float
@@ -46,13 +42,13 @@ class QuickAccuracy(Frozen):
     """How well the quick level knows the robot: predicted errors at the worst task pose, 1 sigma, mm.
 
     Attributes:
-        records: that it measured.
-        error_mm: by these records and what was known before.
-        calibrated_mm: that the result left which it started from.
+        records: number of records that it measured.
+        error_mm: error by these records and what was known before.
+        calibrated_mm: error that the result left which it started from.
         drift_scale: how many times as large as stated the drift since then is.
         further: what more records would leave.
         records_to_calibrated: about how many more would leave as little as that result; 0 where these do,
-            none where no sensible number would.
+            None where no sensible number would.
     """
 
     records: int
@@ -73,8 +69,8 @@ class QuickLevel:
     """The quick level of one robot.
 
     Attributes:
-        check: of the same robot, from the same result on; it has one.
-        budget: most records, references included.
+        check: the check of the same robot, from the same result on; it has one.
+        budget: largest number of records, references included.
     """
 
     check: Check
@@ -97,7 +93,7 @@ class QuickLevel:
 
     @cached_property
     def calibrated_mm(self) -> float | None:
-        """The error predicted at the worst task pose that the result before left; none without poses."""
+        """The error predicted at the worst task pose that the result before left; None without poses."""
         return self._worst(replace(self.check.robot.belief(), covariance=self._before.covariance))
 
     @property
@@ -106,7 +102,7 @@ class QuickLevel:
         return self._before.prior(1.0)
 
     def reached(self, measurements: MeasurementSet) -> str | None:
-        """That the records are enough: see :class:`~hexacell.campaign.stopping_rules.Goal`."""
+        """The reason why the records are enough; None if they are not."""
         error, wanted = self._known_error(measurements), self.calibrated_mm
         if error is None or wanted is None or error > AS_ACCURATE * wanted:
             return None
@@ -117,11 +113,11 @@ class QuickLevel:
         point: int,  # noqa: ARG002 - of the protocol
         measurements: MeasurementSet,
     ) -> str | None:
-        """The same: no point needs more records where all together are enough."""
+        """The reason why a point needs no more records: that all together are enough."""
         return self.reached(measurements)
 
     def robot_after(self, measurements: MeasurementSet) -> Robot:
-        """The robot with what was known before the records, under the drift's scale that they tell.
+        """The robot with what was known before the records, under the drift's scale that they show.
 
         Raises:
             IdentifiabilityError: they do not belong to this robot.
@@ -133,7 +129,7 @@ class QuickLevel:
         return replace(robot, known=known)
 
     def accuracy(self, measurements: MeasurementSet) -> QuickAccuracy | None:
-        """How well the robot is known; none if it can take no task pose.
+        """How well the robot is known; None if it can take no task pose.
 
         Raises:
             IdentifiabilityError: the records do not belong to this robot.
@@ -148,7 +144,7 @@ class QuickLevel:
             error_mm=error,
             calibrated_mm=wanted,
             drift_scale=likeliest.scale,
-            further=tuple(FurtherRecords(records=n, error_mm=errors[n]) for n in TOLD_RECORDS),
+            further=tuple(FurtherRecords(records=n, error_mm=errors[n]) for n in FURTHER_RECORDS),
             records_to_calibrated=_first_within(errors, AS_ACCURATE * wanted),
         )
 
@@ -167,22 +163,13 @@ class QuickLevel:
         belief = estimate.estimate.belief
         error = self.plan.task.error(belief)
         assert error is not None  # noqa: S101 - there is an error now
-        each = self._information_per_record(belief)
+        each = replace(self.plan, settings=self.check.settings).information_per_record(belief)
         return [
             error.worst(
                 add_information(belief.covariance, records * each) if records else belief.covariance
             )
             for records in range(MOST_FURTHER_RECORDS + 1)
         ]
-
-    def _information_per_record(self, belief: RobotBelief) -> Array:
-        """Of the sets of a whole calibration, (p, p), 1/mm^2."""
-        sets = replace(self.plan, settings=self.check.settings).planned_sets
-        planned, points = PlannedInformation.of(sets, belief), self.plan.points
-        total: Array = np.sum(
-            [planned.information(point, len(sets[point - 1])) for point in points], axis=0
-        )
-        return total / sum(len(sets[point - 1]) for point in points)
 
     def _worst(self, belief: RobotBelief) -> float | None:
         error = self.plan.task.error(belief)

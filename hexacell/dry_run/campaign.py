@@ -23,11 +23,12 @@ from hexacell.errors import HexacellError, ReachError
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
-from hexacell.measurements.records import MeasurementSet
+from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 from hexacell.uncertainty.budget import UncertaintyBudget
 
 MOST_TRIED = 6
+"""Number of robots that are tried, where some cannot be identified."""
 
 VisitedPose = tuple[int, int, Pose]
 """Point, orientation at it, and where that is."""
@@ -43,7 +44,6 @@ class VirtualCampaign:
     Attributes:
         state: what the next decision depends on.
         outside: number of records at which the ball left the gauges' travel; they are not taken.
-        largest_mm: the largest deviation on any axis, of records taken or not.
         reason: why the plan ended.
     """
 
@@ -51,7 +51,6 @@ class VirtualCampaign:
     virtual_robot: VirtualRobot
     state: CampaignState = field(default_factory=CampaignState)
     outside: int = 0
-    largest_mm: float = 0.0
     reason: str = ""
 
     @property
@@ -109,17 +108,10 @@ class VirtualCampaign:
             if pilot is None:
                 return taken > 0
             self._go_to_pose(pilot)
-            self._take_pilot(pilot)
+            record = self._take(pilot)
+            if record is not None:
+                self.state = replace(self.state, pilots=(*self.state.pilots, record))
         return True
-
-    def _take_pilot(self, pilot: MeasurePose) -> None:
-        state = replace(self.state, present=pilot.pose)
-        record = self.virtual_robot.measure(pilot.point, pilot.orientation)
-        if self.plan.robot.limits.room.holds(np.array(record.deviation)):
-            self.state = replace(state, pilots=(*state.pilots, record))
-        else:
-            self.outside += 1
-            self.state = replace(state, rejections=state.rejections + 1)
 
     def _go_to_point(self, start: StartPoint) -> None:
         self.virtual_robot.place(start.pose)
@@ -147,16 +139,20 @@ class VirtualCampaign:
             self.plan = replace(plan, robot=robot)
 
     def _measure(self, decision: StartPoint | MeasurePose) -> None:
-        state = self.state
+        record = self._take(decision)
+        if record is not None:
+            measurements = MeasurementSet((*self.measurements.records, record))
+            self.state = replace(self.state, measurements=measurements, point=decision.point)
+
+    def _take(self, decision: StartPoint | MeasurePose) -> Record | None:
+        """The record at the pose of a decision; None where the ball left the gauges' travel."""
         record = self.virtual_robot.measure(decision.point, decision.orientation)
-        deviation = float(np.abs(record.deviation).max())
-        self.largest_mm = max(self.largest_mm, deviation)
-        if not self.plan.robot.limits.room.holds(np.array(record.deviation)):
-            self.outside += 1
-            self.state = replace(state, present=decision.pose, rejections=state.rejections + 1)
-            return
-        measurements = MeasurementSet((*state.measurements.records, record))
-        self.state = replace(state, measurements=measurements, point=decision.point, present=decision.pose)
+        self.state = replace(self.state, present=decision.pose)
+        if self.plan.robot.limits.room.holds(np.array(record.deviation)):
+            return record
+        self.outside += 1
+        self.state = replace(self.state, rejections=self.state.rejections + 1)
+        return None
 
     def _finish(self, point: int, reference: Pose) -> None:
         """Return to the point's reference; it is finished if nothing can be measured from there either."""
@@ -176,13 +172,13 @@ class DryRunResult:
 
     Attributes:
         drawn: number of robots that were tried.
-        robots: number of those that could be identified.
-        points: measured, and how many ``records`` there.
+        robots: number of robots that could be identified.
+        points: number of points that are measured, with so many ``records``.
         outside: records at which the ball left the gauges' travel, over all robots.
-        worst_sigma_mm: predicted error at the worst task pose afterwards; none without task poses.
-        minutes: to measure, noise and held-out poses included.
-        expanded_mm: U of the largest error at the task poses, systematic effects included; none likewise.
-        verdicts: what a run will say of healthy machines; none likewise, or without held-out poses.
+        worst_sigma_mm: predicted error at the worst task pose afterwards; None without task poses.
+        minutes: time to measure, noise and held-out poses included.
+        expanded_mm: U of the largest error at the task poses, systematic effects included; None without.
+        verdicts: the verdicts on healthy machines; None without task poses or held-out poses.
         visited: the poses of the first of these robots, in their order, with point and orientation.
     """
 
@@ -222,7 +218,7 @@ class _Outcome:
 
 
 def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
-    """The outcome for one robot; none if it is not identified."""
+    """The outcome for one robot; None if it is not identified."""
     random = np.random.default_rng([plan.settings.identification.seed, number])
     campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, truth, random))
     try:

@@ -44,10 +44,10 @@ from hexacell.verdict.decision import ErrorLimits, Verdict
 
 MACHINES = 500
 DRAWS = 1000
-"""Fewer than a run has for its single statement: U is good to 3 %."""
+"""Number of draws for each U, good to 3 %: fewer than a run has for its single statement."""
 SEED = 20_100_102
 TESTS = 3
-"""Of the model, in every run: residuals, held-out records, and points by the others."""
+"""Number of tests of the model in every run: residuals, held-out records, and points by the others."""
 WANTED = 0.95
 """Probability to pass below which a limit is one that good machines fail."""
 NOISE = "noise of the readings"
@@ -55,10 +55,10 @@ NOISE = "noise of the readings"
 
 @dataclass(frozen=True, slots=True)
 class VerdictForecast:
-    """What a run will say of healthy machines.
+    """The verdicts of a run on healthy machines.
 
     Attributes:
-        probabilities: of each verdict under the ``limits``.
+        probabilities: probability of each verdict under the ``limits``.
         passing: limits that 95 % of such machines would pass, each by itself.
         largest_part: the line of the budget that contributes most to U at the worst task pose.
         largest_part_mm: its standard uncertainty there, and ``standard_mm`` that of all together.
@@ -78,7 +78,7 @@ class VerdictForecast:
 
     @classmethod
     def mean(cls, each: Sequence[VerdictForecast]) -> VerdictForecast:
-        """Over some robots; the limits and the parts are those of the worst of them."""
+        """The mean over some robots; the limits and the parts are those of the worst of them."""
         worst = max(each, key=lambda one: one.passing.position_mm)
         degrees = max(one.passing.orientation_deg for one in each)
         return cls(
@@ -97,8 +97,8 @@ def forecast_verdicts(stated: Array, budget: UncertaintyBudget, limits: ErrorLim
     Args:
         stated: (t, 6, k) change of the errors that will be stated, by one standard deviation of each
             independent cause.
-        budget: of all that will not be known of them.
-        limits: of the cell.
+        budget: uncertainty of all that will not be known of them.
+        limits: limits of the cell.
     """
     unknown = budget.errors_of(np.zeros(budget.jacobian.shape[-1])).effects
     random = np.random.default_rng(SEED)
@@ -134,7 +134,7 @@ def stated_errors(
 
     Args:
         found: the identification.
-        updated: the same by the held-out records as well.
+        updated: the identification by the held-out records as well.
         first: the budget of ``found``.
         second: that of ``updated``.
         zeros: what is written of ``found``, where that is not all of it.
@@ -174,7 +174,7 @@ def _statements(errors: Array, around: Array) -> list[LargestError]:
 
 
 def _probabilities(verdicts: Sequence[Verdict]) -> dict[Verdict, float]:
-    """With those of the tests of the model, which fail independently."""
+    """The share of each verdict, with the tests of the model, which fail independently."""
     tested = (1.0 - SMALLEST_PROBABILITY) ** TESTS
     shares = {verdict: tested * verdicts.count(verdict) / len(verdicts) for verdict in Verdict}
     shares[Verdict.NOT_EVALUATED] += 1.0 - tested
@@ -194,10 +194,10 @@ def _largest_part(budget: UncertaintyBudget) -> tuple[str, float]:
 def predicted_verdicts(
     plan: Plan, found: Identification, budget: UncertaintyBudget | None
 ) -> VerdictForecast | None:
-    """What a run will say of healthy machines with this geometry; none where nothing can be said.
+    """The verdicts of a run on healthy machines with this geometry; None where none can be predicted.
 
-    ``budget`` is that of the identification. With zeros alone what is held is as wrong as its
-    tolerances say.
+    ``budget`` is that of the identification. With zeros alone what is held is as wrong as its tolerances
+    allow.
     """
     try:
         updated = with_held_out_records(plan, found)

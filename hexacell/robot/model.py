@@ -45,7 +45,7 @@ from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.record_effects import RecordEffects
 
 FARTHEST_DRAWING = 0.25
-"""Of the largest number of a config, that the drawing may be away from it."""
+"""Largest difference of the drawing from a config, as a share of the largest number of the config."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +63,8 @@ class Robot:
         known: what is known before measuring, if that is more than the drawing with its tolerances.
         known_effects: what the systematic effects did to that, as errors (p, k) of the free parameters by
             the name of the effect.
-        taught: the geometry with which points and frames were taught last, in the frames of that time; none
-            in runs of before there was a choice of frames, which wrote a geometry in the convention's.
+        taught: the geometry with which points and frames were taught last, in the frames of that time; None
+            if they are taken to be those of the convention.
         earlier: geometries that may have commanded older records: the drawing, the taught one, and those
             that the controller had before in the same run.
         work_frame: the axes of the controller's base frame about which a work frame can be taught.
@@ -99,14 +99,14 @@ class Robot:
 
     @cached_property
     def commanding(self) -> Geometry:
-        """What the controller commands with now, in the frame convention."""
+        """The geometry that the controller commands with now, in the frame convention."""
         if self.uses_provisional:
             return self.provisional[-1]
         return self._commanding_as_written.geometry
 
     @property
     def free_parameters(self) -> Array:
-        """Those (p,) of that geometry, mm."""
+        """The free parameters (p,) of the geometry that commands, mm."""
         return self.mechanism.convention.free_parameters(self.commanding)
 
     def commanded(self, actual: Geometry) -> CommandedRobot:
@@ -132,7 +132,7 @@ class Robot:
 
     @cached_property
     def held(self) -> HeldParameters | None:
-        """What is not identified; none where all is."""
+        """The parameters that are not identified; None where all are."""
         if self.identifies is ParameterChoice.ALL:
             return None
         return HeldParameters(zero_columns(self.mechanism, self.controller), self.prior.covariance)

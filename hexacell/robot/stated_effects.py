@@ -35,7 +35,7 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
 
     Args:
         settings: of the cell.
-        measured_range_k: range of the temperatures read while measuring; none without thermometers.
+        measured_range_k: range of the temperatures read while measuring; None without thermometers.
     """
     stated = settings.uncertainty
     return (
@@ -50,7 +50,7 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
 
 
 def _of_encoders(stated: CommonUncertaintySettings, *, are_identified: bool) -> tuple[Effect, ...]:
-    """Where the scales are identified, what is not known of them is in the covariance of the parameters."""
+    # Where the scales are identified, what is not known of them is in the covariance of the parameters.
     if isinstance(stated, LinearUncertaintySettings):
         common, each = "common_encoder_scale_um_m", "encoder_scale_um_m"
         of_each = encoder_scales(stated.encoder_scale_um_m, stated.source(each))

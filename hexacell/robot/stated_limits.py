@@ -23,9 +23,9 @@ NO_CONE_DEG = 180.0
 
 
 def stated_limits(settings: CellSettings, controller: ControllerGeometry, frames: FrameTransform) -> Limits:
-    """The limits of a cell; ``frames`` are from the controller's to the convention's.
+    """The limits of a cell, and those that the controller's config states as well.
 
-    Those that the controller's config states hold as well.
+    ``frames`` lead from the controller's to the convention's.
     """
     limits = settings.limits
     lowest, highest, told = _joint_ranges(settings, controller)
@@ -80,7 +80,7 @@ def _axis_limits(limits: LimitSettings, of_controller: ControllerLimits) -> Axis
 
 
 def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLimits | None:
-    """What passive joints and legs allow; none if the cell states nothing of them."""
+    """The limits of passive joints and legs; None if the cell states none."""
     stated, distance = settings.limits.passive_joints, settings.limits.leg_distance_mm
     if distance == 0.0 and min(stated.base_cones + stated.platform_cones) >= NO_CONE_DEG:
         return None

@@ -23,13 +23,13 @@ PIECES = 24
 """Pieces that a line is divided into."""
 
 LEAST_MARGIN_SHARE = 0.5
-"""Of the singularity margin that poses are chosen under; the actual robot may have less than estimated."""
+"""Share of the singularity margin that poses keep; the actual robot may have less than estimated."""
 
 AS_DRAWN_MM = 1e-3
 """A controller whose parameters differ less from the drawing has the drawing's geometry."""
 
 WEAR_SHARE = 0.1
-"""Of the tolerances: how far a robot may have drifted since it was calibrated."""
+"""Share of the tolerances by which a robot may have drifted since it was calibrated."""
 
 
 class VirtualRobot:

@@ -13,7 +13,6 @@ import numpy as np
 
 from hexacell.errors import LimitError
 from hexacell.kinematics import rotations
-from hexacell.kinematics.forward import CONTINUATION_STAGES
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -23,12 +22,10 @@ from hexacell.robot.model import Robot
 
 BATCH = 64
 BATCHES = 60
+"""Orientations are drawn in batches, and so many batches at most."""
 
 TurnsOf = Callable[[Array], Array]
 """Rotations (n, 3, 3) of three angles each (n, 3), rad."""
-
-TRAVEL_SHARE = 0.7
-"""Of the gauges' travel, for deviations aimed at."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,69 +84,22 @@ def unlimited_travel(
     margin = robot.limits.singularity_margin if margin is None else margin
     sets = []
     for point in points:
-        drawn = (
-            _commands(robot, point, turns) for turns in _random_orientations(random, amplitude, turns_of)
-        )
-        sets.append(_first_reached(robot, truth, point, drawn, orientations, margin))
-    return _data_set(robot, sets, orientations)
+        turns = random_orientations(random, amplitude, turns_of)
+        drawn = (robot.frames.poses(PoseBatch.at(point, each)) for each in turns)
+        sets.append(first_reached(robot, truth, point, drawn, orientations, margin))
+    return data_set(robot, sets, orientations)
 
 
-def within_travel(
-    robot: Robot,
-    truth: Geometry,
-    points: Array,
-    orientations: int,
-    amplitude: float,
-    random: np.random.Generator,
-) -> DataSet:
-    """Random rotations within ``amplitude``, rad, that keep the ball within the gauges' travel.
-
-    They are aimed with the true geometry, which a program does not know. They show what can be identified
-    from records that a robot with gauges can give at all.
-
-    Raises:
-        LimitError: a point, or enough poses at it, cannot be reached without crossing a singularity.
-    """
-    margin = robot.limits.singularity_margin
-    sets = []
-    for point in points:
-        level = [_commands(robot, point, np.eye(3)[None])]
-        reference = _first_reached(robot, truth, point, level, 1, margin)
-        drawn = _aimed(robot, truth, reference.actual, amplitude, random)
-        others = _first_reached(robot, truth, point, drawn, orientations - 1, margin)
-        sets.append(_Reached.concatenate([reference, others]))
-    return _data_set(robot, sets, orientations)
-
-
-def _commands(robot: Robot, point: Array, turns: Array) -> PoseBatch:
-    """Commands of turns (n, 3, 3) of the level platform at a point, in the convention's frames."""
-    return robot.frames.poses(PoseBatch.at(point, turns))
-
-
-def _random_orientations(
+def random_orientations(
     random: np.random.Generator, amplitude: float, turns_of: TurnsOf = rotations.from_angles
 ) -> Iterator[Array]:
+    """Batches of rotations (n, 3, 3) whose three angles are within ``amplitude``, rad."""
     for _ in range(BATCHES):
         yield turns_of(random.uniform(-amplitude, amplitude, (BATCH, 3)))
 
 
-def _aimed(
-    robot: Robot, truth: Geometry, reference: PoseBatch, amplitude: float, random: np.random.Generator
-) -> Iterator[PoseBatch]:
-    """Commands that bring the true robot to rotations from the reference, inside the travel."""
-    travel = TRAVEL_SHARE * robot.limits.gauge_travel_mm
-    for turns in _random_orientations(random, amplitude):
-        positions = reference.positions + random.uniform(-travel, travel, (BATCH, 3))
-        targets = PoseBatch(positions, turns @ reference.rotations[0])
-        joints = robot.mechanism.inverse(truth, robot.branch, targets)
-        rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
-        commanded = robot.commanded(truth)
-        commands = commanded.commands_for(targets[rows], joints[rows], stages=CONTINUATION_STAGES)
-        yield commands.poses[commands.found]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class _Reached:
+class Reached:
     """Commands (n), the joint variables (n, 6), mm, and the actual poses that they bring the robot to."""
 
     commands: PoseBatch
@@ -157,39 +107,40 @@ class _Reached:
     actual: PoseBatch
 
     @classmethod
-    def concatenate(cls, parts: Sequence[_Reached]) -> _Reached:
+    def concatenate(cls, parts: Sequence[Reached]) -> Reached:
+        """The commands of several."""
         return cls(
             PoseBatch.concatenate(part.commands for part in parts),
             np.concatenate([part.joints for part in parts]),
             PoseBatch.concatenate(part.actual for part in parts),
         )
 
-    def __getitem__(self, rows: slice | Mask) -> _Reached:
-        return _Reached(self.commands[rows], self.joints[rows], self.actual[rows])
+    def __getitem__(self, rows: slice | Mask) -> Reached:
+        return Reached(self.commands[rows], self.joints[rows], self.actual[rows])
 
 
-def _first_reached(
+def first_reached(
     robot: Robot, truth: Geometry, point: Array, drawn: Iterable[PoseBatch], wanted: int, margin: float
-) -> _Reached:
+) -> Reached:
     """The first of some commands that the robot can be brought to without crossing a singularity.
 
     Raises:
         LimitError: there are fewer than wanted.
     """
-    parts: list[_Reached] = []
+    parts: list[Reached] = []
     for commands in drawn:
         parts.append(_reached(robot, truth, commands, margin))
         if sum(len(part.commands) for part in parts) >= wanted:
-            return _Reached.concatenate(parts)[:wanted]
+            return Reached.concatenate(parts)[:wanted]
     raise LimitError(f"too few poses can be reached at {point} without crossing a singularity")
 
 
-def _reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) -> _Reached:
+def _reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) -> Reached:
     """Those of some commands that keep the limits and, by both geometries, a singularity margin."""
     actual = robot.commanded(truth).actual_poses(commands)
     rows = actual.found & robot.limits.allow_commands(commands) & robot.limits.allow_joints(actual.joints)
     rows[rows] = robot.limits.allow_legs(robot.mechanism, truth, actual.poses[rows], actual.joints[rows])
-    found = _Reached(commands, actual.joints, actual.poses)[rows]
+    found = Reached(commands, actual.joints, actual.poses)[rows]
     sides = ((robot.commanding, found.commands), (truth, found.actual))
     clear = [
         has_singularity_margin(robot.mechanism, geometry, poses, found.joints, margin)
@@ -198,8 +149,9 @@ def _reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) 
     return found[np.logical_and(*clear)]
 
 
-def _data_set(robot: Robot, sets: list[_Reached], orientations: int) -> DataSet:
+def data_set(robot: Robot, sets: list[Reached], orientations: int) -> DataSet:
+    """The data set of what was reached at each point, so many poses at each."""
     labels = [(point, turn) for point in range(1, len(sets) + 1) for turn in range(1, orientations + 1)]
-    found = _Reached.concatenate(sets)
+    found = Reached.concatenate(sets)
     commands = robot.frames.inverse().poses(found.commands)
     return DataSet(np.array(labels), commands, found.joints, found.actual.positions @ robot.frames.base)

@@ -1,6 +1,6 @@
-"""The paper's own two solvers, kept as cross-checks (Abtahi et al. 2010, section 2).
+"""The paper's own solver, kept as a cross-check (Abtahi et al. 2010, section 2).
 
-Both minimise the plain sum of squares of all pairwise differences, eq. 5-8:
+It minimises the plain sum of squares of all pairwise differences, eq. 5-8:
 ``E = (P_r - d_r) - (P_n - d_n)`` for every two records r, n of a point. No weights, no prior.
 """
 
@@ -11,13 +11,12 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from hexacell.errors import ConvergenceError
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import measurement_model
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.forward import ForwardResult, forward_kinematics
+from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 
@@ -84,31 +83,3 @@ def gauss_newton_steps(
             raise ConvergenceError("Gauss-Newton left the assembly mode of a record")
         poses = reached.poses
         yield geometry, float(np.abs(step).max())
-
-
-def least_squares_without_jacobian(problem: Problem) -> Geometry:
-    """The paper's second solver (lsqnonlin): finite differences, a trust region, scipy's TRF.
-
-    Raises:
-        ConvergenceError: scipy reports no convergence, or the solution is on another assembly mode.
-    """
-
-    def reached(free: Array) -> ForwardResult:
-        return problem.solve_poses(free)
-
-    def error(free: Array) -> Array:
-        return error_vector(problem, reached(free).poses.positions - problem.deviations)
-
-    found = least_squares(
-        error,
-        problem.initial_parameters,
-        method="trf",
-        x_scale=1.0,
-        ftol=1e-15,
-        xtol=1e-15,
-        gtol=1e-15,
-        max_nfev=100,
-    )
-    if not found.success or not reached(found.x).found.all():
-        raise ConvergenceError(f"the least-squares solver ended without a solution: {found.message}")
-    return problem.geometry(found.x)

@@ -7,7 +7,7 @@ import numpy as np
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import identify
 from hexacell.robot.virtual_robot import random_robot
-from hexacell.study import data_sets
+from tests.records_within_travel import within_travel
 
 ROBOTS = 1000
 SIGMAS = 6.0
@@ -20,7 +20,7 @@ def test_every_robot_is_found(table_one, say) -> None:
         random = np.random.default_rng(seed)
         truth = random_robot(robot.mechanism, robot.drawing, robot.tolerances, random)
         try:
-            campaign = data_sets.within_travel(robot, truth, table_one.points, 11, np.radians(30), random)
+            campaign = within_travel(robot, truth, table_one.points, 11, np.radians(30), random)
         except LimitError:
             unreachable += 1
             continue

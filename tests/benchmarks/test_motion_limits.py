@@ -32,11 +32,11 @@ from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, controller_geometry, make_robot, robot_of
-from hexacell.study import data_sets
 from procedures.calibration.held_out_poses import HeldOutPoses
 from tests.benchmarks.conftest import Say
 from tests.benchmarks.virtual_calibration import robot_that_reaches, stands_at
 from tests.benchmarks.watched_robot import Seen, WatchedRobot, watch
+from tests.records_within_travel import within_travel
 from tests.simulated_campaign import SimulatedCampaign
 
 pytestmark = pytest.mark.benchmark
@@ -227,7 +227,7 @@ def best_fixed(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Gene
     for _ in range(DESIGNS):
         amplitude = np.radians(random.uniform(20.0, 45.0))
         try:
-            design = data_sets.within_travel(robot, truth, points, settings.orientations, amplitude, random)
+            design = within_travel(robot, truth, points, settings.orientations, amplitude, random)
         except LimitError:
             continue
         found = identify(robot.problem(design.measured(0.01, random)))

@@ -23,7 +23,8 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.study import data_sets
-from hexacell.study.reference_solvers import error_vector, least_squares_without_jacobian
+from hexacell.study.reference_solvers import error_vector
+from tests.least_squares import least_squares_without_jacobian
 
 SEARCH_SECONDS = 3.0
 """Longer than this nobody waits for the next pose."""

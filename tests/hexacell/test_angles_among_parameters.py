@@ -16,8 +16,8 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import Robot, robot_of
 from hexacell.robot.virtual_robot import random_robot
-from hexacell.study import data_sets
 from hexacell.text.identification import drawing_table
+from tests.records_within_travel import within_travel
 
 CONFIG = Path(__file__).parents[2] / "configs" / "linapod.toml"
 TURN = np.cos(np.radians(10.0))
@@ -34,7 +34,7 @@ def identified(robot: Robot, built: Geometry) -> Identification:
     settings = load_cell(CONFIG).settings
     truth, _ = robot.mechanism.normalize_frames(built)
     points, random = np.array(settings.identification.points), np.random.default_rng(2)
-    data = data_sets.within_travel(robot, truth, points, 11, np.radians(25.0), random)
+    data = within_travel(robot, truth, points, 11, np.radians(25.0), random)
     exact = replace(robot, noise=Noise(1e-4, 1e-4))
     return identify(exact.problem(data.measured(0.0, random)))
 

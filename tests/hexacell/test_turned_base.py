@@ -19,7 +19,7 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.measurements.records import MeasurementSet, deviation_of
 from hexacell.robot.model import Robot, make_robot
 from hexacell.robot.virtual_robot import robots_within_tolerances
-from hexacell.study import data_sets
+from tests.records_within_travel import within_travel
 from tests.simulated_campaign import SimulatedCampaign
 
 CONFIG = Path(__file__).parents[2] / "configs" / "gough-stewart.toml"
@@ -61,7 +61,7 @@ def truth(turned: Robot) -> Geometry:
 def records(turned: Robot, truth: Geometry, points: np.ndarray) -> MeasurementSet:
     """Without noise, at orientations about a level platform."""
     random = np.random.default_rng(4)
-    data = data_sets.within_travel(turned, truth, points, 11, np.radians(25.0), random)
+    data = within_travel(turned, truth, points, 11, np.radians(25.0), random)
     return data.measured(0.0, random)
 
 
@@ -131,6 +131,7 @@ def test_a_campaign_stays_within_the_travel(cell: Cell, turned: Robot, truth: Ge
     )
     campaign = SimulatedCampaign(settings, turned, truth, np.random.default_rng(5))
     campaign.carry_out()
+    assert campaign.outside == 0
     assert campaign.largest_mm < settings.limits.gauge_travel_mm
     found = campaign.plan.estimate(campaign.state).identification
     assert found is not None

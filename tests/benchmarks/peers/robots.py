@@ -25,9 +25,10 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.sensitivity import has_singularity_margin
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot.model import Robot, robot_of
-from hexacell.study.data_sets import DataSet, unlimited_travel, within_travel
+from hexacell.study.data_sets import DataSet, unlimited_travel
 from tests.benchmarks.peers.interface import Array, Records
 from tests.benchmarks.virtual_calibration import robot_that_reaches
+from tests.records_within_travel import within_travel
 from tests.simulated_campaign import SimulatedCampaign
 
 SEED = 18

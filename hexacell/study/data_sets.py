@@ -136,7 +136,7 @@ def first_reached(
 
 
 def _reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) -> Reached:
-    """Those of some commands that keep the limits and, by both geometries, a singularity margin."""
+    """The commands that keep the limits and, by both geometries, a singularity margin."""
     actual = robot.commanded(truth).actual_poses(commands)
     rows = actual.found & robot.limits.allow_commands(commands) & robot.limits.allow_joints(actual.joints)
     rows[rows] = robot.limits.allow_legs(robot.mechanism, truth, actual.poses[rows], actual.joints[rows])

@@ -22,7 +22,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.errors import ConvergenceError
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise, Problem
+from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
@@ -52,7 +52,7 @@ class Experiment:
 
     @property
     def key(self) -> str:
-        """It and no other."""
+        """The name of this experiment alone."""
         return f"{self.repeatability_mm:g} mm, {self.number}"
 
 
@@ -96,20 +96,17 @@ def run_experiment(experiment: Experiment) -> ExperimentOutcome:
     records = _scattered(calibrating, scatter, random).measured(NOISE_MM, random)
     stated = replace(robot, noise=Noise(NOISE_MM, float(np.hypot(NOISE_MM, scatter))))
     problem = stated.problem(records)
-    found = _by_paper(problem), identify(problem, find_outliers=False).geometry
+    try:
+        by_paper = gauss_newton(problem)
+    except ConvergenceError:
+        by_paper = None
+    found = by_paper, identify(problem, find_outliers=False).geometry
     return ExperimentOutcome(
         *(
             _differences(robot, truth, found, commanded, scatter, random)
             for commanded in (calibrating, verifying)
         )
     )
-
-
-def _by_paper(problem: Problem) -> Geometry | None:
-    try:
-        return gauss_newton(problem)
-    except ConvergenceError:
-        return None
 
 
 def _differences(
@@ -120,7 +117,7 @@ def _differences(
     scatter_mm: float,
     random: np.random.Generator,
 ) -> Differences:
-    """Of poses that are commanded by the drawing, and by each geometry that was found."""
+    """The differences of poses commanded by the drawing, and by each geometry that was found."""
 
     def places(geometry: Geometry | None) -> tuple[float, ...]:
         if geometry is None:
@@ -157,7 +154,7 @@ class Reduction:
 
     Attributes:
         before: with the drawing in the controller.
-        paper: with the geometry by the paper's estimator, of the draws in which that ends; NaN of none.
+        paper: with the geometry by the paper's estimator, of the draws in which that ends; NaN if it never does.
         ours: with that by this program's.
     """
 
@@ -167,7 +164,7 @@ class Reduction:
 
     @classmethod
     def of(cls, found: Sequence[Differences]) -> Reduction:
-        """Of the draws' differences."""
+        """The medians of the draws' differences."""
         return cls(
             _median(one.before for one in found),
             _median(one.paper for one in found),

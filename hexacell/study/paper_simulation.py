@@ -20,7 +20,6 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.errors import ConvergenceError, IdentifiabilityError
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Problem
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
@@ -31,7 +30,7 @@ from hexacell.study.reference_solvers import gauss_newton_steps
 from hexacell.study.tasks import Study
 
 NOISE_MM = 0.01
-"""Of every joint variable and deviation, one standard deviation."""
+"""Standard deviation of the noise of every joint variable and deviation, mm."""
 
 MOST_STEPS = 15
 SETTLED_MM = 1e-6
@@ -44,7 +43,8 @@ FIGURES = {4: 11, 5: 5}
 """Orientations at each point of a figure."""
 
 AMPLITUDES_DEG = (10.0, 20.0, 30.0, 40.0)
-STEPS_TOLD = (3, 5, 10)
+STEPS_SHOWN = (3, 5, 10)
+"""Steps of Gauss-Newton after which the paper's errors are shown."""
 
 PAPER_EXACT_MM, PAPER_NOISY_MM = 5e-2, 6e-1
 """Figure 4: two or more points without noise; five points with it."""
@@ -54,7 +54,7 @@ PAPER_TABLE_2_MM = {"S": 0.172, "B": 0.572, "l": 0.475}
 
 
 class Angles(StrEnum):
-    """What three angles of an orientation mean."""
+    """The meaning of the three angles of an orientation."""
 
     FIXED_AXES = "fixed x, y, z"
     ZYZ = "turned z, y, z"
@@ -84,20 +84,20 @@ class Trial:
 
     @property
     def key(self) -> str:
-        """It and no other."""
+        """The name of this trial alone."""
         kind = f"{self.angles}, {self.amplitude_deg:g} deg"
         return f"{self.points} x {self.orientations}, {kind}, {self.number}"
 
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """What both estimators make of the same records; largest errors of a parameter, mm.
+    """Largest errors of a parameter, mm, by both estimators from the same records.
 
     Attributes:
-        steps: of the paper's after each step of Gauss-Newton, as far as it came.
+        steps: by the paper's estimator after each step of Gauss-Newton, as far as it came.
         is_settled: whether it came to an end.
-        paper: of the kinds of parameters, by the paper's estimator where it came to its end; else empty.
-        ours: likewise by this program's; empty where it refuses records that cannot determine the geometry.
+        paper: by kinds of parameters, of the paper's estimator where it came to its end; else empty.
+        ours: by kinds of parameters, of this program's; empty where it refuses the records.
     """
 
     steps: tuple[float, ...]
@@ -107,18 +107,18 @@ class Errors:
 
     @property
     def paper_mm(self) -> float:
-        """Of any parameter; infinite where the paper's estimator came to no end."""
+        """Largest error by the paper's estimator; infinite where it came to no end."""
         return max(self.paper.values(), default=np.inf)
 
     @property
     def ours_mm(self) -> float:
-        """Likewise of this program's; infinite where it refuses."""
+        """Largest error by this program's estimator; infinite where it refuses."""
         return max(self.ours.values(), default=np.inf)
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a trial; ``deviation_mm`` is the largest that a gauge would have to show."""
+    """The outcome of a trial; ``deviation_mm`` is the largest that a gauge would have to show."""
 
     exact: Errors
     noisy: Errors
@@ -160,14 +160,11 @@ def _errors(robot: Robot, truth: Geometry, measurements: MeasurementSet) -> Erro
     except ConvergenceError:
         pass  # it left the assembly mode, which is_settled says
     paper = {} if found is None else _by_kind(found, truth)
-    return Errors(tuple(steps), is_settled, paper, _ours(problem, truth))
-
-
-def _ours(problem: Problem, truth: Geometry) -> dict[str, float]:
     try:
-        return _by_kind(identify(problem, find_outliers=False).geometry, truth)
+        ours = _by_kind(identify(problem, find_outliers=False).geometry, truth)
     except IdentifiabilityError:
-        return {}
+        ours = {}
+    return Errors(tuple(steps), is_settled, paper, ours)
 
 
 def _by_kind(found: Geometry, truth: Geometry) -> dict[str, float]:
@@ -188,13 +185,13 @@ def _table_one() -> tuple[Robot, Geometry, Array]:
 
 @dataclass(frozen=True, slots=True)
 class MedianErrors:
-    """Of several draws: medians of the largest error of a parameter, mm.
+    """Medians over several draws of the largest error of a parameter, mm.
 
     Attributes:
-        trials: how many there are.
+        trials: number of draws.
         settled: in how many the paper's estimator came to its end.
         refused: in how many this program's refused to identify.
-        paper_mm: by that, of those; NaN of none.
+        paper_mm: by the paper's estimator, of those that settled; NaN if no draw did.
         ours_there_mm: by this program's estimator, of the same; NaN where it refuses all of them.
         ours_mm: by this program's estimator, of all that it identified.
         after_steps_mm: by the paper's after 3, 5 and 10 steps, of all that came so far.
@@ -210,7 +207,7 @@ class MedianErrors:
 
     @classmethod
     def of(cls, errors: Sequence[Errors]) -> MedianErrors:
-        """Of the draws' errors."""
+        """The medians of the draws' errors."""
         settled = [one for one in errors if one.is_settled]
         return cls(
             len(errors),
@@ -219,7 +216,7 @@ class MedianErrors:
             _median(one.paper_mm for one in settled),
             _median(one.ours_mm for one in settled if one.ours),
             _median(one.ours_mm for one in errors if one.ours),
-            tuple(_median(_after(one, steps) for one in errors) for steps in STEPS_TOLD),
+            tuple(_median(_after(one, steps) for one in errors) for steps in STEPS_SHOWN),
         )
 
 
@@ -238,7 +235,7 @@ class PlannedSet:
 
 @dataclass(frozen=True, slots=True)
 class PaperStudy:
-    """All of it.
+    """The whole study.
 
     Attributes:
         figures: for 4 and 5, the sets with one to five points.

@@ -22,7 +22,7 @@ from hexacell.study.paper_simulation import (
     PAPER_EXACT_MM,
     PAPER_NOISY_MM,
     PAPER_TABLE_2_MM,
-    STEPS_TOLD,
+    STEPS_SHOWN,
     MedianErrors,
     PaperStudy,
     PlannedSet,
@@ -63,7 +63,7 @@ def study_lines(study: PaperStudy) -> Iterator[str]:
         yield HEAD
         for one in sets:
             both = f"{_accuracy(one.exact):<26} {_in_full(one.noisy):<32}"
-            yield f"  {one.points:<8} {both} {_deviation(one)}"
+            yield f"  {one.points:<8} {both} {one.deviation_mm:.0f} mm"
         yield wrapped(WHAT_THE_PAPER_SAYS[figure])
     yield from _table_2(study)
     yield from _sweep(study)
@@ -81,7 +81,7 @@ def _table_2(study: PaperStudy) -> Iterator[str]:
 
 def _sweep(study: PaperStudy) -> Iterator[str]:
     yield ""
-    steps = ", ".join(map(str, STEPS_TOLD))
+    steps = ", ".join(map(str, STEPS_SHOWN))
     yield wrapped(
         "Other orientations: 5 points, 11 orientations, with noise; largest error of a parameter, mm. "
         f"After {steps} steps of the paper's estimator, at its end, and ours as above."
@@ -90,7 +90,7 @@ def _sweep(study: PaperStudy) -> Iterator[str]:
     for one in study.sweep:
         after = " ".join(f"{_number(error):<6}" for error in one.noisy.after_steps_mm)
         angles = f"{one.angles:<16} {one.amplitude_deg:<3g}"
-        yield f"  {angles} {after} {_in_full(one.noisy):<24} {_deviation(one)}"
+        yield f"  {angles} {after} {_in_full(one.noisy):<24} {one.deviation_mm:.0f} mm"
 
 
 def study_document(study: PaperStudy) -> dict[str, Any]:
@@ -117,7 +117,7 @@ def _set(one: PlannedSet) -> dict[str, Any]:
 
 def _document(one: MedianErrors) -> dict[str, Any]:
     after = {
-        str(steps): _finite(error) for steps, error in zip(STEPS_TOLD, one.after_steps_mm, strict=True)
+        str(steps): _finite(error) for steps, error in zip(STEPS_SHOWN, one.after_steps_mm, strict=True)
     }
     medians = {name: _finite(getattr(one, name)) for name in ("paper_mm", "ours_there_mm", "ours_mm")}
     return asdict(one) | medians | {"after_steps_mm": after}
@@ -128,14 +128,14 @@ def _finite(value: float) -> float | None:
 
 
 def _accuracy(one: MedianErrors) -> str:
-    """Of both estimators: ``1.51 (12), 0.48``."""
+    """The errors of both estimators: ``1.51 (12), 0.48``."""
     ours = "refused" if one.refused == one.trials else _number(one.ours_mm)
     paper = f"{_number(one.paper_mm)} ({one.settled})" if one.settled else "none"
     return f"{paper}, {ours}"
 
 
 def _in_full(one: MedianErrors) -> str:
-    """Likewise with ours of the same draws between: ``1.51 (12), 0.48, 0.52``."""
+    """The errors with ours of the same draws between: ``1.51 (12), 0.48, 0.52``."""
     paper, _, ours = _accuracy(one).rpartition(", ")
     return f"{paper}, {_number(one.ours_there_mm)}, {ours}" if one.settled else f"{paper}, {ours}"
 
@@ -144,10 +144,6 @@ def _number(value: float) -> str:
     if not isfinite(value):
         return "-"
     return f"{value:.0e}" if value < 1e-3 else f"{value:.2f}" if value < 100.0 else f"{value:.0f}"
-
-
-def _deviation(one: PlannedSet) -> str:
-    return f"{one.deviation_mm:.0f} mm"
 
 
 def study_picture(study: PaperStudy) -> str:
@@ -167,8 +163,8 @@ def study_picture(study: PaperStudy) -> str:
                 name = f"{estimator}, {'0.01 mm of noise' if noise == 'noisy' else 'no noise'}"
                 x, y = zip(*shown, strict=True) if shown else ((), ())
                 axes.semilogy(x, y, marker + line, color=colour, label=name, markersize=4)
-        told = "the paper of figure 4, 5 points, noise"
-        axes.axhline(PAPER_NOISY_MM, color="#888888", linewidth=0.6, label=told)
+        label = "the paper of figure 4, 5 points, noise"
+        axes.axhline(PAPER_NOISY_MM, color="#888888", linewidth=0.6, label=label)
         axes.set_xticks(range(1, 6))
         axes.set_xlim(0.8, 5.2)
         axes.set_ylim(0.5 * SMALLEST_MM, 100.0)

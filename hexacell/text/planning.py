@@ -19,13 +19,13 @@ from hexacell.text.measured_noise import averaging_lines
 from hexacell.verdict.decision import Verdict
 
 DIGITS = 2
-"""Of a limit that is proposed."""
+"""Number of digits of a limit that is proposed."""
 
 TRYING_PLAN = "Trying the plan on simulated robots within the tolerances, some seconds ..."
 
 
 def decision_text(decision: StartPoint | MeasurePose | Finished) -> str:
-    """What to do now."""
+    """The decision what to do now, as a sentence."""
     match decision:
         case Finished(reason=reason):
             return f"Done: {reason}."
@@ -84,7 +84,7 @@ def run_forecast_line(forecast: Forecast) -> str:
 
 
 def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
-    """What a plan is expected to give, and for which robots it fails."""
+    """The outcome expected of a plan, and for which robots it fails."""
     result, target_mm = trial.result, trial.target_mm
     if not result.robots:
         yield (
@@ -128,7 +128,7 @@ def device_line(identity: DeviceIdentity) -> str:
 
 
 def preflight_lines(devices: Sequence[DeviceIdentity]) -> Iterator[str]:
-    """What was checked, before the plan is tried on simulated robots."""
+    """The checks that passed, before the plan is tried on simulated robots."""
     for identity in devices:
         yield f"ok  {device_line(identity)}"
     yield "ok  all points can be reached, all devices answer; nothing was moved"
@@ -186,7 +186,7 @@ def _percent(share: float) -> str:
 
 
 def quick_start_text(accepted: AcceptedResult | None) -> str | None:
-    """What a quick level starts from."""
+    """The result that a quick level starts from."""
     if accepted is None:
         return None
     return f"the quick level starts from the result of {accepted.at:%Y-%m-%d}, {Path(accepted.run).name}"
@@ -198,7 +198,7 @@ def quick_accuracy_text(found: QuickAccuracy) -> str:
 
 
 def quick_accuracy_sentences(found: QuickAccuracy) -> str:
-    """The same as sentences."""
+    """How well the robot is known after a quick level, and what more records would give."""
     further = ", ".join(f"{one.records} more {one.error_mm:.3f}" for one in found.further)
     return (
         f"{found.records} records leave {found.error_mm:.3f} mm at the worst task pose (one sigma), "
@@ -218,7 +218,7 @@ def _to_calibrated(found: QuickAccuracy) -> str:
 
 
 def quick_trial_text(trial: QuickTrial) -> str:
-    """What the quick level is expected to give."""
+    """The outcome expected of the quick level."""
     if trial.accuracy is None:
         return "No simulated robot that drifted as stated could be measured: a quick level may fail."
     return (
@@ -229,7 +229,7 @@ def quick_trial_text(trial: QuickTrial) -> str:
 
 
 def check_trial_text(trial: CheckTrial) -> str:
-    """What a check is expected to take and to give."""
+    """The time and the outcome expected of a check."""
     if not trial.records:
         return "No simulated robot that drifted as stated could be measured: a check may fail."
     error = (

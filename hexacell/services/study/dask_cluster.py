@@ -31,7 +31,7 @@ PATIENCE_S = 30.0
 """For a scheduler that does not answer, and for one that has no workers."""
 
 CHECKS = 5
-"""Of the workers within that time."""
+"""Number of checks, within that time, whether there are workers."""
 
 CLOSING_S = 2.0
 
@@ -52,10 +52,10 @@ def dask_cluster(address: str, *, patience_s: float = PATIENCE_S) -> NewExecutor
     a worker has another version of this program.
 
     Raises:
-        UsageError: this is no address of a scheduler.
+        UsageError: this is not an address of a scheduler.
     """
     if not re.fullmatch(r"(tcp|tls)://\S+:\d+", address):
-        raise UsageError(f"'{address}' is no address of a Dask scheduler", action="Try tcp://HOST:8786")
+        raise UsageError(f"'{address}' is not an address of a Dask scheduler", action="Try tcp://HOST:8786")
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # the errors here say it in plain words
     return partial(ClusterExecutor, address, patience_s)
@@ -96,7 +96,7 @@ class ClusterExecutor(Executor):
         patience_s: for its answer and its workers, s.
 
     Raises:
-        ClusterError: see :func:`dask_cluster`.
+        ClusterError: it does not answer, has no workers, or another version of this program.
     """
 
     def __init__(self, address: str, patience_s: float) -> None:
@@ -137,7 +137,7 @@ class ClusterExecutor(Executor):
         try:
             begun: distributed.Future[ResultType] = self._client.submit(task, pure=False)
         except Exception as error:
-            raise BrokenExecutor(f"the scheduler takes no tasks: {error}") from error
+            raise BrokenExecutor(f"the scheduler accepts no tasks: {error}") from error
         self._begun.add(begun)
         try:
             result: ResultType = await begun
@@ -161,7 +161,7 @@ class ClusterExecutor(Executor):
             async with asyncio.timeout(patience_s):
                 return bool(await self._client.nthreads())
         except Exception:
-            # The connection is lost, of which each task is told.
+            # The connection is lost, which each task reports.
             return False
 
 
@@ -206,7 +206,7 @@ async def _close(client: distributed.Client) -> None:
 
 
 async def _require_same_version(client: distributed.Client, address: str) -> None:
-    """Refuse a scheduler, which unpickles tasks too, and workers with another version, or none.
+    """Refuse a scheduler, which unpickles tasks too, and workers with another version, or without any.
 
     ``locate`` is of the standard library, so that they can be asked whatever they have.
     """
@@ -230,7 +230,7 @@ def _in_version(
     *arguments: Parameters.args,
     **named: Parameters.kwargs,
 ) -> ResultType:
-    """What a worker does: it may have come with another version after the others were asked."""
+    """Carry a task out in a worker, which may have another version if it came after the others were asked."""
     if version != __version__:
         place = distributed.get_worker().address
         raise ClusterError(

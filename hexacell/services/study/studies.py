@@ -18,7 +18,7 @@ from hexacell.storage import atomic_files
 from hexacell.study.tasks import ResultType, Study, SummaryType, TaskType, results_of
 
 OnProgress = Callable[[int, int], None]
-"""Told how many tasks of how many are done."""
+"""Called with the number of tasks that are done, and of all tasks."""
 
 NewExecutor = Callable[[], Executor]
 
@@ -35,16 +35,16 @@ def run_study(
     folder: Path,
     draws: int,
     new_executor: NewExecutor,
-    told: OnProgress,
+    on_progress: OnProgress,
 ) -> SummaryType:
-    """What a study says; what ``folder`` has of its results already is not computed again.
+    """The summary of a study; results that ``folder`` has already are not computed again.
 
     Args:
         study: one of them.
         folder: gets a line for each task, in a file ``.jsonl`` named after the study.
         draws: as many as the study is to make.
         new_executor: what carries out the tasks, such as :func:`processes`; another one where it breaks.
-        told: of the progress.
+        on_progress: is called after every task.
 
     Raises:
         FileError: the folder cannot be written, or has another file of that name.
@@ -54,7 +54,7 @@ def run_study(
     path = folder / f"{study.name}.jsonl"
     kept = cast("type[_Kept[ResultType]]", _Kept.__class_getitem__(study.result_type))
     return study.summary(
-        tasks, _results(path, TypeAdapter(kept), tasks, study.carry_out, new_executor, told)
+        tasks, _results(path, TypeAdapter(kept), tasks, study.carry_out, new_executor, on_progress)
     )
 
 
@@ -64,26 +64,26 @@ def _results(
     tasks: Mapping[str, TaskType],
     carry_out: Callable[[TaskType], ResultType],
     new_executor: NewExecutor,
-    told: OnProgress,
+    on_progress: OnProgress,
 ) -> dict[str, ResultType]:
     """The results of all tasks by their keys, those that were kept among them."""
     atomic_files.create_folder_durably(path.parent)
     known = {key: result for key, result in _known(path, kept).items() if key in tasks}
-    told(len(known), len(tasks))
+    on_progress(len(known), len(tasks))
     try:
         with path.open("a", encoding="utf-8") as file:
             for key, result in results_of(tasks, carry_out, new_executor, done=set(known)):
                 known[key] = result
                 file.write(kept.dump_json(_Kept(key=key, outcome=result)).decode() + "\n")
                 file.flush()
-                told(len(known), len(tasks))
+                on_progress(len(known), len(tasks))
     except OSError as error:
         raise atomic_files.os_error_to_file_error("cannot be written", path, error) from error
     return known
 
 
 def _known(path: Path, kept: TypeAdapter[_Kept[ResultType]]) -> dict[str, ResultType]:
-    """What was kept; a last line that was not finished is computed again."""
+    """The results that were kept; a last line that was not finished is computed again."""
     if not path.exists():
         return {}
     *lines, rest = path.read_text(encoding="utf-8").split("\n")
@@ -93,7 +93,10 @@ def _known(path: Path, kept: TypeAdapter[_Kept[ResultType]]) -> dict[str, Result
             result = kept.validate_json(line)
         except ValidationError as error:
             raise FileError(
-                "this is no result of this study", subject=path, line=number, action="Name another folder"
+                "this is not a result of this study",
+                subject=path,
+                line=number,
+                action="Name another folder",
             ) from error
         found[result.key] = result.outcome
     if rest:

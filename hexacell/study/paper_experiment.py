@@ -154,7 +154,7 @@ class Reduction:
 
     Attributes:
         before: with the drawing in the controller.
-        paper: with the geometry by the paper's estimator, of the draws in which that ends; NaN if it never does.
+        paper: with the geometry by the paper's estimator, of the draws in which that ends, else NaN.
         ours: with that by this program's.
     """
 

@@ -152,28 +152,22 @@ def verdict_forecast_lines(forecast: VerdictForecast) -> Iterator[str]:
 
 
 def _warning(forecast: VerdictForecast) -> str:
-    limits = " and ".join(_limits(forecast)) or "the limits"
-    part = f"{forecast.largest_part} ({forecast.largest_part_mm:.3f} of {forecast.standard_mm:.3f} mm)"
-    return (
-        f"That is too little: a good machine fails these limits. {WANTED:.0%} would pass {limits} in "
-        f"[acceptance]. The largest part of the uncertainty at the worst task pose is the {part}: "
-        f"{_help(forecast)}."
-    )
-
-
-def _limits(forecast: VerdictForecast) -> Iterator[str]:
-    """The limits that are too small, with the value that would do."""
+    """The limits that are too small with values that would do, and what would help."""
     wanted, present = forecast.passing, forecast.limits
+    limits = []
     if wanted.position_mm > present.position_mm:
-        yield f"position_mm = {_rounded_up(wanted.position_mm):g}"
+        limits.append(f"position_mm = {_rounded_up(wanted.position_mm):g}")
     if wanted.orientation_deg > present.orientation_deg:
-        yield f"orientation_deg = {_rounded_up(wanted.orientation_deg):g}"
-
-
-def _help(forecast: VerdictForecast) -> str:
+        limits.append(f"orientation_deg = {_rounded_up(wanted.orientation_deg):g}")
+    part = f"{forecast.largest_part} ({forecast.largest_part_mm:.3f} of {forecast.standard_mm:.3f} mm)"
+    remedy = "have it calibrated, or measure it, and state its size in [uncertainty]"
     if forecast.largest_part == NOISE:
-        return "more records, or means of more readings, reduce it"
-    return "have it calibrated, or measure it, and state its size in [uncertainty]"
+        remedy = "more records, or means of more readings, reduce it"
+    return (
+        f"That is too little: a good machine fails these limits. {WANTED:.0%} would pass "
+        f"{' and '.join(limits) or 'the limits'} in [acceptance]. The largest part of the uncertainty at "
+        f"the worst task pose is the {part}: {remedy}."
+    )
 
 
 def _rounded_up(limit: float) -> float:

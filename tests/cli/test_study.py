@@ -79,7 +79,7 @@ def test_what_is_no_study_is_not_overwritten(typed_here, tmp_path: Path) -> None
     (tmp_path / "kept" / "paper.jsonl").write_text("mine\n")
     refused = typed_here(*PAPER)
     assert refused.code == ExitCode.USAGE
-    assert "paper.jsonl:1: this is no result of this study. Name another folder" in refused.err
+    assert "paper.jsonl:1: this is not a result of this study. Name another folder" in refused.err
     assert (tmp_path / "kept" / "paper.jsonl").read_text() == "mine\n"
 
 

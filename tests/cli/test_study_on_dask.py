@@ -75,7 +75,7 @@ def test_a_lost_scheduler_ends_the_command_with_what_to_do(start, cluster, tmp_p
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--scheduler", "here"), "'here' is no address of a Dask scheduler. Try tcp://HOST:8786"),
+        (("--scheduler", "here"), "'here' is not an address of a Dask scheduler. Try tcp://HOST:8786"),
         (("--scheduler", "tcp://h:1", "--processes", "2"), "not allowed with argument --scheduler"),
     ],
 )

@@ -230,7 +230,7 @@ def _in_version(
     *arguments: Parameters.args,
     **named: Parameters.kwargs,
 ) -> ResultType:
-    """Carry a task out in a worker, which may have another version if it came after the others were asked."""
+    """Carry a task out in a worker, which may have come later with another version."""
     if version != __version__:
         place = distributed.get_worker().address
         raise ClusterError(

@@ -196,5 +196,5 @@ def test_a_worker_that_comes_later_with_another_version_is_named(cluster, monkey
 
 @pytest.mark.parametrize("address", ["", "here", "127.0.0.1:8786", "tcp://127.0.0.1", "tcp://:port"])
 def test_what_is_no_address_is_refused(address: str) -> None:
-    with pytest.raises(UsageError, match="is no address of a Dask scheduler"):
+    with pytest.raises(UsageError, match="is not an address of a Dask scheduler"):
         dask_cluster(address)

@@ -7,9 +7,10 @@ single parameter are seen later. It says early that something happened, and prob
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexacell.cell.fields import Frozen
 from hexacell.checks.check import Check
@@ -38,11 +39,11 @@ class ChangeAlarm(Frozen):
     """Whether the first records of a check contradict a robot that has not changed since, by one parameter.
 
     Attributes:
-        records: that were tested.
+        records: number of records that were tested.
         score: the largest of all parameters; each is standard normal for an unchanged robot.
         limit: what the largest exceeds in one of a hundred checks of unchanged robots.
-        leg: that changed, if one did, by all records of the check; its likeliest ``parameter``, the
-            ``change`` of that and its standard deviation, if it alone changed.
+        leg: the leg that changed, if one did, by all records of the check; its likeliest ``parameter``,
+            the ``change`` of that and its standard deviation, if it alone changed.
     """
 
     records: int
@@ -58,19 +59,6 @@ class ChangeAlarm(Frozen):
     def is_raised(self) -> bool:
         """Whether an unchanged robot is contradicted."""
         return self.score > self.limit
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ChangeTest:
-    """The test of single causes, and the leg that changed if one did.
-
-    Attributes:
-        cause: index of the likeliest parameter of that leg.
-    """
-
-    test: SingleCauseTest
-    leg: int
-    cause: int
 
 
 def change_alarm_at(check: Check, measurements: MeasurementSet, warmer: Array | None) -> ChangeAlarm | None:
@@ -100,60 +88,41 @@ def change_alarm(
     Raises:
         IdentifiabilityError: the records do not belong to this robot.
     """
-    false = check.false_records(measurements)
+    before, false = check.before, check.false_records(measurements)
     sound = [row for row, one in enumerate(measurements.records) if one.id not in false]
-    first, every = (
-        _tested(check, measurements, rows, expansion) for rows in (sound[:FIRST_RECORDS], sound)
-    )
-    if first is None or len(sound) < FIRST_RECORDS:
+    if before is None or len(sound) < FIRST_RECORDS:
         return None
-    assert every is not None  # noqa: S101 - the first records had a test
-    parameter = check.robot.mechanism.parameters.parameters[every.cause]
+    first, _ = _single_causes(check, before, measurements, sound[:FIRST_RECORDS], expansion)
+    every, legs = _single_causes(check, before, measurements, sound, expansion)
+    leg = likeliest_leg(every.scores, every.sigmas, legs)
+    cause = int(np.where(legs == leg, np.abs(every.scores), -1.0).argmax())
+    parameter = check.robot.mechanism.parameters.parameters[cause]
     return ChangeAlarm(
         records=FIRST_RECORDS,
-        score=float(np.abs(first.test.scores).max()),
-        limit=first.test.limit,
-        leg=every.leg,
+        score=float(np.abs(first.scores).max()),
+        limit=first.limit,
+        leg=leg,
         parameter=parameter.name,
         unit=parameter.kind.unit.value,
-        change=float(every.test.changes[every.cause]),
-        sigma=float(every.test.sigmas[every.cause]),
+        change=float(every.changes[cause]),
+        sigma=float(every.sigmas[cause]),
     )
 
 
-def _tested(
-    check: Check, measurements: MeasurementSet, rows: list[int], expansion: Array | None
-) -> ChangeTest | None:
-    records = MeasurementSet(tuple(measurements.records[row] for row in rows))
-    if not rows or check.before is None:
-        return None
-    by_row = None if expansion is None else expansion[rows]
-    return change_test(check.robot, check.before, records, check.earlier, by_row)
-
-
-def change_test(
-    robot: Robot,
+def _single_causes(
+    check: Check,
     before: IdentifiedBefore,
     measurements: MeasurementSet,
-    earlier: Mapping[str, Array],
-    expansion: Array | None = None,
-) -> ChangeTest:
-    """Test records of a robot that was identified before against its not having changed since.
-
-    Args:
-        robot: with the systematic effects, which act as they did then.
-        before: the identification.
-        measurements: some records.
-        earlier: what the effects did to that identification, as in :class:`~hexacell.checks.check.Check`.
-        expansion: (n, P), by how much the parameters differ at each record from those of then.
-    """
-    records = machine_records(robot, measurements, robot.free_parameters, expansion)
+    rows: list[int],
+    expansion: Array | None,
+) -> tuple[SingleCauseTest, NDArray[np.int_]]:
+    """The test of a change of each parameter by some of the records, and the legs of the parameters."""
+    robot, by_row = check.robot, None if expansion is None else expansion[rows]
+    some = MeasurementSet(tuple(measurements.records[row] for row in rows))
+    records = machine_records(robot, some, robot.free_parameters, by_row)
     causes = machine_causes(robot, len(records.state))
-    covariance = _state_covariance(before.covariance, robot.effects, earlier, len(records.state))
-    found = single_cause_test(records, covariance, causes.by_state)
-    leg = likeliest_leg(found.scores, found.sigmas, causes.legs)
-    of_leg = np.where(causes.legs == leg, np.abs(found.scores), -1.0)
-    return ChangeTest(found, leg, int(of_leg.argmax()))
+    covariance = _state_covariance(before.covariance, robot.effects, check.earlier, len(records.state))
+    return single_cause_test(records, covariance, causes.by_state), causes.legs
 
 
 def machine_records(

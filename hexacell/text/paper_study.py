@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from math import isfinite
 from typing import Any
@@ -95,36 +95,56 @@ def _sweep(study: PaperStudy) -> Iterator[str]:
 
 def study_document(study: PaperStudy) -> dict[str, Any]:
     """All figures as a JSON document; what is not finite is null."""
-    return {
-        "noise_mm": NOISE_MM,
-        "paper": {
-            "exact_mm": PAPER_EXACT_MM,
-            "noisy_mm": PAPER_NOISY_MM,
-            "table_2_mm": PAPER_TABLE_2_MM,
-        },
-        "figures": {str(figure): [_set(one) for one in sets] for figure, sets in study.figures.items()},
-        "sweep": [_set(one) for one in study.sweep],
-        "table_2": {
-            kind: {"paper_mm": _finite(paper), "ours_mm": _finite(ours)}
-            for kind, (paper, ours) in study.table_2.items()
-        },
-    }
+    document: dict[str, Any] = finite(
+        {
+            "noise_mm": NOISE_MM,
+            "paper": {
+                "exact_mm": PAPER_EXACT_MM,
+                "noisy_mm": PAPER_NOISY_MM,
+                "table_2_mm": PAPER_TABLE_2_MM,
+            },
+            "figures": {figure: [_set(one) for one in sets] for figure, sets in study.figures.items()},
+            "sweep": [_set(one) for one in study.sweep],
+            "table_2": {
+                kind: {"paper_mm": paper, "ours_mm": ours} for kind, (paper, ours) in study.table_2.items()
+            },
+        }
+    )
+    return document
 
 
 def _set(one: PlannedSet) -> dict[str, Any]:
-    return asdict(one) | {"exact": _document(one.exact), "noisy": _document(one.noisy)}
-
-
-def _document(one: MedianErrors) -> dict[str, Any]:
-    after = {
-        str(steps): _finite(error) for steps, error in zip(STEPS_SHOWN, one.after_steps_mm, strict=True)
+    medians = {"exact": one.exact, "noisy": one.noisy}
+    return asdict(one) | {
+        noise: asdict(errors)
+        | {"after_steps_mm": dict(zip(STEPS_SHOWN, errors.after_steps_mm, strict=True))}
+        for noise, errors in medians.items()
     }
-    medians = {name: _finite(getattr(one, name)) for name in ("paper_mm", "ours_there_mm", "ours_mm")}
-    return asdict(one) | medians | {"after_steps_mm": after}
 
 
-def _finite(value: float) -> float | None:
-    return value if isfinite(value) else None
+def experiment_document(study: ExperimentStudy) -> dict[str, Any]:
+    """All figures as a JSON document; what is not finite is null."""
+    document: dict[str, Any] = finite(
+        {
+            "paper": {"reduction": PAPER_REDUCTION, "repeatability_mm": PAPER_REPEATABILITY_MM},
+            "rows": [asdict(row) for row in study.rows],
+            "example": asdict(study.example),
+        }
+    )
+    return document
+
+
+def finite(part: Any) -> Any:  # noqa: ANN401 - any part of a document
+    """A part of a JSON document, with null for what is not finite."""
+    match part:
+        case Mapping():
+            return {str(key): finite(one) for key, one in part.items()}
+        case list() | tuple():
+            return [finite(one) for one in part]
+        case float() if not isfinite(part):
+            return None
+        case _:
+            return part
 
 
 def _accuracy(one: MedianErrors) -> str:
@@ -211,22 +231,6 @@ def _columns(before: str, paper: str, ours: str) -> str:
 
 def _after(value: float, before: float) -> str:
     return f"{value:.3f} -{100 * (1 - value / before):.1f}%" if isfinite(value) else "-"
-
-
-def experiment_document(study: ExperimentStudy) -> dict[str, Any]:
-    """All figures as a JSON document; what is not finite is null."""
-    return {
-        "paper": {"reduction": PAPER_REDUCTION, "repeatability_mm": PAPER_REPEATABILITY_MM},
-        "rows": [
-            asdict(row) | {name: _medians(getattr(row, name)) for name in ("calibrating", "verifying")}
-            for row in study.rows
-        ],
-        "example": asdict(study.example),
-    }
-
-
-def _medians(one: Reduction) -> dict[str, float | None]:
-    return {name: value if isfinite(value) else None for name, value in asdict(one).items()}
 
 
 def experiment_picture(study: ExperimentStudy) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Executor, ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
@@ -52,34 +52,20 @@ def run_study(
     """
     tasks = study.tasks_of(draws)
     path = folder / f"{study.name}.jsonl"
-    kept = cast("type[_Kept[ResultType]]", _Kept.__class_getitem__(study.result_type))
-    return study.summary(
-        tasks, _results(path, TypeAdapter(kept), tasks, study.carry_out, new_executor, on_progress)
-    )
-
-
-def _results(
-    path: Path,
-    kept: TypeAdapter[_Kept[ResultType]],
-    tasks: Mapping[str, TaskType],
-    carry_out: Callable[[TaskType], ResultType],
-    new_executor: NewExecutor,
-    on_progress: OnProgress,
-) -> dict[str, ResultType]:
-    """The results of all tasks by their keys, those that were kept among them."""
-    atomic_files.create_folder_durably(path.parent)
-    known = {key: result for key, result in _known(path, kept).items() if key in tasks}
-    on_progress(len(known), len(tasks))
+    kept = TypeAdapter(cast("type[_Kept[ResultType]]", _Kept.__class_getitem__(study.result_type)))
+    atomic_files.create_folder_durably(folder)
+    results = {key: result for key, result in _known(path, kept).items() if key in tasks}
+    on_progress(len(results), len(tasks))
     try:
         with path.open("a", encoding="utf-8") as file:
-            for key, result in results_of(tasks, carry_out, new_executor, done=set(known)):
-                known[key] = result
+            for key, result in results_of(tasks, study.carry_out, new_executor, done=set(results)):
+                results[key] = result
                 file.write(kept.dump_json(_Kept(key=key, outcome=result)).decode() + "\n")
                 file.flush()
-                on_progress(len(known), len(tasks))
+                on_progress(len(results), len(tasks))
     except OSError as error:
         raise atomic_files.os_error_to_file_error("cannot be written", path, error) from error
-    return known
+    return study.summary(tasks, results)
 
 
 def _known(path: Path, kept: TypeAdapter[_Kept[ResultType]]) -> dict[str, ResultType]:

@@ -84,12 +84,9 @@ def chosen_records(
             return ChosenRecords(robot, _random(settings, robot, truth, random, RANDOM_DEG, wanted))
         case OrientationChoice.PAPER:
             amplitude, count = float(np.radians(PAPER_DEG)), settings.identification.orientations
-            drawn = unlimited_travel(robot, truth, _points(settings), count, amplitude, random)
+            points = np.array(settings.identification.points)
+            drawn = unlimited_travel(robot, truth, points, count, amplitude, random)
             return ChosenRecords(robot, drawn.measured(robot.noise.gauge_mm, random))
-
-
-def _points(settings: CellSettings) -> Array:
-    return np.array([point[:3] for point in settings.identification.points])
 
 
 def _best_fixed(settings: CellSettings, robot: Robot, truth: Geometry) -> list[list[Pose]]:
@@ -127,9 +124,9 @@ def _selected(
 
 
 def possible_targets(belief: RobotBelief, zero: GaugeZero, count: int, seed: int) -> ReachableTargets:
-    """Those of ``count`` poses (a power of two) all over tilt and turn that the estimated robot can take.
+    """The poses, of ``count`` (a power of two) all over tilt and turn, that the estimated robot can take.
 
-    The ball is where the gauges were zeroed, and the robot on its assembly mode of then.
+    The ball is where the gauges were zeroed, and the robot on the assembly mode that it had there.
     """
     from scipy.stats import qmc  # noqa: PLC0415 - half a second that only this function needs
 
@@ -194,7 +191,7 @@ def _random(
 
 
 def _inside(virtual: VirtualRobot, pose: Pose, point: int, orientation: int) -> list[Record]:
-    """The record of a pose; none where the robot cannot stand, or the ball leaves the travel."""
+    """The record of a pose; empty where the robot cannot stand, or the ball leaves the travel."""
     if not virtual.can_stand(virtual.model.from_commands([pose]))[0]:
         return []
     virtual.place(pose)

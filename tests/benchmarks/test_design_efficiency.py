@@ -25,7 +25,7 @@ from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
 from hexacell.services.study.studies import processes
 from hexacell.study.design_records import possible_targets
-from hexacell.study.design_trials import SEED
+from hexacell.study.design_study import SEED
 from tests.benchmarks.continuous_design import (
     Criterion,
     Design,

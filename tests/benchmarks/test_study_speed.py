@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import pytest
 
 from hexacell.services.study.studies import processes, run_study
-from hexacell.study.design_trials import DesignOutcome, DesignTrial, run_design_trial
+from hexacell.study.design_study import DesignOutcome, DesignTrial, run_design_trial
 from hexacell.study.tasks import Study
 
 pytestmark = pytest.mark.benchmark

@@ -11,11 +11,19 @@ import pytest
 from pydantic import TypeAdapter
 
 from hexacell.measurements.records import MeasurementSet
-from hexacell.study import design_trials
+from hexacell.study import design_study as design_trials
 from hexacell.study.design_records import ChosenRecords, OrientationChoice, chosen_records
-from hexacell.study.design_summary import SWEEPS, SWEPT, design_summary, design_trials_of
-from hexacell.study.design_trials import DesignOutcome, DesignTrial, RecordsAccuracy, run_design_trial
-from hexacell.text.design_study import design_document, design_lines, design_picture
+from hexacell.study.design_study import (
+    SWEEPS,
+    SWEPT,
+    DesignOutcome,
+    DesignTrial,
+    RecordsAccuracy,
+    design_summary,
+    design_trials_of,
+    run_design_trial,
+)
+from hexacell.text.studies import design_document, design_lines, design_picture
 
 
 def outcome(trial: DesignTrial) -> DesignOutcome:

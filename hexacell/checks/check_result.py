@@ -17,8 +17,8 @@ from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.results.result import AcceptedResult, LengthResult
 from hexacell.uncertainty.effects import Effect
 from hexacell.verdict.check_statement import CheckStatement
-from hexacell.verdict.decision import JudgedError, Verdict
-from hexacell.verdict.verification import VerifiedAccuracy, outcome_of
+from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
+from hexacell.verdict.verification import outcome_of
 
 
 class ParameterChange(Frozen):

@@ -21,8 +21,7 @@ from hexacell.text.report.report import (
 )
 from hexacell.text.report.statement import MEANINGS, MODES, decision_rule, method_sentences, scope_sentences
 from hexacell.uncertainty.statement import COVERAGE, COVERAGE_FACTOR
-from hexacell.verdict.decision import Verdict
-from hexacell.verdict.verification import VerifiedAccuracy
+from hexacell.verdict.decision import Verdict, VerifiedAccuracy
 
 TITLE = "Digital Calibration Certificate"
 SCHEMA_VERSION = "3.3.0"

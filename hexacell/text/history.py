@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from hexacell.results.run_comparison import ParameterTrend, RunComparison
-from hexacell.services.history.retention import Retention
 from hexacell.services.history.run_index import PastRun
 from hexacell.text.layout import wrapped
-from hexacell.text.parameters import parameter_table, rows_of_changes
+
+if TYPE_CHECKING:
+    from hexacell.results.run_comparison import ParameterTrend, RunComparison
+    from hexacell.services.history.retention import Retention
 
 NO_RUNS = "This cell has no runs yet."
 NO_DRIFT = "A drift needs three calibrations of the cell."
@@ -60,6 +62,8 @@ def standing(run: PastRun) -> str:
 
 def comparison_text(before: PastRun, after: PastRun, compared: RunComparison) -> str:
     """The verdict on the change in words, then every free parameter."""
+    from hexacell.text.parameters import parameter_table, rows_of_changes  # noqa: PLC0415 - not for `status`
+
     return "\n".join(
         [
             wrapped(f"{before.name} -> {after.name}: {comparison_sentence(compared)}"),

@@ -9,9 +9,9 @@ from hexacell.checks.check_result import CheckResult
 from hexacell.results.result import AcceptedResult, LengthResult
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.layout import wrapped
-from hexacell.verdict.decision import JudgedError, Verdict
+from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from hexacell.verdict.length_check import LengthStatement, scale_words
-from hexacell.verdict.verification import Verification, VerifiedAccuracy
+from hexacell.verdict.verification import Verification
 
 
 def verification_text(verified: Verification) -> str:

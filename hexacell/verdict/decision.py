@@ -18,9 +18,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
+from typing import Literal
 
-from hexacell.cell.fields import Frozen
+from hexacell.cell.fields import Frozen, SixNumbers
 from hexacell.cell.measuring import AcceptanceSettings
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.parameters import JointUnit
+from hexacell.results.result import LengthResult
 from hexacell.uncertainty.statement import LargestError, TaskErrors
 
 
@@ -118,3 +122,27 @@ class ErrorLimits:
         of_position = decide(position, self.position_mm, self.guard_band_factor)
         of_orientation = decide(orientation, self.orientation_deg, self.guard_band_factor)
         return worst_verdict([of_position, of_orientation])
+
+
+class VerifiedAccuracy(Frozen):
+    """The error of the written geometry at the task poses.
+
+    Attributes:
+        poses: their number, and whether the cell file names them; else they span the workspace.
+        worst: the pose with the largest position error, in the controller's frames.
+        length: what a length check found; none if there was none.
+        scale_of: what says how long a millimetre is: the encoders, or the drawing where these read angles.
+    """
+
+    position: JudgedError
+    orientation: JudgedError
+    poses: int
+    task_named: bool
+    worst: SixNumbers
+    length: LengthResult | None = None
+    scale_of: Literal["encoders", "drawing"] = "encoders"
+
+    @staticmethod
+    def scale_with(mechanism: Mechanism) -> Literal["encoders", "drawing"]:
+        """What says so of a mechanism."""
+        return "encoders" if mechanism.words.joint_unit is JointUnit.MM else "drawing"

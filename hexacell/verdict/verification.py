@@ -10,29 +10,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hexacell.campaign.task_accuracy import Task
-from hexacell.cell.fields import Frozen, SixNumbers
+from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
 from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
-from hexacell.results.result import IdentificationResult, LengthResult
+from hexacell.results.result import IdentificationResult
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_errors import JudgedGeometry
-from hexacell.verdict.decision import JudgedError, Verdict, worst_verdict
+from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy, worst_verdict
 from hexacell.verdict.length_check import LengthMeasurements, length_check, length_result
 from hexacell.verdict.model_evidence import (
     ZEROS_DOUBTED,
@@ -59,30 +57,6 @@ class DeviationStatistics:
         if not len(distances) or not np.isfinite(distances).all():
             return None
         return cls(float(distances.mean()), len(distances))
-
-
-class VerifiedAccuracy(Frozen):
-    """The error of the written geometry at the task poses.
-
-    Attributes:
-        poses: their number, and whether the cell file names them; else they span the workspace.
-        worst: the pose with the largest position error, in the controller's frames.
-        length: what a length check found; none if there was none.
-        scale_of: what says how long a millimetre is: the encoders, or the drawing where these read angles.
-    """
-
-    position: JudgedError
-    orientation: JudgedError
-    poses: int
-    task_named: bool
-    worst: SixNumbers
-    length: LengthResult | None = None
-    scale_of: Literal["encoders", "drawing"] = "encoders"
-
-    @staticmethod
-    def scale_with(mechanism: Mechanism) -> Literal["encoders", "drawing"]:
-        """What says so of a mechanism."""
-        return "encoders" if mechanism.words.joint_unit is JointUnit.MM else "drawing"
 
 
 class Verification(Frozen):

@@ -26,8 +26,7 @@ from hexacell.runs.archived_documents import (
     folder_stamps,
 )
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.verdict.decision import Verdict
-from hexacell.verdict.verification import VerifiedAccuracy
+from hexacell.verdict.decision import Verdict, VerifiedAccuracy
 
 if TYPE_CHECKING:
     from hexacell.drift.run_evidence import RunEvidence

@@ -10,7 +10,7 @@ from hexacell.results.result import IdentificationResult
 from hexacell.runs.run_folder import RunFolder, StartAttempts, read_attempts
 from hexacell.services.history.run_index import RunSummary
 from hexacell.services.write_back.proposals import later_approval
-from hexacell.verdict.verification import VerifiedAccuracy
+from hexacell.verdict.decision import VerifiedAccuracy
 from procedures.journal.journal import read_entries, read_journal
 from procedures.journal.line_format import Entry
 from procedures.run import events

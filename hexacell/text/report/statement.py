@@ -11,9 +11,8 @@ from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.text.report.pages import Block, Chapter, Facts, Paragraph, Table, Tone
 from hexacell.text.verdict import not_checked, scale_lines, teaching_sentence
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
-from hexacell.verdict.decision import JudgedError, Verdict
+from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from hexacell.verdict.model_evidence import ModelTest
-from hexacell.verdict.verification import VerifiedAccuracy
 from procedures.run.steps import Phase
 
 NO_VERDICT = "NOT EVALUATED"

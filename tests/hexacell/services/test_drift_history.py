@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.runs.run_folder import RunFolder
-from hexacell.services.history import drift_history as module
+from hexacell.services.history import run_evidence_document
 from hexacell.services.history.drift_history import DriftHistory, drift_history
 from hexacell.services.history.run_evidence_document import evidence_document
 from hexacell.services.history.run_index import EvidenceDocument
@@ -83,7 +83,7 @@ def test_each_run_is_computed_once_for_what_the_cell_file_states(nights, monkeyp
         computed.append(folder.path.name)
         return evidence_document(settings, folder)
 
-    monkeypatch.setattr(module, "evidence_document", noted)
+    monkeypatch.setattr(run_evidence_document, "evidence_document", noted)
     after(nights, 2, crash={})
     assert len(computed) == 3
     nights.check()

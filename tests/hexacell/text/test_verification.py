@@ -9,9 +9,9 @@ import pytest
 from hexacell.checks.check_result import CheckResult, ParameterChange, check_line
 from hexacell.results.result import AcceptedResult
 from hexacell.text.verdict import check_start_text, check_text, not_checked, verification_text
-from hexacell.verdict.decision import JudgedError, Verdict
+from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from hexacell.verdict.model_evidence import ModelTest
-from hexacell.verdict.verification import Verification, VerifiedAccuracy
+from hexacell.verdict.verification import Verification
 
 WHEN = datetime(2026, 11, 20, 2, 30, tzinfo=UTC)
 

@@ -25,9 +25,9 @@ from hexacell.noise.measured_noise import (
 )
 from hexacell.results.result import OutlierRecord
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from hexacell.verdict.decision import JudgedError, Verdict
+from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from hexacell.verdict.model_evidence import ModelTest
-from hexacell.verdict.verification import Verification, VerifiedAccuracy
+from hexacell.verdict.verification import Verification
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.events import course, measuring, results

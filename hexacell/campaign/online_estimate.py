@@ -22,12 +22,10 @@ from hexacell.campaign.pilots import are_counted
 from hexacell.design.predicted_records import GaugeZero, gauge_zero_at
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.data_faults.hypotheses import record_ids, record_mask
-from hexacell.identification.data_faults.online_rejection import without_gross_errors
-from hexacell.identification.estimator import estimate_online
+from hexacell.identification.estimator import estimate_online, without_gross_errors
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.levenberg_marquardt import COARSE, INCREMENTAL
+from hexacell.identification.solver.fit import COARSE, INCREMENTAL
 from hexacell.identification.solver.multistart import restarts
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
@@ -164,7 +162,7 @@ def update_estimate(
     """The estimate from that of all records but the last; with ``tries_others``, doubted if implausible."""
     if before is None:
         return ChainedEstimate(estimate_online(problem))
-    kept = problem.subset(~record_mask(problem, before.false_records))
+    kept = problem.subset(~problem.mask_of(before.false_records))
     found = _continued(kept, before.identification)
     if not tries_others or _is_plausible(kept, found):
         return ChainedEstimate(found, before.false_records)
@@ -206,7 +204,7 @@ def _without_false_records(found: Identification) -> ChainedEstimate | None:
     """The plausible estimate from most of the records, if there is one."""
     for fewer in without_gross_errors(found):
         if _is_plausible(fewer.problem, fewer):
-            false = frozenset(record_ids(found.problem)) - frozenset(record_ids(fewer.problem))
+            false = frozenset(found.problem.record_ids) - frozenset(fewer.problem.record_ids)
             return ChainedEstimate(fewer, false)
     return None
 

@@ -22,7 +22,7 @@ from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import exact_records
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.scale_observation import ScaleObservation
+from hexacell.uncertainty.propagation import ScaleObservation
 
 
 @dataclass(frozen=True, slots=True, eq=False)

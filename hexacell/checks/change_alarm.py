@@ -24,9 +24,8 @@ from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
-from hexacell.uncertainty.effects import Effect, Occurrence
+from hexacell.uncertainty.effects import Effect, Occurrence, RecordEffects
 from hexacell.uncertainty.geometry_drift import IdentifiedBefore
-from hexacell.uncertainty.record_effects import RecordEffects
 
 FIRST_RECORDS = 8
 """Number of a check's first records that are tested, references included."""

@@ -18,7 +18,7 @@ from hexacell.checks.drift_estimator import DriftEstimator, ScaledEstimate
 from hexacell.design.criteria import add_information
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.problem.data_requirements import is_overdetermined
-from hexacell.identification.problem.problem import Prior
+from hexacell.identification.problem.prior import Prior
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.geometry_drift import IdentifiedBefore

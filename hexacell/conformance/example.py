@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.identification.problem.problem import Tolerances
+from hexacell.identification.problem.prior import Tolerances
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism

@@ -6,10 +6,10 @@ import numpy as np
 
 from hexacell.conformance.example import MechanismExample
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.build import build_problem
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
-from hexacell.identification.problem.problem import Noise, Prior
-from hexacell.identification.solver.regularized_fit import RELEASE_RATIO
+from hexacell.identification.problem.prior import Noise, Prior
+from hexacell.identification.problem.problem import Assumptions
+from hexacell.identification.solver.fit import RELEASE_RATIO
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
@@ -27,14 +27,13 @@ def check_identification(example: MechanismExample) -> None:
     """A robot within the tolerances is identified from its records, commanded with the drawing."""
     _, truth, *_ = example.robots()
     normal, _ = example.mechanism.normalize_frames(truth)
-    problem = build_problem(
+    problem = Assumptions(
         example.mechanism,
-        records_without_noise(example, truth),
         controller=CommandingGeometry.of(example.mechanism, example.drawing),
         branch=example.branch,
         prior=Prior.of(example.mechanism, example.drawing, example.widths),
         noise=NOISE,
-    )
+    ).problem(records_without_noise(example, truth))
     found = identify(problem)
     # How large a machine is, records without noise seem to tell, and sigma says that they do not.
     if found.undetermined and not example.mechanism.frame_freedom.size:

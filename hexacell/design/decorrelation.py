@@ -20,8 +20,7 @@ from hexacell.design.predicted_records import (
     predict_records,
 )
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.diagnostics.correlations import CorrelatedPair
-from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.result import CorrelatedPair, Identification
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array

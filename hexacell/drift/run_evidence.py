@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hexacell.identification.problem.prior import SystematicModel, no_systematic_errors
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.problem.systematic_errors import SystematicModel, no_systematic_errors
-from hexacell.identification.solver.linear_costs import systematic_errors
-from hexacell.identification.solver.measurement_model import Prediction, predict
-from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
+from hexacell.identification.solver.linear_model import systematic_errors
+from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction, predict
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import position_sensitivity
 

@@ -14,7 +14,7 @@ from hexacell.checks.check import Check
 from hexacell.checks.quick_level import QuickAccuracy, QuickLevel
 from hexacell.dry_run.campaign import VirtualCampaign, VisitedPose
 from hexacell.errors import HexacellError
-from hexacell.identification.problem.problem import Prior
+from hexacell.identification.problem.prior import Prior
 from hexacell.robot.virtual_robot import VirtualRobot
 
 MOST_TRIED = 3

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.commanded_motion import ActualPoses, CommandedRobot
 from hexacell.kinematics.forward import apply_twist
 from hexacell.kinematics.free_sensitivity import FreeSensitivity, free_sensitivity

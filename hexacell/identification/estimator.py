@@ -2,22 +2,39 @@
 
 from __future__ import annotations
 
-from hexacell.identification.data_faults.rejection import screen
+from collections.abc import Iterator
+
+import numpy as np
+
+from hexacell.identification.data_faults.hypothesis_search import LARGEST_REJECTED_SHARE
+from hexacell.identification.data_faults.score_tests import OutlierStatistics
+from hexacell.identification.data_faults.stepwise_selection import screen
 from hexacell.identification.problem.data_requirements import (
+    is_overdetermined,
     require_enough_records,
     require_rotation_diversity,
 )
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.levenberg_marquardt import COARSE, SolverOptions
-from hexacell.identification.solver.regularized_fit import fit_regularized
+from hexacell.identification.solver.fit import (
+    COARSE,
+    INCREMENTAL,
+    SolverOptions,
+    fit_regularized,
+    solve_around_singularities,
+)
 from hexacell.identification.solver.result import Identification
-from hexacell.identification.solver.singular_records import solve_around_singularities
 
 
 def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     """Identify the geometry from all records, without those that have a data fault.
 
-    With ``find_outliers`` false no record is tested.
+    Args:
+        problem: n records, with the prior and the noise.
+        find_outliers: whether records are tested; without it all of them are used.
+
+    Returns:
+        The p free parameters, mm, with their covariance (p, p), mm^2, and what is wrong with the records
+        that were left out.
 
     Raises:
         IdentifiabilityError: the records cannot determine the parameters.
@@ -31,7 +48,36 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
 
 
 def estimate_online(problem: Problem, options: SolverOptions = COARSE) -> Identification:
-    """Estimate the geometry from the records so far, with the full prior and without any check."""
+    """Estimate the geometry from the records so far, with the full prior and without any check.
+
+    Args:
+        problem: n records; with few of them, the prior determines the rest.
+        options: of the solver, which starts at the initial parameters of the problem.
+    """
     precision = problem.prior.precision
     kept, solution = solve_around_singularities(problem, precision, options)
     return Identification(kept, solution, precision)
+
+
+def without_gross_errors(found: Identification) -> Iterator[Identification]:
+    """Estimates without the most significant gross error, without two, and so on.
+
+    Each continues the last one, needs no fit from the drawing, and looks for no cause: what is false, and
+    why, is found from all records by :func:`identify`. Records are left out only while the others have
+    equations to spare; fewer agree with anything, and prove nothing.
+
+    Args:
+        found: an online estimate.
+    """
+    largest = LARGEST_REJECTED_SHARE * found.records
+    rejected = 0
+    while rejected < largest:
+        ratio = OutlierStatistics.of(found.linear_model).threshold_ratio(rejected)
+        kept = np.arange(found.records) != int(np.argmax(ratio))
+        if ratio.max() <= 1.0 or not is_overdetermined(found.problem.subset(kept)):
+            return
+        everywhere = np.ones(found.records, dtype=bool)
+        some = found.problem.starting_at(found.free, found.poses, everywhere).subset(kept)
+        problem, solution = solve_around_singularities(some, found.active_prior, INCREMENTAL)
+        found, rejected = Identification(problem, solution, found.active_prior), rejected + 1
+        yield found

@@ -14,12 +14,12 @@ from pydantic import Field
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.identification.identified_zeros import IdentifiedZeros, ParameterChoice
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.identification.solver.result import (
     DataFault,
     DataFaultKind,
     GeometryEstimate,
     Identification,
+    Termination,
 )
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet

@@ -2,7 +2,7 @@
 
 An identified geometry may be written in any frames that its parameters can express. Points, work frames and
 tool frames were taught with an earlier geometry. The one written is in the frames in which the task poses
-move least against that (:mod:`~hexacell.identification.diagnostics.frame_choice`).
+move least against that (:mod:`~hexacell.identification.diagnostics.frame_alignment`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen
 from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.cell.model import CellSettings
-from hexacell.identification.diagnostics.frame_choice import choose_frames
-from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
+from hexacell.identification.diagnostics.frame_alignment import PoseErrors, choose_frames
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch

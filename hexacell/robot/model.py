@@ -25,9 +25,9 @@ from hexacell.identification.identified_zeros import (
     ParameterChoice,
     zero_columns,
 )
-from hexacell.identification.problem.build import build_problem
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
-from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances
+from hexacell.identification.problem.prior import Noise, Prior, Tolerances
+from hexacell.identification.problem.problem import Assumptions, Problem
 from hexacell.identification.solver.result import GeometryEstimate, Identification
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
@@ -41,8 +41,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.plugins import Group, load
 from hexacell.robot.stated_effects import stated_effects
 from hexacell.robot.stated_limits import stated_limits
-from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.record_effects import RecordEffects
+from hexacell.uncertainty.effects import Effect, RecordEffects
 
 FARTHEST_DRAWING = 0.25
 """Largest difference of the drawing from a config, as a share of the largest number of the config."""
@@ -149,19 +148,18 @@ class Robot:
 
         It takes less time with the problem ``before`` of some of these records.
         """
-        return build_problem(
+        assumptions = Assumptions(
             self.mechanism,
-            measurements,
-            controller=self._commanding_as_written,
-            branch=self.branch,
-            prior=self.prior,
-            noise=self.noise,
+            self._commanding_as_written,
+            self.branch,
+            self.prior,
+            self.noise,
             provisional=self.provisional,
             earlier=self.earlier,
             systematic=RecordEffects(self.effects),
             unknowns=self.unknowns,
-            before=before,
         )
+        return assumptions.problem(measurements, before)
 
     def belief(self, identified: Identification | None = None) -> RobotBelief:
         """What is known of the robot: by an identification, or by its drawing alone."""

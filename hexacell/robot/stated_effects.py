@@ -12,20 +12,22 @@ from hexacell.cell.uncertainty import (
 )
 from hexacell.kinematics.mechanism import MechanismWords
 from hexacell.kinematics.parameters import MachinePart
-from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.encoder_effects import (
+from hexacell.uncertainty.effect_kinds import (
+    ball_beside_tool,
+    ball_roundness,
     common_encoder_scale,
+    common_sag,
     encoder_eccentricities,
     encoder_scales,
-    stop_repeatability,
-)
-from hexacell.uncertainty.environment_effects import (
+    gauge_scales,
     load_at_work,
+    rail_directions,
+    rail_waves,
+    stop_repeatability,
     temperature_at_work,
     temperature_while_measuring,
 )
-from hexacell.uncertainty.gauge_effects import ball_beside_tool, ball_roundness, gauge_scales
-from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
+from hexacell.uncertainty.effects import Effect
 
 
 def stated_effects(settings: CellSettings, measured_range_k: float | None = None) -> tuple[Effect, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hexacell.errors import LimitError, ReachError
-from hexacell.identification.problem.problem import Tolerances
+from hexacell.identification.problem.prior import Tolerances
 from hexacell.kinematics.commanded_motion import ActualPoses
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry

@@ -26,8 +26,8 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, RecordId
-from hexacell.noise.averaging import WINDOWS, AveragingForecaster, mean_of_independent
 from hexacell.noise.measured_noise import AveragingForecast, with_measured_noise
+from hexacell.noise.noise_assessment import WINDOWS, AveragingForecaster, mean_of_independent
 from hexacell.robot.model import robot_of
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services import search_effort

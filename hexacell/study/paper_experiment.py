@@ -22,7 +22,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.errors import ConvergenceError
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hexacell.identification.diagnostics.frame_alignment import PoseErrors
 from hexacell.identification.diagnostics.model_tests import contradicted_points
-from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import JointUnit
-from hexacell.noise.repeatability import Repeatability
-from hexacell.noise.variance_components import NoiseLevel, NoiseLevels
+from hexacell.noise.record_noise import NoiseLevel, NoiseLevels, Repeatability
 from hexacell.text.layout import wrapped
 from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.parameters import parameter_rows, parameter_table

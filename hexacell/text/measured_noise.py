@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.noise.approach_scatter import ScatterSource
-from hexacell.noise.averaging import worthwhile_windows
 from hexacell.noise.measured_noise import (
     AveragingForecast,
     InstrumentNoise,
     MeasuredNoise,
     RepeatedApproaches,
 )
+from hexacell.noise.noise_assessment import worthwhile_windows
 from hexacell.text.layout import duration, wrapped
 
 THOUSAND = 1e3

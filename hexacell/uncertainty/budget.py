@@ -25,10 +25,9 @@ from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
+from hexacell.uncertainty.effect_kinds import COMMON_SCALE
 from hexacell.uncertainty.effects import Effect, Occurrence
-from hexacell.uncertainty.encoder_effects import COMMON_SCALE
-from hexacell.uncertainty.propagation import Propagation, compressed
-from hexacell.uncertainty.scale_observation import MeasuredScale, ScaleObservation
+from hexacell.uncertainty.propagation import MeasuredScale, Propagation, ScaleObservation, compressed
 from hexacell.uncertainty.statement import TaskErrors, covariance_factor
 
 TELLING_SIGMAS = 4.0

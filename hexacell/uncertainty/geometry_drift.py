@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.identification.problem.problem import Prior, Tolerances
+from hexacell.identification.problem.prior import Prior, Tolerances
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry

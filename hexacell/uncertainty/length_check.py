@@ -27,22 +27,23 @@ from functools import cached_property
 
 import numpy as np
 
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import position_sensitivity
+from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.encoder_effects import COMMON_SCALE, common_encoder_scale
-from hexacell.uncertainty.length_errors import (
+from hexacell.uncertainty.length_records import (
     JudgedGeometry,
     LengthError,
+    LengthRecords,
+    LengthStandard,
     errors_by_effect,
     errors_by_gauges,
     shared_errors,
 )
-from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
-from hexacell.uncertainty.scale_observation import ScaleObservation
+from hexacell.uncertainty.propagation import ScaleObservation
 from hexacell.uncertainty.statement import COVERAGE_FACTOR, covariance_factor
 
 HARDLY_MM2 = 0.01

@@ -6,7 +6,7 @@ the weighted squares with the stations' unknowns eliminated, then errs by
     dp = C J~^T W e,
 
 with C the covariance of the estimate and J~ the centred Jacobian
-(:class:`~hexacell.identification.solver.nuisance_parameters.NuisanceElimination`; e needs no centring,
+(:class:`~hexacell.identification.solver.measurement_model.NuisanceElimination`; e needs no centring,
 because J~^T W contains it). A controller with that geometry sets joint variables at which the robot is
 ``D e' - H dp`` beside the commanded pose: the effect itself, less what the estimate had taken up of it.
 Base and platform frames are fitted to both over the workspace
@@ -20,7 +20,7 @@ the error of the earlier estimate,
 Constant causes are the same in both, so that their columns are added, never averaged away.
 
 What an effect adds to the chi-square is ``e^T M e``, with M the weights less what stations and parameters
-absorb (:mod:`hexacell.identification.solver.linearized_model`).
+absorb (:mod:`hexacell.identification.solver.linear_model`).
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit
 from hexacell.identification.diagnostics.pose_accuracy import error_jacobian, teachable_frames
 from hexacell.identification.identified_zeros import IdentifiedZeros
-from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
+from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.uncertainty.effects import Effect, Occurrence, Placement, Readings
-from hexacell.uncertainty.record_effects import errors_of_records
+from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
+from hexacell.uncertainty.effects import Effect, Occurrence, Placement, Readings, errors_of_records
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -192,3 +192,87 @@ def compressed(columns: Array) -> Array:
         return columns
     upper: Array = np.linalg.qr(columns.T)[1]
     return upper.T
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScaleObservation:
+    """How much farther the sliders move than all encoders show, um/m, and what is not known of that.
+
+    The judged geometry and the check err in part by the same causes. By these parts the observation is
+    beside the truth together with the errors at the task.
+
+    Attributes:
+        farther_um_m: the value; encoders that show too much have a negative one.
+        sigma_um_m: one standard deviation by causes that it shares with nothing else.
+        by_parameters: (p,) its error by errors of the free parameters.
+        by_effects: (k,) its error by one unit of each cause of an effect that it shares, by the name.
+    """
+
+    farther_um_m: float
+    sigma_um_m: float
+    by_parameters: Array
+    by_effects: Mapping[str, Array]
+
+    def by_effect(self, effect: Effect, causes: int) -> Array:
+        """Its error (k,) by one unit of each cause of an effect, as many as a budget has of it.
+
+        Where causes act directly, and differ each time, they come last and are not shared.
+        """
+        shared = self.by_effects.get(effect.name, np.zeros(0))
+        if effect.occurrence is Occurrence.CONSTANT and len(shared) not in {0, causes}:
+            raise ValueError(effect.name)
+        return np.concatenate([shared, np.zeros(causes - len(shared))])
+
+
+def errors_by_scale(
+    belief: RobotBelief, task: PoseBatch, workspace: PoseBatch, parameter_columns: Mapping[str, Array]
+) -> Array:
+    """Errors (t, 6) at task poses by 1 um/m, mm and rad, through the geometry and directly.
+
+    ``parameter_columns`` has what that did to the free parameters (p, 1). Frames are fitted over the
+    workspace.
+    """
+    effect = common_encoder_scale(1.0)
+    through = -error_jacobian(belief, task, workspace) @ parameter_columns[COMMON_SCALE]
+    assert effect.on_poses is not None  # noqa: S101 - it moves the sliders
+    at_task, over = (effect.on_poses(placement_of(belief, poses)) for poses in (task, workspace))
+    direct = teachable_frames(belief, workspace).remove_frame_motion(task, at_task, over)
+    errors: Array = (through + direct)[..., 0]
+    return errors
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredScale:
+    """What a measured scale common to all encoders does at t task poses; nothing without a measurement.
+
+    Attributes:
+        unit: (t, 6) errors by 1 um/m, mm and rad.
+    """
+
+    unit: Array
+    scale: ScaleObservation | None
+
+    @classmethod
+    def of(cls, propagation: Propagation, scale: ScaleObservation | None) -> MeasuredScale:
+        """At the task of a propagation."""
+        if scale is None:
+            return cls(np.zeros(propagation.jacobian.shape[:2]), None)
+        return cls(propagation.columns(common_encoder_scale(1.0)).combined[..., 0], scale)
+
+    @property
+    def known(self) -> Array:
+        """(t, 6) by the measured value."""
+        return self.unit * (0.0 if self.scale is None else self.scale.farther_um_m)
+
+    def by_parameters(self, columns: Array) -> Array:
+        """(t, 6, k) by errors (p, k) of the free parameters, of the sign of the jacobian."""
+        if self.scale is None:
+            return np.zeros((*self.unit.shape, columns.shape[-1]))
+        return self.unit[..., None] * (self.scale.by_parameters @ columns)
+
+    def combined(self, effect: Effect, task: TaskColumns) -> Array:
+        """Errors (t, 6, k) by one unit of each cause of an effect, less what is taken for a scale."""
+        if self.scale is None or effect.name == COMMON_SCALE:
+            return task.combined
+        taken = self.scale.by_effect(effect, task.combined.shape[-1])
+        return task.combined - self.unit[..., None] * taken

@@ -11,20 +11,18 @@ from hexacell.campaign.feasibility import UNDETERMINED_SHARE
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.design.decorrelation import DecorrelatingPose, decorrelating_poses
-from hexacell.identification.diagnostics.correlations import CorrelatedPair, strongly_correlated
 from hexacell.identification.diagnostics.model_tests import PointPrediction, leave_one_point_out
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareVerdict
 from hexacell.identification.solver.measurement_model import record_covariance
-from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.result import CorrelatedPair, Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import MeasuredNoise
-from hexacell.noise.repeatability import Repeatability, repeatability
-from hexacell.noise.variance_components import NoiseLevels, noise_levels
+from hexacell.noise.record_noise import NoiseLevels, Repeatability, noise_levels, repeatability
 from hexacell.results.result import ExpectedImprovement
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
@@ -164,7 +162,7 @@ def _record_noise_mm(found: Identification) -> float:
 def _correlated(
     robot: Robot, found: Identification
 ) -> tuple[tuple[CorrelatedPair, DecorrelatingPose | None], ...]:
-    pairs = strongly_correlated(found)
+    pairs = found.strongly_correlated()
     poses = decorrelating_poses(robot.belief(found), found, pairs[:SEPARATED_PAIRS])
     in_commands = [pose and replace(pose, command=robot.to_command(pose.command)) for pose in poses]
     return tuple(zip(pairs, chain(in_commands, repeat(None)), strict=False))

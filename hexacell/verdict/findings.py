@@ -9,7 +9,7 @@ from hexacell.identification.diagnostics.tolerance_check import ToleranceViolati
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.kinematics.mechanism import FrameConvention
 from hexacell.kinematics.parameters import JointUnit
-from hexacell.noise.variance_components import NoiseLevel, NoiseLevels
+from hexacell.noise.record_noise import NoiseLevel, NoiseLevels
 from hexacell.verdict.assessment import SEPARATED_PAIRS, Assessment
 
 POOR_REPEATABILITY = 2.0

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from hexacell.design.decorrelation import DecorrelatingPose
+from hexacell.identification.diagnostics.frame_alignment import PoseErrors
 from hexacell.identification.diagnostics.model_tests import contradicted_points
-from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.noise.variance_components import NoiseLevels
+from hexacell.noise.record_noise import NoiseLevels
 from hexacell.results.result import IdentificationResult
 from hexacell.uncertainty.budget import BudgetLine, UncertaintyBudget
 from hexacell.verdict.assessment import Assessment

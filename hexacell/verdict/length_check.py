@@ -18,12 +18,11 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.results.result import AcceptedResult, LengthResult, LengthSource
 from hexacell.robot.model import Robot
+from hexacell.uncertainty.effect_kinds import COMMON_SCALE
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.encoder_effects import COMMON_SCALE
 from hexacell.uncertainty.length_check import LengthCheck
-from hexacell.uncertainty.length_errors import JudgedGeometry
-from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
-from hexacell.uncertainty.scale_observation import errors_by_scale
+from hexacell.uncertainty.length_records import JudgedGeometry, LengthRecords, LengthStandard
+from hexacell.uncertainty.propagation import errors_by_scale
 from hexacell.uncertainty.statement import COVERAGE_FACTOR, TaskErrors
 from hexacell.verdict.decision import JudgedError, Verdict
 

@@ -20,7 +20,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
 from hexacell.identification.identified_zeros import ParameterChoice
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
@@ -29,7 +29,7 @@ from hexacell.results.result import IdentificationResult
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.length_check import LengthCheck
-from hexacell.uncertainty.length_errors import JudgedGeometry
+from hexacell.uncertainty.length_records import JudgedGeometry
 from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy, worst_verdict
 from hexacell.verdict.length_check import LengthMeasurements, length_check, length_result
 from hexacell.verdict.model_evidence import (

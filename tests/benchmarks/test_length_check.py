@@ -29,8 +29,7 @@ from hexacell.robot.model import Robot
 from hexacell.robot.stated_effects import stated_effects
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.uncertainty.length_check import LengthCheck
-from hexacell.uncertainty.length_errors import JudgedGeometry
-from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
+from hexacell.uncertainty.length_records import JudgedGeometry, LengthRecords, LengthStandard
 from tests.benchmarks.imperfect_machine import ImperfectMachine
 
 MACHINES = int(os.environ.get("ROBOTS", "100"))

@@ -15,9 +15,8 @@ import pytest
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
-from hexacell.identification.problem.problem import Tolerances
-from hexacell.identification.solver.levenberg_marquardt import Termination
-from hexacell.identification.solver.result import GeometryEstimate
+from hexacell.identification.problem.prior import Tolerances
+from hexacell.identification.solver.result import GeometryEstimate, Termination
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import random_robot

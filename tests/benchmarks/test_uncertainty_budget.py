@@ -29,11 +29,19 @@ from hexacell.robot.model import Robot
 from hexacell.robot.stated_effects import stated_effects
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.uncertainty.effect_kinds import (
+    ball_roundness,
+    common_encoder_scale,
+    common_sag,
+    encoder_scales,
+    gauge_scales,
+    load_at_work,
+    rail_directions,
+    rail_waves,
+    stop_repeatability,
+    temperature_at_work,
+)
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, stop_repeatability
-from hexacell.uncertainty.environment_effects import load_at_work, temperature_at_work
-from hexacell.uncertainty.gauge_effects import ball_roundness, gauge_scales
-from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
 from tests.benchmarks.imperfect_machine import ImperfectMachine
 
 MACHINES = int(os.environ.get("ROBOTS", "100"))

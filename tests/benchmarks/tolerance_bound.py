@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from hexacell.identification.diagnostics.tolerance_fit import PROBABILITY, ToleranceFitter
+from hexacell.identification.diagnostics.tolerance_check import PROBABILITY, ToleranceFitter
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import Robot

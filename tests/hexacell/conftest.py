@@ -20,9 +20,9 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.build import build_problem
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
-from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances
+from hexacell.identification.problem.prior import Noise, Prior, Tolerances
+from hexacell.identification.problem.problem import Assumptions, Problem
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
@@ -262,15 +262,14 @@ def problem_of(
     provisional: tuple[Geometry, ...] = (),
 ) -> Problem:
     """The identification of some records on the paper's robot."""
-    return build_problem(
+    return Assumptions(
         Hexaglide(),
-        measurements,
         controller=CommandingGeometry.of(Hexaglide(), controller),
         branch=BRANCH,
         prior=Prior.of(Hexaglide(), drawing, tolerances),
         noise=noise,
         provisional=provisional,
-    )
+    ).problem(measurements)
 
 
 @pytest.fixture(scope="session")

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
-from hexacell.identification.problem.problem import Noise, Tolerances
+from hexacell.identification.problem.prior import Noise, Tolerances
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.solver.result import Termination
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.verdict.acceptance_gates import gates

@@ -11,7 +11,7 @@ import pytest
 from hexacell.cell.loader import load_cell
 from hexacell.errors import FileError
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import Robot, robot_of

@@ -16,7 +16,7 @@ from hexacell.config.interface import ControllerGeometry
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.identification.estimator import estimate_online, identify
-from hexacell.identification.problem.problem import Tolerances
+from hexacell.identification.problem.prior import Tolerances
 from hexacell.kinematics.mechanism import FrameTransform, inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch

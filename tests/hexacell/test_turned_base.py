@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.interface import ControllerGeometry
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.pose import PoseBatch

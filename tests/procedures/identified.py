@@ -8,7 +8,7 @@ import numpy as np
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
-from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.solver.result import Termination
 from hexacell.results.result import IdentificationResult
 
 

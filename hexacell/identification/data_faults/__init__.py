@@ -1,1 +1,1 @@
-"""Faults in the data: outliers, zero shifts and gauge faults, found and named."""
+"""Faults in the data: found by stepwise selection, named; begin with :mod:`.stepwise_selection`."""

@@ -1,56 +1,65 @@
-"""The fault hypotheses: gross errors of records, a shift of the gauges' zero, gauge faults.
+"""Hypotheses on what is wrong with some records, and fits of records that are corrected for them.
 
-A gauge fault (:mod:`.gauge_faults`) may be at one point or at all of them.
+There are three kinds. A gross error concerns single records, which disagree with all the others. When the
+zero of the gauges shifts, all later records of the point are off by one constant. A gauge fault (gauges
+exchanged, reversed or reading in inches) is a known matrix T: the readings were d and should have been T
+d.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hexacell.distributions import chi_square_limit
-from hexacell.identification.data_faults.fault_model import (
-    PENALTY_PER_UNKNOWN,
-    CorrectedFit,
-    FaultHypothesis,
-)
-from hexacell.identification.data_faults.gauge_faults import GAUGE_FAULTS, GaugeFault
-from hexacell.identification.data_faults.score_tests import (
-    OutlierStatistics,
-    ZeroShiftStatistics,
-    known_change_gains,
-)
-from hexacell.identification.problem.data_requirements import is_determined, is_overdetermined
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.linearized_model import LinearizedModel
+from hexacell.identification.solver.chi_square import ChiSquareVerdict
+from hexacell.identification.solver.fit import QUICK, fit_regularized
+from hexacell.identification.solver.result import GAUGES, DataFaultKind, Identification
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import RecordId
 
-WORTH_TESTING = 0.05
-"""Probability of the residuals below which zero shifts and gauge faults are tested too."""
+PENALTY_PER_UNKNOWN = 10.0
+"""By how much a hypothesis must lower the chi-square for each number that it is free to choose."""
 
-FALSE_SHIFTS_PER_FILE = 1e-3
-SMALLEST_GAUGE_FAULT_GAIN = 25.0
-"""A likelihood ratio of 270,000, for some dozens of gauge faults tested."""
+SUFFICIENT_DECREASE = 20.0
+"""Of the mean square residual, for a hypothesis to be accepted although the fit is not yet consistent."""
 
-CONFIRMED_SHARE = 0.5
-"""Of the first-order gain of a gauge fault, what a refit must confirm."""
+SETTLING_DECREASE = 400.0
+SETTLING_MISFIT = 4.0
+"""Of the mean square residual, and what it must be, for a hypothesis to need no comparison with others."""
+
+LARGEST_TRUSTED_RATIO = 10.0
+"""Residuals over the stated noise up to which first-order tests around the solution are valid."""
+
+MM_PER_INCH = 25.4
 
 SPLIT_POINT = -1
 """Label of the point that the records after a zero shift form while it is tested."""
 
 
-def record_ids(problem: Problem) -> list[RecordId]:
-    """Point and orientation of each record."""
-    return [(point, orientation) for point, orientation in problem.labels.tolist()]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultHypothesis(ABC):
+    """One explanation of records that disagree with the others; equal however it was found.
 
+    Attributes:
+        gain: the decrease of the chi-square if it is true, to first order.
+        unknowns: how many numbers it is free to choose.
+    """
 
-def record_mask(problem: Problem, records: Collection[RecordId]) -> Mask:
-    """Which records (n,) of a problem are among some others."""
-    return np.array([record in records for record in record_ids(problem)], dtype=bool)
+    gain: float = field(compare=False)
+    unknowns: int = field(compare=False)
+
+    @property
+    def cost(self) -> float:
+        """The penalized gain, negative: the most likely hypothesis has the lowest cost."""
+        return PENALTY_PER_UNKNOWN * self.unknowns - self.gain
+
+    @abstractmethod
+    def corrected(self, problem: Problem) -> Problem:
+        """The problem without the fault: readings corrected, or records left out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,17 +68,13 @@ class OutlierHypothesis(FaultHypothesis):
 
     records: tuple[RecordId, ...]
 
-    def of(self, records: Collection[RecordId]) -> OutlierHypothesis:
-        """The same of other records."""
-        return replace(self, records=tuple(records))
+    def only(self, records: Collection[RecordId]) -> OutlierHypothesis:
+        """The gross errors of some of the records alone."""
+        return replace(self, records=tuple(record for record in self.records if record in records))
 
     def corrected(self, problem: Problem) -> Problem:
         """The problem without these records."""
-        return problem.subset(~record_mask(problem, self.records))
-
-    def confirmed(self, current: CorrectedFit) -> CorrectedFit | None:
-        """The fit of the other records, if these determine the parameters."""
-        return self.trial(current) if is_determined(self.corrected(current.problem)) else None
+        return problem.subset(~problem.mask_of(self.records))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +93,7 @@ class ZeroShiftHypothesis(FaultHypothesis):
 
     def rows(self, problem: Problem) -> Mask:
         """The records (n,) after the shift."""
-        first = np.flatnonzero(record_mask(problem, [(self.point, self.orientation)]))[0]
+        first = np.flatnonzero(problem.mask_of([(self.point, self.orientation)]))[0]
         after: Mask = (problem.labels[:, 0] == self.point) & (np.arange(problem.records) >= first)
         return after
 
@@ -96,19 +101,7 @@ class ZeroShiftHypothesis(FaultHypothesis):
         """The problem without the records after the shift."""
         return problem.subset(~self.rows(problem))
 
-    def trial(self, current: CorrectedFit) -> CorrectedFit | None:
-        """The fit without the records after the shift, if these agree with the others up to a constant."""
-        split = CorrectedFit.uncorrected(self._split(current.problem))
-        if not split.is_reliable or not is_overdetermined(split.problem):
-            return None
-        if not split.is_consistent and not is_determined(self.corrected(current.problem)):
-            return None
-        concerned = np.isin(split.fit.problem.labels[:, 0], [self.point, SPLIT_POINT])
-        statistics = OutlierStatistics.of(LinearizedModel.at_solution(split.fit))
-        is_constant = bool((statistics.threshold_ratio()[concerned] <= 1.0).all())
-        return current.corrected_for(self) if is_constant else None
-
-    def _split(self, problem: Problem) -> Problem:
+    def split(self, problem: Problem) -> Problem:
         """The problem with the records after the shift as a point with an unknown zero of its own."""
         after = self.rows(problem)
         labels = problem.labels.copy()
@@ -117,9 +110,39 @@ class ZeroShiftHypothesis(FaultHypothesis):
         return replace(problem, labels=labels, first_rows=first_rows)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class GaugeFault:
+    """A known fault of gauges; ``remedy`` (3, 3) turns false readings x, y, z into true ones."""
+
+    kind: DataFaultKind
+    gauges: str
+    remedy: Array
+
+    def in_base_frame(self, problem: Problem) -> Array:
+        """The remedy (3, 3) of deviations along the axes of the base frame."""
+        turned: Array = problem.gauges @ self.remedy @ problem.gauges.T
+        return turned
+
+
+def _gauge_faults() -> Iterator[GaugeFault]:
+    for first, second in ((0, 1), (0, 2), (1, 2)):
+        order = [0, 1, 2]
+        order[first], order[second] = second, first
+        yield GaugeFault(DataFaultKind.EXCHANGED, GAUGES[first] + GAUGES[second], np.eye(3)[order])
+    for order in ([1, 2, 0], [2, 0, 1]):
+        yield GaugeFault(DataFaultKind.EXCHANGED, GAUGES, np.eye(3)[order])
+    for kind, factor in ((DataFaultKind.REVERSED, -1.0), (DataFaultKind.INCHES, MM_PER_INCH)):
+        for axis, gauge in enumerate(GAUGES):
+            yield GaugeFault(kind, gauge, np.diag(np.where(np.arange(3) == axis, factor, 1.0)))
+        yield GaugeFault(kind, GAUGES, factor * np.eye(3))
+
+
+GAUGE_FAULTS = tuple(_gauge_faults())
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GaugeFaultHypothesis(FaultHypothesis):
-    """A gauge fault at one point, or at every point (``point`` is none)."""
+    """A gauge fault at one point, or at every point (``point`` is None)."""
 
     gauge_fault: GaugeFault
     point: int | None
@@ -127,95 +150,106 @@ class GaugeFaultHypothesis(FaultHypothesis):
     def corrected(self, problem: Problem) -> Problem:
         """The problem with true readings."""
         rows = np.ones(problem.records, bool) if self.point is None else problem.labels[:, 0] == self.point
-        remedy = _in_base_frame(problem, self.gauge_fault)
+        remedy = self.gauge_fault.in_base_frame(problem)
         deviations = np.where(rows[:, None], problem.deviations @ remedy.T, problem.deviations)
         return replace(problem, deviations=deviations)
-
-    def trial(self, current: CorrectedFit) -> CorrectedFit | None:
-        """The fit with true readings, if there are equations to spare that could contradict them."""
-        return current.corrected_for(self) if is_overdetermined(current.problem) else None
-
-    def confirmed(self, current: CorrectedFit) -> CorrectedFit | None:
-        """The fit with true readings, if it has a sufficient part of the first-order gain and is a proof.
-
-        It is one if it agrees with the noise, or is better by far.
-        """
-        corrected = self.trial(current)
-        if corrected is None:
-            return None
-        limit = current.fit.chi2 - CONFIRMED_SHARE * self.gain
-        is_proof = corrected.is_consistent or corrected.is_better_by_far_than(current)
-        return corrected if is_proof and corrected.fit.chi2 < limit else None
-
-
-def _in_base_frame(problem: Problem, gauge_fault: GaugeFault) -> Array:
-    turned: Array = problem.gauges @ gauge_fault.remedy @ problem.gauges.T
-    return turned
 
 
 ALL_IN_INCHES = GaugeFaultHypothesis(gain=0.0, unknowns=0, gauge_fault=GAUGE_FAULTS[-1], point=None)
 
 
-def rank_hypotheses(
-    model: LinearizedModel, goodness: ChiSquareTest, *, found_before: int = 0
-) -> list[FaultHypothesis]:
-    """The significant hypotheses on the residuals of a model, the most likely first."""
-    statistics = OutlierStatistics.of(model)
-    hypotheses: list[FaultHypothesis] = [*_outlier(model, statistics, found_before)]
-    if goodness.probability < WORTH_TESTING:
-        hypotheses += _zero_shift(model, statistics.scale)
-        for hypothesis in score_gauge_faults(model):
-            remaining = max(1.0, (goodness.chi2 - hypothesis.gain) / goodness.expected)
-            if hypothesis.gain > SMALLEST_GAUGE_FAULT_GAIN * min(statistics.scale, remaining):
-                hypotheses.append(hypothesis)
-    return sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)
+@dataclass(frozen=True, slots=True, eq=False)
+class CorrectedFit:
+    """A fit of records that are corrected for data faults.
+
+    Attributes:
+        original: all records as measured.
+        problem: the records after correction.
+        fit: of those; the solver may have left out some of them, next to a singularity.
+        faults: what was corrected, in the order of selection.
+    """
+
+    original: Problem
+    problem: Problem
+    fit: Identification
+    faults: tuple[FaultHypothesis, ...] = ()
+
+    @classmethod
+    def uncorrected(cls, problem: Problem) -> CorrectedFit:
+        """The fit of all records as measured."""
+        return cls(problem, problem, fit_regularized(problem, QUICK))
+
+    def corrected_for(self, hypothesis: FaultHypothesis) -> CorrectedFit:
+        """The fit after correction for one more fault."""
+        problem = hypothesis.corrected(self.problem)
+        fit = fit_regularized(problem, QUICK)
+        return replace(self, problem=problem, fit=fit, faults=(*self.faults, hypothesis))
+
+    def converged(self) -> CorrectedFit:
+        """The fit with the solver's full number of iterations, where the quick fit was cut short."""
+        if self.fit.converged:
+            return self
+        return replace(self, fit=fit_regularized(self.problem))
+
+    @property
+    def rejected(self) -> list[RecordId]:
+        """The records rejected for gross errors."""
+        outliers = (fault for fault in self.faults if isinstance(fault, OutlierHypothesis))
+        return [record for outlier in outliers for record in outlier.records]
+
+    @property
+    def zero_shifts(self) -> list[ZeroShiftHypothesis]:
+        """The shifts of the gauges' zero that were corrected."""
+        return [fault for fault in self.faults if isinstance(fault, ZeroShiftHypothesis)]
+
+    def after(self, shift: ZeroShiftHypothesis) -> list[RecordId]:
+        """All records after a shift of the zero."""
+        return self.original.subset(shift.rows(self.original)).record_ids
+
+    @property
+    def lost(self) -> int:
+        """How many records the solver left out."""
+        return self.problem.records - self.fit.records
+
+    @property
+    def is_reliable(self) -> bool:
+        """Whether the solution is good enough for first-order tests around it."""
+        is_near = self.fit.goodness.ratio <= LARGEST_TRUSTED_RATIO
+        return not self.lost and self.fit.converged and is_near
+
+    @property
+    def is_consistent(self) -> bool:
+        """Whether all records agree with the stated noise."""
+        return self.is_reliable and self.fit.goodness.agreement is not ChiSquareVerdict.TOO_LARGE
+
+    @property
+    def misfit(self) -> float:
+        """The mean square residual; a lost record counts as one at the largest trusted ratio."""
+        squares = self.fit.goodness.ratio**2 * self.fit.records + LARGEST_TRUSTED_RATIO**2 * self.lost
+        return squares / self.problem.records
+
+    def is_better_by_far_than(self, other: CorrectedFit) -> bool:
+        """Whether it explains so much more that it is right although something else is still wrong."""
+        return self.misfit < other.misfit / SUFFICIENT_DECREASE
+
+    def settles(self, other: CorrectedFit) -> bool:
+        """Whether no other hypothesis can explain it better: it agrees, or an imperfect machine is left."""
+        is_near_noise = self.is_reliable and self.misfit <= SETTLING_MISFIT
+        return self.is_consistent or (is_near_noise and self.misfit < other.misfit / SETTLING_DECREASE)
 
 
-def score_gauge_faults(model: LinearizedModel) -> list[GaugeFaultHypothesis]:
-    """Every gauge fault, at all points and at each, with its gain."""
-    problem = model.problem
-    points = [None, *(int(problem.labels[row, 0]) for row in problem.first_rows)]
-    hypotheses = []
-    for fault in GAUGE_FAULTS:
-        change = -problem.deviations @ (_in_base_frame(problem, fault) - np.eye(3)).T
-        at_points, at_all = known_change_gains(model, change)
-        hypotheses += [
-            GaugeFaultHypothesis(gain=gain, unknowns=0, gauge_fault=fault, point=point)
-            for point, gain in zip(points, [at_all, *at_points.tolist()], strict=True)
-        ]
-    return hypotheses
+class UncorrectableFaultError(Exception):
+    """A fault of the records that cannot be corrected by leaving some of them out.
 
+    Attributes:
+        fault: what is wrong.
+        before: the fit that does not explain it.
+        after: the fit corrected for it.
+        left: the records that are left without it.
+    """
 
-def _outlier(
-    model: LinearizedModel, statistics: OutlierStatistics, found_before: int
-) -> Iterator[OutlierHypothesis]:
-    """The record with the most significant gross error, of one gauge or of any kind."""
-    ratio = statistics.threshold_ratio(found_before)
-    row = int(np.argmax(ratio))
-    if ratio[row] <= 1.0:
-        return
-    point, orientation = model.problem.labels[row].tolist()
-    one_gauge, any_direction = float(statistics.along_gauges[row].max()), float(statistics.omnibus[row])
-    is_one_gauge = any_direction - one_gauge < 2.0 * PENALTY_PER_UNKNOWN
-    gain, unknowns = (one_gauge, 1) if is_one_gauge else (any_direction, 3)
-    yield OutlierHypothesis(gain=gain, unknowns=unknowns, records=((point, orientation),))
-
-
-def _zero_shift(model: LinearizedModel, scale: float) -> Iterator[ZeroShiftHypothesis]:
-    """The most significant shift of the gauges' zero."""
-    statistics = ZeroShiftStatistics.of(model)
-    if not len(statistics.rows):
-        return
-    best = int(np.argmax(statistics.gains))
-    critical = chi_square_limit(3, FALSE_SHIFTS_PER_FILE / len(statistics.rows))
-    gain = float(statistics.gains[best])
-    if (significance := gain / scale / critical) > 1.0:
-        point, orientation = model.problem.labels[statistics.rows[best]].tolist()
-        yield ZeroShiftHypothesis(
-            gain=gain,
-            unknowns=3,
-            point=point,
-            orientation=orientation,
-            shift=statistics.shifts[best],
-            significance=significance,
-        )
+    def __init__(
+        self, fault: FaultHypothesis, before: CorrectedFit, after: CorrectedFit, left: Problem
+    ) -> None:
+        super().__init__(fault)
+        self.fault, self.before, self.after, self.left = fault, before, after, left

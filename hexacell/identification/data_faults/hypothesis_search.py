@@ -1,48 +1,63 @@
 """The search for data faults where the fit itself is wrong: each candidate is tried by a refit.
 
 First-order tests around a wrong solution are unreliable. The drawing is a better expansion point: it is
-within millimetres of the truth, whatever the gauges read. The most likely hypotheses of three lists
-are tried in turn: gauge faults around the drawing, all kinds around the solution, and all kinds
-around the solution with the records that the solver left out. Two candidates reject several records
-at once: greedy deletion with a refit after each, and deletion around the drawing. The fit without the
-deleted records is one more place to look for gauge faults that they have in common. The first corrected fit
-that agrees with the noise, or nearly so and is incomparably better, is taken, else the best one if it is
-better by far.
+within millimetres of the truth, whatever the gauges read. The candidates, in the order in which they are
+tried (:func:`_candidates`):
 
-Source: Atkinson and Riani, Robust Diagnostic Regression Analysis, 2000, on masking: several outliers
-hide each other around a fit to all of them, and show around one that they did not influence.
+1. the most likely gauge fault around the drawing, and the most likely hypotheses of all kinds around the
+   solution, and around the solution with the records that the solver left out;
+2. greedy deletion: the most likely fault is left out, with a refit after each (:func:`_greedy_deletion`);
+3. deletion around the drawing: all outliers there at once;
+4. gauge faults around the fit without the deleted records, which they may have in common;
+5. the second and third of the lists of 1, and every gauge fault at all points.
+
+The first corrected fit that agrees with the noise, or nearly so and is incomparably better, is taken,
+else the best one if it is better by far.
+
+Source: Atkinson and Riani, Robust Diagnostic Regression Analysis, 2000, on masking: several outliers hide
+each other around a fit to all of them, and show around one that they did not influence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import chain, zip_longest
 
 import numpy as np
 
 from hexacell.distributions import chi_square_limit
-from hexacell.identification.data_faults.fault_model import CorrectedFit, FaultHypothesis
 from hexacell.identification.data_faults.hypotheses import (
+    SPLIT_POINT,
+    CorrectedFit,
+    FaultHypothesis,
     GaugeFaultHypothesis,
     OutlierHypothesis,
+    ZeroShiftHypothesis,
+)
+from hexacell.identification.data_faults.score_tests import (
+    OutlierStatistics,
     rank_hypotheses,
-    record_ids,
     score_gauge_faults,
 )
-from hexacell.identification.data_faults.score_tests import OutlierStatistics
+from hexacell.identification.problem.data_requirements import is_determined, is_overdetermined
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver import measurement_model
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.linearized_model import LinearizedModel
+from hexacell.identification.solver.linear_model import LinearizedModel
+from hexacell.identification.solver.measurement_model import predict
+from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.rotations import Array, Mask
 
 LARGEST_REJECTED_SHARE = 0.1
 """Of all records: if more disagree, they are not single mistakes."""
 
 TRIED_FROM_EACH_LIST = 3
+
 LARGEST_TRIMMED_SHARE = 0.25
+"""Of all records, that may be outliers around the drawing."""
+
 SIGNIFICANCE = 1e-4
+"""Probability that a good record counts as an outlier around the drawing."""
 
 
 def search(current: CorrectedFit) -> CorrectedFit | None:
@@ -58,53 +73,68 @@ def search(current: CorrectedFit) -> CorrectedFit | None:
 
 def hypotheses_at_solution(current: CorrectedFit, found_before: int) -> list[FaultHypothesis]:
     """The significant hypotheses by tests around the solution, the most likely first."""
-    model = LinearizedModel.at_solution(current.fit)
-    return rank_hypotheses(model, current.fit.noise_test, found_before=found_before)
+    return rank_hypotheses(current.fit.linear_model, current.fit.noise_test, found_before=found_before)
+
+
+def refitted(current: CorrectedFit, hypothesis: FaultHypothesis) -> CorrectedFit | None:
+    """The fit corrected for one more fault; None if the records contradict it, or too few could."""
+    match hypothesis:
+        case ZeroShiftHypothesis() if not _is_constant(current, hypothesis):
+            return None
+        case GaugeFaultHypothesis() if not is_overdetermined(current.problem):
+            return None
+    return current.corrected_for(hypothesis)
+
+
+def _is_constant(current: CorrectedFit, shift: ZeroShiftHypothesis) -> bool:
+    """Whether the records after a shift of the zero agree with the others up to a constant."""
+    split = CorrectedFit.uncorrected(shift.split(current.problem))
+    if not split.is_reliable or not is_overdetermined(split.problem):
+        return False
+    if not split.is_consistent and not is_determined(shift.corrected(current.problem)):
+        return False
+    concerned = np.isin(split.fit.problem.labels[:, 0], [shift.point, SPLIT_POINT])
+    statistics = OutlierStatistics.of(split.fit.linear_model)
+    return bool((statistics.threshold_ratio()[concerned] <= 1.0).all())
 
 
 def _trials(current: CorrectedFit) -> Iterator[CorrectedFit]:
+    """The corrected fits of all candidates, each hypothesis tried once."""
+    tried: set[FaultHypothesis] = set()
+    for candidate in _candidates(current):
+        if isinstance(candidate, CorrectedFit):
+            yield candidate
+        elif candidate not in tried:
+            tried.add(candidate)
+            trial = refitted(current, candidate)
+            if trial is not None:
+                yield trial
+
+
+def _candidates(current: CorrectedFit) -> Iterator[FaultHypothesis | CorrectedFit]:
+    """What may be wrong, in the order above: hypotheses, and one fit without several records."""
     start = _ExpansionPoint.start(current.problem)
     gauge_faults = start.gauge_faults()
-    elsewhere = _ExpansionPoint.solution(current).hypotheses()
-    ranks = _by_rank(gauge_faults, hypotheses_at_solution(current, 0), elsewhere)
-    tried: set[FaultHypothesis] = set()
-    yield from _one_by_one(current, chain(*ranks[:1]), tried)
+    elsewhere = _ExpansionPoint.solution(current, current.fit).hypotheses()
+    lists = (gauge_faults, hypotheses_at_solution(current, 0), elsewhere)
+    first, *others = [*zip_longest(*(one[:TRIED_FROM_EACH_LIST] for one in lists))] or [()]
+    yield from filter(None, first)
     deleted = _greedy_deletion(current)
     yield deleted
-    yield from _one_by_one(current, [start.gross_errors()], tried)
-    at_all_points = (hypothesis for hypothesis in gauge_faults if hypothesis.point is None)
-    without_deleted = _ExpansionPoint.solution(replace(deleted, problem=current.problem)).gauge_faults()
-    last = chain(without_deleted[:TRIED_FROM_EACH_LIST], *ranks[1:], at_all_points)
-    yield from _one_by_one(current, last, tried)
-
-
-def _by_rank(*lists: Sequence[FaultHypothesis]) -> list[tuple[FaultHypothesis | None, ...]]:
-    """The most likely hypothesis of each list, the second of each, and so on."""
-    return [*zip_longest(*(hypotheses[:TRIED_FROM_EACH_LIST] for hypotheses in lists))]
-
-
-def _one_by_one(
-    current: CorrectedFit, hypotheses: Iterable[FaultHypothesis | None], tried: set[FaultHypothesis]
-) -> Iterator[CorrectedFit]:
-    for hypothesis in hypotheses:
-        if hypothesis is None or hypothesis in tried:
-            continue
-        tried.add(hypothesis)
-        trial = hypothesis.trial(current)
-        if trial is not None:
-            yield trial
+    if (outliers := start.gross_errors()) is not None:
+        yield outliers
+    yield from _ExpansionPoint.solution(current, deleted.fit).gauge_faults()[:TRIED_FROM_EACH_LIST]
+    yield from filter(None, chain(*others))
+    yield from (hypothesis for hypothesis in gauge_faults if hypothesis.point is None)
 
 
 def _greedy_deletion(start: CorrectedFit) -> CorrectedFit:
-    """Records left out by the most likely hypothesis, one after another with a refit in between."""
+    """Leave out the records of the most likely hypothesis, one after another with a refit in between."""
     now, found = start, 0
     while found < LARGEST_REJECTED_SHARE * start.problem.records and not now.is_consistent:
-        removable = (
-            hypothesis
-            for hypothesis in hypotheses_at_solution(now, found)
-            if not isinstance(hypothesis, GaugeFaultHypothesis)
-        )
-        trials = (hypothesis.trial(now) for hypothesis in removable)
+        hypotheses = hypotheses_at_solution(now, found)
+        removing = (one for one in hypotheses if not isinstance(one, GaugeFaultHypothesis))
+        trials = (refitted(now, hypothesis) for hypothesis in removing)
         trial = next((trial for trial in trials if trial is not None), None)
         if trial is None:
             break
@@ -128,11 +158,10 @@ class _ExpansionPoint:
         return cls(problem, problem.prior.precision)
 
     @classmethod
-    def solution(cls, current: CorrectedFit) -> _ExpansionPoint:
-        """The solution, with the records that the solver left out."""
-        problem, free = current.problem, current.fit.free
-        solved = problem.solve_poses(free)
-        return cls(problem.starting_at(free, solved.poses, solved.found), current.fit.active_prior)
+    def solution(cls, current: CorrectedFit, fit: Identification) -> _ExpansionPoint:
+        """The solution of a fit, with all records of another one."""
+        solved = current.problem.solve_poses(fit.free)
+        return cls(current.problem.starting_at(fit.free, solved.poses, solved.found), fit.active_prior)
 
     def hypotheses(self) -> list[FaultHypothesis]:
         """The significant hypotheses, the most likely first."""
@@ -153,13 +182,13 @@ class _ExpansionPoint:
         while np.count_nonzero(~kept) <= LARGEST_TRIMMED_SHARE * self.problem.records:
             worst = self._worst(kept)
             if worst is None:
-                records = tuple(record_ids(self.problem.subset(~kept)))
+                records = tuple(self.problem.subset(~kept).record_ids)
                 return OutlierHypothesis(gain=0.0, unknowns=0, records=records) if records else None
             kept &= np.any(self.problem.labels != worst, axis=1)
         return None
 
     def _worst(self, kept: Mask) -> Array | None:
-        """The label (2,) of the record with the largest statistic; none if it is not significant."""
+        """The label (2,) of the record with the largest statistic; None if it is not significant."""
         model = self._model(kept)
         if model is None:
             return None
@@ -171,10 +200,10 @@ class _ExpansionPoint:
     def _model(self, kept: Mask) -> LinearizedModel | None:
         """The linear model of those of some records (n,) that are not next to a singularity."""
         some = self.problem.subset(kept)
-        prediction = measurement_model.predict(some, some.initial_parameters, some.start)
+        prediction = predict(some, some.initial_parameters, some.start)
         if prediction.singular.all():
             return None
         if prediction.singular.any():
             some = some.subset(~prediction.singular)
-            prediction = measurement_model.predict(some, some.initial_parameters, some.start)
+            prediction = predict(some, some.initial_parameters, some.start)
         return LinearizedModel.around(some, prediction, self.active_prior)

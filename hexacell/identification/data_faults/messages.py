@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
-from hexacell.identification.data_faults.gauge_faults import MM_PER_INCH, GaugeFault
-from hexacell.identification.data_faults.hypotheses import GaugeFaultHypothesis, ZeroShiftHypothesis
-from hexacell.identification.solver.chi_square import ChiSquareTest
+from hexacell.identification.data_faults.deletion_tests import DeletionTest
+from hexacell.identification.data_faults.hypotheses import (
+    MM_PER_INCH,
+    CorrectedFit,
+    GaugeFault,
+    GaugeFaultHypothesis,
+    UncorrectableFaultError,
+    ZeroShiftHypothesis,
+)
+from hexacell.identification.problem.data_requirements import equations
 from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
 from hexacell.measurements.records import Deviation, RecordId
 
@@ -16,82 +23,67 @@ NAMED_SHARE = 0.3
 """Of the largest component of a zero shift: gauges with smaller components are not named."""
 
 
-def rejected_record(
-    record: RecordId,
-    kind: DataFaultKind,
-    *,
-    gauges: str = "",
-    offset_mm: Deviation | None = None,
-    leg: tuple[int, float] | None = None,
-) -> DataFault:
-    """A record that is left out.
+def left_out(selected: CorrectedFit, tests: Mapping[RecordId, DeletionTest]) -> tuple[DataFault, ...]:
+    """What is wrong with the records that a fit does without; ``tests`` are those of single records."""
+    shifts = []
+    for shift in selected.zero_shifts:
+        records = tuple(selected.after(shift))
+        consequence = f"; orientations {shift.orientation} to {records[-1][1]} are left out"
+        shifts.append(_zero_shift(shift, consequence, records))
+    return (*map(_rejected_record, tests.values()), *shifts)
 
-    ``gauges`` are the faulty gauges, empty if no single one is at fault. ``offset_mm`` are the errors of
-    the gauges x, y and z; ``leg`` is a leg (from 1) and its distance from the commanded position, mm.
-    """
-    point, orientation = record
-    if kind is DataFaultKind.MISMATCHED_JOINTS and leg:
-        fact, action = _mismatched_joints(leg)
-    elif offset_mm is None:
-        fact, action = (
-            "the pose is too near a singularity for this record to be used",
-            "Choose another orientation",
+
+def refused(error: UncorrectableFaultError) -> DataFault:
+    """A fault for which the data are refused."""
+    match error.fault:
+        case ZeroShiftHypothesis() as shift:
+            found = equations(error.left)
+            consequence = f", and the records before it and at the other points give only {found} equations"
+            return _zero_shift(shift, consequence)
+        case GaugeFaultHypothesis() as fault:
+            return _gauge_fault(fault, error.before, error.after)
+    raise TypeError(error.fault)
+
+
+def _rejected_record(test: DeletionTest) -> DataFault:
+    point, orientation = test.record
+    action = "Measure it again"
+    if test.kind is DataFaultKind.MISMATCHED_JOINTS and test.leg:
+        leg, off = test.leg
+        fact = (
+            f"q{leg} is {off:+.3f} mm off its place for the commanded pose, unlike in the point's other "
+            "records; the record is left out"
         )
+        action = "Check whether q1 to q6 belong to another pose, or measure it again"
+    elif test.offset_mm is None:
+        fact = "the pose is too near a singularity for this record to be used"
+        action = "Choose another orientation"
     else:
-        fact = f"{_wrong_readings(kind, gauges, offset_mm)}; the record is left out"
-        action = "Measure it again"
+        fact = f"{_wrong_readings(test.kind, test.gauges, test.offset_mm)}; the record is left out"
     return DataFault(
-        kind,
+        test.kind,
         f"Point {point}, orientation {orientation}: {fact}",
         action,
-        gauges=gauges,
-        left_out=(record,),
-        offset_mm=offset_mm,
+        gauges=test.gauges,
+        left_out=(test.record,),
+        offset_mm=test.offset_mm,
     )
 
 
-def zero_shift(shift: ZeroShiftHypothesis, left_out: Sequence[RecordId]) -> DataFault:
-    """A shift of the gauges' zero, with the records after it that are left out."""
-    _, last = left_out[-1]
-    consequence = f"; orientations {shift.orientation} to {last} are left out"
-    return _zero_shift(shift, consequence, tuple(left_out))
-
-
-def refused_zero_shift(shift: ZeroShiftHypothesis, equations: int) -> DataFault:
-    """A shift of the gauges' zero after which too few records are left."""
-    consequence = f", and the records before it and at the other points give only {equations} equations"
-    return _zero_shift(shift, consequence)
-
-
-def gauge_fault(
-    hypothesis: GaugeFaultHypothesis, before: ChiSquareTest, after: ChiSquareTest, *, lost: int = 0
-) -> DataFault:
-    """A gauge fault, refused; the residuals before and after its correction are the evidence.
-
-    ``lost`` counts the records that had no place in the fit before, next to a singularity.
-    """
+def _gauge_fault(hypothesis: GaugeFaultHypothesis, before: CorrectedFit, after: CorrectedFit) -> DataFault:
+    """The residuals before and after the correction are the evidence."""
     fault = hypothesis.gauge_fault
     where = "at every point" if hypothesis.point is None else f"at point {hypothesis.point}"
     looks, correction, action = _looks_correction_action(fault, where)
+    without = ""
+    if before.lost:
+        without = f" without {before.lost} record{'s' if before.lost > 1 else ''} that no geometry explains"
+    ratio, corrected_ratio = before.fit.goodness.ratio, after.fit.goodness.ratio
     sentence = (
-        f"{_names(fault.gauges)} {looks} {where}: the residuals are {before.ratio:.3g} times the stated "
-        f"noise{_without(lost)}, and {after.ratio:.3g} times {correction}"
+        f"{_names(fault.gauges)} {looks} {where}: the residuals are {ratio:.3g} times the stated "
+        f"noise{without}, and {corrected_ratio:.3g} times {correction}"
     )
     return DataFault(fault.kind, sentence, action, gauges=fault.gauges)
-
-
-def _without(lost: int) -> str:
-    if not lost:
-        return ""
-    return f" without {lost} record{'s' if lost > 1 else ''} that no geometry explains"
-
-
-def _mismatched_joints(leg: tuple[int, float]) -> tuple[str, str]:
-    number, off = leg
-    return (
-        f"q{number} is {off:+.3f} mm off its place for the commanded pose, unlike in the point's other "
-        "records; the record is left out"
-    ), "Check whether q1 to q6 belong to another pose, or measure it again"
 
 
 def _wrong_readings(kind: DataFaultKind, gauges: str, offset_mm: Deviation) -> str:

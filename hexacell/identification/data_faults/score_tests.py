@@ -5,7 +5,7 @@ estimate and the gain
 
     b = (Z^T M Z)^-1 Z^T M r,    gain = r^T M Z b,
 
-with M of :mod:`hexacell.identification.solver.linearized_model`. No second fit is needed, and of M
+with M of :class:`.LinearizedModel`. No second fit is needed, and of M
 only the blocks of the records concerned. Three choices of Z:
 
 - one record, along one gauge or in any direction: a gross error. The record is tested against what
@@ -22,19 +22,37 @@ Weisberg, Residuals and Influence in Regression, 1982.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.distributions import chi_square_limit, normal_limit
+from hexacell.identification.data_faults.hypotheses import (
+    GAUGE_FAULTS,
+    PENALTY_PER_UNKNOWN,
+    FaultHypothesis,
+    GaugeFaultHypothesis,
+    OutlierHypothesis,
+    ZeroShiftHypothesis,
+)
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.linearized_model import LinearizedModel
+from hexacell.identification.solver.chi_square import ChiSquareTest
+from hexacell.identification.solver.linear_model import LinearizedModel
 from hexacell.kinematics.rotations import Array
 
 FALSE_ALARMS_PER_RECORD = 2e-4
 FALSE_ALARMS_PER_FILE = 0.02
 """The smaller rate applies: a file of 100,000 good records must lose none either."""
+
+WORTH_TESTING = 0.05
+"""Probability of the residuals below which zero shifts and gauge faults are tested too."""
+
+FALSE_SHIFTS_PER_FILE = 1e-3
+
+SMALLEST_GAUGE_FAULT_GAIN = 25.0
+"""A likelihood ratio of 270,000, for some dozens of gauge faults tested."""
 
 SMALLEST_REDUNDANCY = 1e-3
 """Of a record's information: where the others determine less, its residual is no evidence."""
@@ -44,6 +62,77 @@ SCATTER_OF_MEDIAN = 1.12
 """Relative standard deviation of the median of n such values, times the square root of n."""
 
 
+def rank_hypotheses(
+    model: LinearizedModel, goodness: ChiSquareTest, *, found_before: int = 0
+) -> list[FaultHypothesis]:
+    """The significant hypotheses on the residuals of a model, the most likely first.
+
+    Args:
+        model: of the records, around a geometry.
+        goodness: the test of their residuals there.
+        found_before: how many gross errors were found before.
+    """
+    statistics = OutlierStatistics.of(model)
+    hypotheses: list[FaultHypothesis] = [*_outlier(model, statistics, found_before)]
+    if goodness.probability < WORTH_TESTING:
+        hypotheses += _zero_shift(model, statistics.scale)
+        for hypothesis in score_gauge_faults(model):
+            remaining = max(1.0, (goodness.chi2 - hypothesis.gain) / goodness.expected)
+            if hypothesis.gain > SMALLEST_GAUGE_FAULT_GAIN * min(statistics.scale, remaining):
+                hypotheses.append(hypothesis)
+    return sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)
+
+
+def score_gauge_faults(model: LinearizedModel) -> list[GaugeFaultHypothesis]:
+    """Every gauge fault, at all points and at each, with its gain."""
+    problem = model.problem
+    points = [None, *(int(problem.labels[row, 0]) for row in problem.first_rows)]
+    hypotheses = []
+    for fault in GAUGE_FAULTS:
+        change = -problem.deviations @ (fault.in_base_frame(problem) - np.eye(3)).T
+        at_points, at_all = known_change_gains(model, change)
+        hypotheses += [
+            GaugeFaultHypothesis(gain=gain, unknowns=0, gauge_fault=fault, point=point)
+            for point, gain in zip(points, [at_all, *at_points.tolist()], strict=True)
+        ]
+    return hypotheses
+
+
+def _outlier(
+    model: LinearizedModel, statistics: OutlierStatistics, found_before: int
+) -> Iterator[OutlierHypothesis]:
+    """The record with the most significant gross error, of one gauge or of any kind."""
+    ratio = statistics.threshold_ratio(found_before)
+    row = int(np.argmax(ratio))
+    if ratio[row] <= 1.0:
+        return
+    point, orientation = model.problem.labels[row].tolist()
+    one_gauge, any_direction = float(statistics.along_gauges[row].max()), float(statistics.omnibus[row])
+    is_one_gauge = any_direction - one_gauge < 2.0 * PENALTY_PER_UNKNOWN
+    gain, unknowns = (one_gauge, 1) if is_one_gauge else (any_direction, 3)
+    yield OutlierHypothesis(gain=gain, unknowns=unknowns, records=((point, orientation),))
+
+
+def _zero_shift(model: LinearizedModel, scale: float) -> Iterator[ZeroShiftHypothesis]:
+    """The most significant shift of the gauges' zero."""
+    statistics = ZeroShiftStatistics.of(model)
+    if not len(statistics.rows):
+        return
+    best = int(np.argmax(statistics.gains))
+    critical = chi_square_limit(3, FALSE_SHIFTS_PER_FILE / len(statistics.rows))
+    gain = float(statistics.gains[best])
+    if (significance := gain / scale / critical) > 1.0:
+        point, orientation = model.problem.labels[statistics.rows[best]].tolist()
+        yield ZeroShiftHypothesis(
+            gain=gain,
+            unknowns=3,
+            point=point,
+            orientation=orientation,
+            shift=statistics.shifts[best],
+            significance=significance,
+        )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class OutlierStatistics:
     """Tests of n records for gross errors.
@@ -51,7 +140,8 @@ class OutlierStatistics:
     Attributes:
         along_gauges: (n, 3) squared standardised shift along each gauge; about 1 for a good record.
         omnibus: (n,) squared standardised shift; about 3 for a good record.
-        scale: noise variance over the stated one where it is significantly larger, else 1.
+        scale: noise variance, by the median record, over the stated one where it is significantly larger,
+            else 1.
     """
 
     along_gauges: Array
@@ -65,7 +155,9 @@ class OutlierStatistics:
         covariance = model.residual_covariance
         along_gauges = _along_gauges(gauges, model.scores, weights @ covariance @ weights, weights)
         omnibus = _omnibus(model.residuals, covariance, weights)
-        return cls(along_gauges, omnibus, _noise_scale(omnibus))
+        noise = float(np.median(omnibus)) / MEDIAN_OF_CHI2_3
+        is_larger = noise > 1.0 + 4.0 * SCATTER_OF_MEDIAN / np.sqrt(len(omnibus))
+        return cls(along_gauges, omnibus, noise if is_larger else 1.0)
 
     def threshold_ratio(self, found_before: int = 0) -> Array:
         """The larger statistic (n,) of each record over its critical value.
@@ -96,12 +188,6 @@ def _omnibus(residuals: Array, covariance: Array, weights: Array) -> Array:
     squares = np.where(testable, along**2 / np.where(testable, values, 1.0), 0.0)
     statistics: Array = np.sum(squares, axis=-1)
     return statistics
-
-
-def _noise_scale(omnibus: Array) -> float:
-    """The noise variance by the median record; 1 unless it is significantly larger than stated."""
-    ratio = float(np.median(omnibus)) / MEDIAN_OF_CHI2_3
-    return ratio if ratio > 1.0 + 4.0 * SCATTER_OF_MEDIAN / np.sqrt(len(omnibus)) else 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,1 +1,1 @@
-"""Diagnostics of a solution: accuracy, correlations, tolerances, repeatability, noise levels."""
+"""What follows from a result: pose accuracy, frames, tests of the model, tolerances."""

@@ -1,31 +1,92 @@
-"""Frame alignment: pose errors after the base and platform frames are fitted (linear least squares).
+"""Base and platform frames: fitted before pose errors are compared, and chosen for a new geometry.
 
 The base frame and the rotation of the platform frame are conventions, set when a fixture or a tool is
-taught. Pose errors are therefore compared after both frames are fitted. To first order a base
-frame shifted by t and rotated by f, and a platform frame rotated by p about the ball, change a pose
-(P, R) by
+taught. Pose errors are therefore compared after both frames are fitted (:class:`FrameFit`). To first
+order a base frame shifted by t and rotated by f, and a platform frame rotated by p about the ball, change
+a pose (P, R) by
 
     dP = t + f x P,    dr = f + R p,
 
-with dr the rotation vector in the base frame. The best (t, f, p) minimize the sum of squares over
-poses that span the workspace, with rotations weighted by a length, the platform's radius. Not every
-controller can turn a work frame about every axis: f is restricted to the axes about which it can be taught.
+with dr the rotation vector in the base frame. The best (t, f, p) minimize the sum of squares over poses
+that span the workspace, with rotations weighted by a length, the platform's radius. Not every controller
+can turn a work frame about every axis: f is restricted to the axes about which it can be taught.
+
+An identification leaves the frames of a geometry open: the mechanism's parameters can express it in any
+of them (:class:`~hexacell.kinematics.mechanism.FrameFreedom`). The base frame is not turned all the same:
+the gauges measure along its axes, and stay where they are when a new geometry is written. Points, work
+frames and tool frames were taught with an earlier geometry. At the joint variables q of a taught pose X
+the new geometry has another pose Y, in frames of its own. The chosen change of frames c
+(:func:`choose_frames`) is the one with the smallest
+
+    sum over taught poses of |dP|^2 + (r |dw|)^2,    (dP, dw) = pose errors of c(Y) against X,
+
+with r the platform's radius. It is found by Gauss-Newton with the derivatives at X. They give the exact
+gradient of the sum: a small turn f moves c(Y) by f x c(Y) = f x X + f x dP, whose last term is normal to
+dP, and a small turn w changes the length of dw by ``w . dw / |dw|``, however large dw is.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hexacell.kinematics import rotations
-from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.commanded_motion import CommandedRobot
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Branch, FrameFreedom, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rotations import Array, Mask
 
-MAX_ITERATIONS = 20
-TOLERANCE = 1e-12
+ALIGNMENT_ITERATIONS = 20
+ALIGNMENT_TOLERANCE = 1e-12
 """Convergence: largest rotation, rad, and largest shift divided by the length."""
+
+CHOICE_ITERATIONS = 50
+CHOICE_TOLERANCE = 1e-13
+"""Convergence: largest turn, rad, and largest shift divided by the length."""
+
+UNDETERMINED = 0.01
+"""Changes that move the taught poses by less than this share of what others do are not made.
+
+Poses in one place, for example, do not distinguish turns of the base frame and of the platform frame."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseErrors:
+    """Position errors (n,), mm, and orientation errors (n,), rad, of n poses."""
+
+    distances_mm: Array
+    angles: Array
+
+    @classmethod
+    def of_squares(cls, squares: Array) -> PoseErrors:
+        """The errors by squares of components (n, 6): positions, mm^2, then rotation vectors, rad^2."""
+        return cls(np.sqrt(squares[:, :3].sum(axis=-1)), np.sqrt(squares[:, 3:].sum(axis=-1)))
+
+    def times(self, factor: float) -> PoseErrors:
+        """All errors multiplied by a factor."""
+        return PoseErrors(factor * self.distances_mm, factor * self.angles)
+
+    @property
+    def position_rms_mm(self) -> float:
+        """Root mean square distance."""
+        return float(np.sqrt(np.mean(self.distances_mm**2)))
+
+    @property
+    def position_largest_mm(self) -> float:
+        """Largest distance."""
+        return float(self.distances_mm.max())
+
+    @property
+    def orientation_rms_deg(self) -> float:
+        """Root mean square angle."""
+        return float(np.degrees(np.sqrt(np.mean(self.angles**2))))
+
+    @property
+    def orientation_largest_deg(self) -> float:
+        """Largest angle."""
+        return float(np.degrees(self.angles.max()))
 
 
 def pose_errors(reached: PoseBatch, commanded: PoseBatch) -> Array:
@@ -71,11 +132,12 @@ class FrameFit:
 
     def aligned(self, reached: PoseBatch, others: PoseBatch) -> PoseBatch:
         """Poses ``others`` in the frames that fit ``reached`` to the workspace best (Gauss-Newton)."""
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(ALIGNMENT_ITERATIONS):
             best = self.coefficients(pose_errors(reached, self.workspace))
-            change = _inverse_change(best)
+            shift, base, platform = best.reshape(3, 3)
+            change = FrameTransform(rotations.from_vector(-base), shift, rotations.from_vector(platform))
             reached, others = change.poses(reached), change.poses(others)
-            if max(np.abs(best[:3]).max() / self.length, np.abs(best[3:]).max()) < TOLERANCE:
+            if max(np.abs(best[:3]).max() / self.length, np.abs(best[3:]).max()) < ALIGNMENT_TOLERANCE:
                 break
         return others
 
@@ -90,7 +152,88 @@ def frame_derivatives(poses: PoseBatch) -> Array:
     return design
 
 
-def _inverse_change(coefficients: Array) -> FrameTransform:
-    """The change of frames that removes the errors with these coefficients (9,)."""
-    shift, base, platform = coefficients.reshape(3, 3)
-    return FrameTransform(rotations.from_vector(-base), shift, rotations.from_vector(platform))
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameChoice:
+    """The frames of a new geometry, and how far the taught poses move nevertheless.
+
+    Attributes:
+        geometry: the new geometry in the chosen frames.
+        frames: from the mechanism's convention to the chosen frames.
+        found: (n,) which of the taught poses both geometries reach; the others did not count.
+        displacement: of the poses found, at equal joint variables: mm and rad.
+    """
+
+    geometry: Geometry
+    frames: FrameTransform
+    found: Mask
+    displacement: PoseErrors
+
+
+def choose_frames(
+    mechanism: Mechanism, branch: Branch, *, taught: Geometry, new: Geometry, poses: PoseBatch
+) -> FrameChoice:
+    """The frames in which the ``new`` geometry moves n taught poses least.
+
+    Args:
+        mechanism: of both geometries.
+        branch: of both.
+        taught: the geometry of the time of teaching, in the frames of that time.
+        new: the new geometry, in the mechanism's frame convention.
+        poses: in the frames of ``taught``. If both geometries reach none of them, the frames of ``taught``
+            are kept, as the mechanism's convention has them.
+    """
+    normalized, convention = mechanism.normalize_frames(taught)
+    robot = CommandedRobot(mechanism, branch, commanding=normalized, actual=new)
+    reached = robot.actual_poses(convention.poses(poses))
+    targets, reached_poses = poses[reached.found], reached.poses[reached.found]
+    length = float(mechanism.platform_radius(new))
+    frames = convention.inverse()
+    if len(targets):
+        freedom = replace(mechanism.frame_freedom, base="")  # gauges measure along the axes of the base
+        change = closest_frames(freedom, length, frames.poses(reached_poses), targets)
+        frames = frames.then(change)
+    return FrameChoice(
+        mechanism.change_frames(new, frames),
+        frames,
+        reached.found,
+        PoseErrors.of_squares(pose_errors(frames.poses(reached_poses), targets) ** 2),
+    )
+
+
+def closest_frames(
+    freedom: FrameFreedom, length: float, reached: PoseBatch, targets: PoseBatch
+) -> FrameTransform:
+    """The change of frames that brings n poses closest to n others; rotations count by ``length``, mm."""
+    pivot = np.where([axis in freedom.shift for axis in "xyz"], targets.positions.mean(axis=0), 0.0)
+    solution = _pseudoinverse(freedom, length, targets, pivot)
+    weights = np.repeat([1.0, length], 3)
+    frames = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
+    for _ in range(CHOICE_ITERATIONS):
+        errors = pose_errors(frames.poses(reached), targets) * weights
+        step = np.zeros(9)
+        step[freedom.columns] = solution @ errors.ravel()
+        frames = frames.then(_change(step, length, pivot))
+        if np.abs(step).max() < CHOICE_TOLERANCE * length:
+            break
+    return frames
+
+
+def _pseudoinverse(freedom: FrameFreedom, length: float, targets: PoseBatch, pivot: Array) -> Array:
+    """The best free changes (k, 6n), all in mm, for weighted errors.
+
+    Turns are about the pivot and times the length: where the poses leave a choice, the smallest change
+    is then a small one everywhere among them.
+    """
+    centred = PoseBatch(targets.positions - pivot, targets.rotations)
+    design = frame_derivatives(centred)
+    design[:, 3:] *= length
+    design[:, :, 3:] /= length
+    inverse: Array = np.linalg.pinv(design.reshape(-1, 9)[:, freedom.columns], rcond=UNDETERMINED)
+    return inverse
+
+
+def _change(step: Array, length: float, pivot: Array) -> FrameTransform:
+    """The change of frames that removes a shift, a turn of the base and one of the platform (9,), mm."""
+    shift, base, platform = step.reshape(3, 3) / np.array([[1.0], [length], [length]])
+    turn = rotations.from_vector(-base)
+    return FrameTransform(turn, pivot + turn.T @ (shift - pivot), rotations.from_vector(platform))

@@ -5,7 +5,7 @@ many degrees of freedom as they have measured coordinates, less the unknown cons
 the chi-square of these records against their covariance as predicted from the others. Both costs are
 linearized at the solution of all records, where the poses, and with them the weights, are known best. The
 systematic errors that are stated of the machine are in the covariance
-(:mod:`~hexacell.identification.solver.linear_costs`).
+(:mod:`~hexacell.identification.solver.linear_model`).
 
 Sources: Gelb (ed.), Applied Optimal Estimation, 1974 (innovations); Cook and Weisberg, Residuals and
 Influence in Regression, 1982 (deletion).
@@ -22,10 +22,9 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY, ChiSquareTest
-from hexacell.identification.solver.levenberg_marquardt import FINE
-from hexacell.identification.solver.linear_costs import LinearCosts
+from hexacell.identification.solver.fit import FINE, solve_around_singularities
+from hexacell.identification.solver.linear_model import LinearCosts
 from hexacell.identification.solver.result import Identification
-from hexacell.identification.solver.singular_records import solve_around_singularities
 from hexacell.kinematics.rotations import Mask
 
 

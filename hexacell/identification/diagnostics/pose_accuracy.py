@@ -20,42 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.diagnostics.frame_alignment import FrameFit, pose_errors
+from hexacell.identification.diagnostics.frame_alignment import FrameFit, PoseErrors, pose_errors
 from hexacell.kinematics.free_sensitivity import free_sensitivity
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PoseErrors:
-    """Position errors (n,), mm, and orientation errors (n,), rad, of n poses."""
-
-    distances_mm: Array
-    angles: Array
-
-    def times(self, factor: float) -> PoseErrors:
-        """All errors multiplied by a factor."""
-        return PoseErrors(factor * self.distances_mm, factor * self.angles)
-
-    @property
-    def position_rms_mm(self) -> float:
-        """Root mean square distance."""
-        return float(np.sqrt(np.mean(self.distances_mm**2)))
-
-    @property
-    def position_largest_mm(self) -> float:
-        """Largest distance."""
-        return float(self.distances_mm.max())
-
-    @property
-    def orientation_rms_deg(self) -> float:
-        """Root mean square angle."""
-        return float(np.degrees(np.sqrt(np.mean(self.angles**2))))
-
-    @property
-    def orientation_largest_deg(self) -> float:
-        """Largest angle."""
-        return float(np.degrees(self.angles.max()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +33,7 @@ class Accuracy:
     Attributes:
         poses: the reachable task poses, in the mechanism's frame convention.
         reachable: (k,) bool, which of all task poses these are.
-        before: with the controller's present geometry: the systematic error.
+        before: with the controller's present geometry, the systematic error.
         after: with the identified geometry: one standard deviation (root mean square) of each error.
     """
 
@@ -103,8 +71,8 @@ def predicted_accuracy(belief: RobotBelief, *, task: PoseBatch, workspace: PoseB
     return Accuracy(
         poses=task,
         reachable=task_reachable,
-        before=_norms(pose_errors(aligned, task) ** 2),
-        after=_norms(mean_squares),
+        before=PoseErrors.of_squares(pose_errors(aligned, task) ** 2),
+        after=PoseErrors.of_squares(mean_squares),
     )
 
 
@@ -139,8 +107,3 @@ def _derivatives(belief: RobotBelief, poses: PoseBatch) -> Array:
     """Derivatives (n, 6, p) of the poses by the free parameters, at the estimate's joint variables."""
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
     return free_sensitivity(belief.mechanism, belief.estimate, poses, joints).free
-
-
-def _norms(squares: Array) -> PoseErrors:
-    """Norms from squared components (n, 6): positions, mm^2, then rotation vectors, rad^2."""
-    return PoseErrors(np.sqrt(squares[:, :3].sum(axis=-1)), np.sqrt(squares[:, 3:].sum(axis=-1)))

@@ -1,6 +1,6 @@
-"""The commanded poses of records: the start of their forward kinematics.
+"""The commanded poses of records: the start of their forward kinematics, and a check of their encoders.
 
-A pose is commanded under a geometry and in its frames: those of the controller, or those of before if the
+A pose is commanded under a geometry and in its frames: those of the controller, or earlier ones if the
 record is older than the last calibration. Each record is attributed to the geometry whose inverse
 kinematics is nearest to its encoders. Its pose under any other geometry is found by continuation from
 there.
@@ -15,14 +15,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hexacell.errors import IdentifiabilityError
+from hexacell.identification.problem.prior import Prior
 from hexacell.kinematics.forward import CONTINUATION_STAGES, ForwardResult, continue_solution
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 SAME_GEOMETRY_STAGES = (1, *CONTINUATION_STAGES)
 """Continuation stages under the commanding geometry: the joint variables are near the commanded ones."""
+
+
+ACCEPTED_MM = 1.0
+"""Differences of joint variables from the commanded ones up to this are normal on any machine."""
+
+MAX_OUTLIER_SHARE = 0.2
+"""Largest share of the records whose joint variables may be inconsistent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +55,7 @@ class CommandingGeometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommandedPoses:
-    """The commands of n records.
+    """The commands of n records, each attributed to the geometry whose inverse kinematics is nearest.
 
     Attributes:
         poses: the commanded poses, in the convention's frames.
@@ -55,6 +65,7 @@ class CommandedPoses:
     """
 
     mechanism: Mechanism
+    branch: Branch
     poses: PoseBatch
     candidate_geometries: Sequence[Geometry]
     choice: NDArray[np.intp]
@@ -81,7 +92,7 @@ class CommandedPoses:
             np.stack([each.positions for each in poses])[choice, rows],
             np.stack([each.rotations for each in poses])[choice, rows],
         )
-        return cls(mechanism, chosen, geometries, choice, computed[choice, rows])
+        return cls(mechanism, branch, chosen, geometries, choice, computed[choice, rows])
 
     def are_of(self, candidates: Sequence[CommandingGeometry]) -> bool:
         """Whether they were attributed to the very same geometries."""
@@ -138,3 +149,90 @@ class CommandedPoses:
             poses = poses.with_rows(rows, result.poses)
             found[rows] = result.found
         return ForwardResult(poses, found)
+
+
+def require_consistent_encoders(
+    commands: CommandedPoses, measured: Array, labels: NDArray[np.int_], prior: Prior
+) -> None:
+    """Require that a geometry within the tolerances explains the joint variables of n records.
+
+    The joint variables q are the inverse kinematics of the commanded pose under the geometry that the
+    controller had at that time. That geometry may be unknown, but it was within the drawing's tolerances.
+    Its effect on q is bounded by worst-case tolerance analysis: the sum, over the parameters of a leg, of
+    the larger change of q at the two ends of the tolerance. A few inconsistent records are accepted; the
+    search for data faults names them.
+
+    Args:
+        commands: of the records.
+        measured: joint variables (n, 6), mm.
+        labels: point and orientation (n, 2).
+        prior: the drawing and its tolerances.
+
+    Raises:
+        IdentifiabilityError: names the first record and its worst leg, and the columns that look exchanged,
+            if any.
+    """
+    # NaN is a pose out of reach, which the start poses report.
+    difference = np.nan_to_num(np.abs(measured - commands.joints), nan=0.0)
+    if _is_small_share(difference > ACCEPTED_MM):
+        return
+    explained = _explained_by_tolerances(commands, prior)
+    if _is_small_share(difference > explained):
+        return
+    inconsistent = np.logical_or.reduce(difference > explained, axis=-1)
+    first = int(np.argmax(inconsistent))
+    leg = int(np.argmax(difference[first] - explained[first]))
+    point, orientation = labels[first]
+    raise IdentifiabilityError(
+        f"in {np.count_nonzero(inconsistent)} of {len(labels)} records the joint variables do not belong "
+        f"to the commanded pose; the first is point {point}, orientation {orientation}, where q{leg + 1} "
+        f"is {difference[first, leg]:.1f} mm off, and the tolerances explain "
+        f"{explained[first, leg]:.1f} mm",
+        action=_advice(commands, measured, explained),
+    )
+
+
+def _is_small_share(legs: Mask) -> bool:
+    """Whether any leg (n, 6) is concerned in few of n records only."""
+    records = np.logical_or.reduce(legs, axis=-1)
+    return bool(np.count_nonzero(records) <= MAX_OUTLIER_SHARE * len(records))
+
+
+def _explained_by_tolerances(commands: CommandedPoses, prior: Prior) -> Array:
+    """Bound (n, 6), mm, of the tolerances' effect on each joint variable; infinite if out of reach."""
+    widths = prior.leg_widths(commands.mechanism)
+    parameters = prior.centre.parameters
+
+    def commanded(change: Array) -> Array:
+        geometry = Geometry(parameters, prior.centre.vector + parameters.of_every_leg(change))
+        return commands.mechanism.inverse(geometry, commands.branch, commands.poses)
+
+    at_drawing = commanded(np.zeros(len(widths)))
+    changes = np.zeros_like(at_drawing)
+    for parameter in np.diag(widths):
+        changes += np.maximum(*(np.abs(commanded(sign * parameter) - at_drawing) for sign in (-1.0, 1.0)))
+    return np.nan_to_num(changes, nan=np.inf)
+
+
+def _advice(commands: CommandedPoses, measured: Array, explained: Array) -> str:
+    columns = _best_columns(commands, measured)
+    difference = np.nan_to_num(np.abs(measured[:, columns] - commands.joints), nan=0.0)
+    if not _is_small_share(difference > explained):
+        return "Check that q1 to q6 are in the row of their pose, in mm, and which config commanded it"
+    moved = [leg for leg in range(LEGS) if columns[leg] != leg]
+    names, sources = (
+        ", ".join(f"q{leg + 1}" for leg in legs) for legs in (moved, [columns[leg] for leg in moved])
+    )
+    joint = commands.mechanism.words.joint
+    return f"The columns {names} look like those of {sources}: check which encoder is on which {joint}"
+
+
+def _best_columns(commands: CommandedPoses, measured: Array) -> list[int]:
+    """The column (6,) that fits each leg's commands best: a linear assignment."""
+    # The import takes a sixth of the start-up time, and only wrong columns need it.
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415
+
+    reached = np.isfinite(commands.joints).all(axis=-1)
+    distance = np.abs(measured[reached][:, None, :] - commands.joints[reached][:, :, None])
+    _, columns = linear_sum_assignment(np.median(distance, axis=0))
+    return [int(column) for column in columns]

@@ -1,189 +1,32 @@
-"""The identification problem: records, prior and noise in the form that the solver takes."""
+"""The identification problem: records, prior and noise in the form that the solver takes.
+
+:meth:`Assumptions.problem` makes it of records, from the problem of some of them if that is known.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.identification.problem.commanded_poses import CommandedPoses
-from hexacell.identification.problem.systematic_errors import SystematicModel, no_systematic_errors
+from hexacell.errors import IdentifiabilityError
+from hexacell.identification.problem.commanded_poses import (
+    CommandedPoses,
+    CommandingGeometry,
+    require_consistent_encoders,
+)
+from hexacell.identification.problem.prior import Noise, Prior, SystematicModel, no_systematic_errors
 from hexacell.kinematics.forward import ForwardResult
-from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Mechanism
-from hexacell.kinematics.parameters import LEGS, ParameterSet, ParameterUnit
+from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.measurements.records import MeasurementSet, RecordId
 
-
-@dataclass(frozen=True, slots=True)
-class Noise:
-    """Standard deviations of the readings of a record and of the gauges' alignment and scale.
-
-    Attributes:
-        encoder: of an encoder; where they differ, the root mean square of all.
-        gauge_mm: likewise of a gauge.
-        alignment: of each component of a station's small rotation against the base, rad; zero if exact.
-        gauge_scale: of each gauge's relative scale error; zero if exact.
-        encoder_shares: of each encoder, in units of ``encoder``; empty where all are alike.
-        gauge_shares: of each gauge, x, y, z, in units of ``gauge_mm``.
-        gauge_axes: rows of the matrix whose columns are the gauges' directions in the frame convention;
-            empty where all gauges are alike, or along its axes.
-    """
-
-    encoder: float
-    gauge_mm: float
-    alignment: float = 0.0
-    gauge_scale: float = 0.0
-    encoder_shares: tuple[float, ...] = ()
-    gauge_shares: tuple[float, ...] = ()
-    gauge_axes: tuple[tuple[float, ...], ...] = ()
-
-    def with_devices(self, encoders: Sequence[float], gauges_mm: Sequence[float]) -> Noise:
-        """The same with the noise of each encoder, and of the gauges x, y and z."""
-        encoder, gauge = (float(np.sqrt(np.mean(np.square(one)))) for one in (encoders, gauges_mm))
-        return replace(
-            self,
-            encoder=encoder,
-            gauge_mm=gauge,
-            encoder_shares=tuple(mm / encoder for mm in encoders),
-            gauge_shares=tuple(mm / gauge for mm in gauges_mm),
-        )
-
-    def scaled(self, factor: float) -> Noise:
-        """The same with all readings noisier by a factor."""
-        return replace(self, encoder=factor * self.encoder, gauge_mm=factor * self.gauge_mm)
-
-    def along(self, gauges: Array) -> Noise:
-        """The same of gauges whose directions in the frame convention are the columns (3, 3)."""
-        if not self.gauge_shares:
-            return self
-        return replace(self, gauge_axes=tuple(tuple(row) for row in gauges.tolist()))
-
-    @property
-    def encoders(self) -> Array:
-        """Of each encoder (6,)."""
-        return self.encoder * np.array(self.encoder_shares or (1.0,) * LEGS)
-
-    @property
-    def gauges_mm(self) -> Array:
-        """Of each gauge (3,), along x, y and z."""
-        return self.gauge_mm * np.array(self.gauge_shares or (1.0,) * 3)
-
-    def encoder_covariance(self, position_by_joints: Array) -> Array:
-        """Covariance (n, 3, 3), mm^2, of the ball's position by ``dP/dq`` (n, 3, 6)."""
-        scaled = position_by_joints * self.encoders
-        covariance: Array = scaled @ np.swapaxes(scaled, -1, -2)
-        return covariance
-
-    @property
-    def gauge_covariance(self) -> Array:
-        """Covariance (3, 3), mm^2, of what the gauges show, in the frame convention."""
-        if not self.gauge_axes:
-            return np.diag(self.gauges_mm**2)
-        scaled = np.array(self.gauge_axes) * self.gauges_mm
-        covariance: Array = scaled @ scaled.T
-        return covariance
-
-
-@dataclass(frozen=True, slots=True)
-class Tolerances:
-    """Half-widths within which the built robot differs from its drawing.
-
-    Attributes:
-        by_kind: for all parameters of a kind, in its unit, by the kind's symbol.
-        ball_mm: for the ball's mounting, an offset common to all platform joints.
-    """
-
-    by_kind: Mapping[str, float]
-    ball_mm: float = 0.0
-
-    @classmethod
-    def of_settings(cls, parameters: ParameterSet, settings: Mapping[str, float]) -> Tolerances:
-        """The tolerances of a cell file: under the keys of the kinds, and ``ball_mm``."""
-        by_kind = {kind.symbol: settings[kind.tolerance_key] for kind in parameters.kinds}
-        return cls(by_kind, settings["ball_mm"])
-
-    def widths(self, parameters: ParameterSet) -> Array:
-        """The half-width of each parameter (P,), without the ball's offset."""
-        return parameters.by_kind(self.by_kind)
-
-    def scaled(self, share: float) -> Tolerances:
-        """A share of all of them."""
-        by_kind = {symbol: share * width for symbol, width in self.by_kind.items()}
-        return Tolerances(by_kind, share * self.ball_mm)
-
-    def sum_mm(self, parameters: ParameterSet) -> float:
-        """Sum of all length tolerances, the ball's offset included."""
-        lengths = (self.by_kind[kind.symbol] for kind in parameters.kinds if kind.unit is ParameterUnit.MM)
-        return sum(lengths) + self.ball_mm
-
-
-@dataclass(frozen=True, eq=False)
-class Prior:
-    """The Gaussian prior of the geometry: the drawing and its tolerances.
-
-    Attributes:
-        centre: the drawing, in the mechanism's frame convention.
-        free: its free parameters (p,), mm.
-        covariance: (p, p) of the free parameters, mm^2.
-        tolerance_sigma: (p,) their standard deviations by their own tolerances, mm, without those of the
-            parameters that define the frames; none where the prior is no drawing.
-        is_estimate: whether it is an earlier estimate, with what may have drifted since.
-    """
-
-    centre: Geometry
-    free: Array
-    covariance: Array
-    tolerance_sigma: Array | None = None
-    is_estimate: bool = False
-
-    @classmethod
-    def of(cls, mechanism: Mechanism, drawing: Geometry, tolerances: Tolerances) -> Prior:
-        """The Gaussian with the second moments of errors uniform within the tolerances, to first order.
-
-        The tolerances hold for all parameters in the frames of the ``drawing``; the change to the
-        convention's frames correlates them.
-        """
-        centre, _ = mechanism.normalize_frames(drawing)
-        by_parameters = free_parameter_derivatives(mechanism, drawing)
-        by_ball = mechanism.parameters.ball_offset @ by_parameters
-        widths = tolerances.widths(mechanism.parameters)[:, None]
-        factor = np.vstack([widths * by_parameters, tolerances.ball_mm * by_ball])
-        own = np.vstack([np.diag(widths[:, 0]), tolerances.ball_mm * mechanism.parameters.ball_offset])
-        own_sigma = np.linalg.norm(own, axis=0)[mechanism.convention.free_rows()] / np.sqrt(3.0)
-        free = mechanism.convention.free_parameters(centre)
-        return cls(centre, free, factor.T @ factor / 3.0, own_sigma)
-
-    @property
-    def sigma(self) -> Array:
-        """What counts as unknown of each free parameter (p,): the tolerances, if there are any; mm."""
-        if self.tolerance_sigma is not None:
-            return self.tolerance_sigma
-        sigma: Array = np.sqrt(np.diag(self.covariance))
-        return sigma
-
-    @cached_property
-    def precision(self) -> Array:
-        """(p, p), 1/mm^2."""
-        return np.linalg.inv(self.covariance)
-
-    def squared_distance(self, free: Array) -> float:
-        """Squared distance of free parameters (p,), mm, from the drawing, in standard deviations."""
-        change = free - self.free
-        return float(change @ np.linalg.solve(self.covariance, change))
-
-    def leg_widths(self, mechanism: Mechanism) -> Array:
-        """The largest tolerances (c,) of the numbers of one leg, the ball's offset included."""
-        widths = np.zeros(len(mechanism.parameters))
-        widths[mechanism.convention.free_rows()] = np.sqrt(3.0 * np.diag(self.covariance))
-        parameters = mechanism.parameters
-        largest = [parameters.array(widths, kind.symbol).max() for kind in parameters.kinds]
-        return np.repeat(largest, [kind.numbers_per_leg for kind in parameters.kinds])
+Values = TypeVar("Values", Array, Mask)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -257,6 +100,15 @@ class Problem:
         """Poses that close the geometry of free parameters (p,), mm, at the records' joint variables."""
         return self.commands.solve_poses(self.geometry(free), self.joints)
 
+    @property
+    def record_ids(self) -> list[RecordId]:
+        """Point and orientation of each record."""
+        return [(point, orientation) for point, orientation in self.labels.tolist()]
+
+    def mask_of(self, records: Collection[RecordId]) -> Mask:
+        """Which records (n,) are among some others."""
+        return np.array([record in records for record in self.record_ids], dtype=bool)
+
     def rows_of(self, labels: NDArray[np.int_]) -> NDArray[np.intp]:
         """The rows (k,) of records by their labels (k, 2); -1 for one that is not here."""
         rows = {tuple(label): row for row, label in enumerate(self.labels.tolist())}
@@ -317,3 +169,113 @@ class Problem:
 def first_rows_of(points: NDArray[np.int_]) -> NDArray[np.intp]:
     """The rows (m,) at which each point of sorted records (n,) begins."""
     return np.flatnonzero(np.diff(points, prepend=points[:1] - 1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Assumptions:
+    """What the identification of records takes as known of the robot.
+
+    Attributes:
+        controller: under which the records were commanded.
+        branch: of the controller's inverse kinematics.
+        provisional: geometries, in the frame convention, that commanded in the controller's frames for a
+            while; the last one was used last.
+        earlier: geometries that may have commanded records from before the last calibration, in frames of
+            their own.
+        systematic: the errors of records that are no noise.
+        unknowns: how many parameters the records are to determine; 0: all.
+    """
+
+    mechanism: Mechanism
+    controller: CommandingGeometry
+    branch: Branch
+    prior: Prior
+    noise: Noise
+    provisional: Sequence[Geometry] = ()
+    earlier: Sequence[CommandingGeometry] = ()
+    systematic: SystematicModel = no_systematic_errors
+    unknowns: int = 0
+
+    def problem(self, measurements: MeasurementSet, known: Problem | None = None) -> Problem:
+        """The problem of a measurement set.
+
+        Args:
+            measurements: n records in any order.
+            known: the problem of some of these records. A record does not change how those before it were
+                commanded, nor their start poses; these are taken over and computed for the new records
+                alone.
+
+        Raises:
+            IdentifiabilityError: joint variables do not belong to the commanded poses, or for most records
+                no continuation from the commanding to the initial geometry exists; the message names the
+                first.
+        """
+        mechanism, frames = self.mechanism, self.controller.frames
+        order = np.argsort(measurements.group, kind="stable")
+        labels = measurements.labels[order]
+        own = (CommandingGeometry(one, frames) for one in (*self.provisional, self.prior.centre))
+        candidates = [self.controller, *own, *self.earlier]
+        if known is not None and not known.commands.are_of(candidates):
+            known = None
+        rows = np.full(len(labels), -1) if known is None else known.rows_of(labels)
+        new = measurements.subset(order[rows < 0])
+        joints, deviations = new.joints, frames.deviations(new.deviations)
+        commands = CommandedPoses.of(mechanism, new.poses, candidates, self.branch, joints)
+        if known is not None:
+            joints = _interleaved(known.joints, rows, joints)
+            deviations = _interleaved(known.deviations, rows, deviations)
+            commands = known.commands.with_others(rows, commands)
+        require_consistent_encoders(commands, joints, labels, self.prior)
+        initial = self.provisional[-1] if self.provisional else commands.most_frequent_geometry
+        free = mechanism.convention.free_parameters(initial)
+        if known is not None and np.array_equal(known.initial_parameters, free):
+            start = _extended_start(known, rows, initial, commands, joints)
+        else:
+            start = commands.solve_poses(initial, joints)
+        _require_start_poses(start.found, labels)
+        return Problem(
+            mechanism=mechanism,
+            prior=self.prior,
+            noise=self.noise.along(frames.base),
+            joints=joints,
+            deviations=deviations,
+            first_rows=first_rows_of(labels[:, 0]),
+            commands=commands,
+            initial_parameters=free,
+            start=start.poses,
+            has_start_pose=start.found,
+            labels=labels,
+            gauges=frames.base,
+            systematic=self.systematic,
+            unknowns=self.unknowns,
+        )
+
+
+def _interleaved(known: Values, rows: NDArray[np.intp], new: Values) -> Values:
+    """Values (n, ...): known ones in the order of their ``rows`` (n,), and new ones where that is -1."""
+    values = known[rows]
+    values[rows < 0] = new
+    return values
+
+
+def _extended_start(
+    known: Problem, rows: NDArray[np.intp], initial: Geometry, commands: CommandedPoses, joints: Array
+) -> ForwardResult:
+    """The start poses of a known problem, in the order of ``rows`` (n,), and of the new records."""
+    new = np.flatnonzero(rows < 0)
+    solved = commands[new].solve_poses(initial, joints[new])
+    found = _interleaved(known.has_start_pose, rows, solved.found)
+    return ForwardResult(known.start[rows].with_rows(new, solved.poses), found)
+
+
+def _require_start_poses(found: Mask, labels: NDArray[np.int_]) -> None:
+    """Require a start pose for at least half of the records; the solver leaves the others out."""
+    missing = np.flatnonzero(~found)
+    if 2 * len(missing) <= len(found):
+        return
+    point, orientation = labels[missing[0]]
+    raise IdentifiabilityError(
+        f"in {len(missing)} of {len(found)} records a singularity lies between the commanded pose and the "
+        f"joint variables; the first is point {point}, orientation {orientation}",
+        action="Check that q1 to q6 belong to these poses, and the poses to this controller's config",
+    )

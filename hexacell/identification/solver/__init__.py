@@ -1,1 +1,1 @@
-"""The solver: regularized weighted least squares by Levenberg-Marquardt."""
+"""The fit of a geometry: model, iteration, tests of the residuals, result; begin with :mod:`.fit`."""

@@ -1,14 +1,22 @@
-"""The measurement model: residuals of every record, their derivatives and their weights.
+"""The measurement model: residuals of every record, their derivatives and weights.
 
 A record predicts the ball's position P(p, q) by forward kinematics at the measured joint variables q
-(Abtahi et al. 2010, eq. 4). Its residual is P minus the measured deviation; the unknown constant of each
-point, which the differences of eq. 5 remove, stays in it. The noise of the encoders reaches the residual
-through ``G = dP/dq``, so that, to first order, a record's covariance is
+(Abtahi et al. 2010, eq. 4). Its residual is P minus the measured deviation. The noise of the encoders
+reaches the residual through ``G = dP/dq``, so that, to first order, a record's covariance is
 
     V = G diag(s_encoder^2) G^T + diag(s_gauge^2).
 
 Near a singularity the first term is large, and ordinary least squares (eq. 13) would weight such a record
 wrongly. The weight is the inverse of V (generalized least squares; Aitken 1936).
+
+A record satisfies ``P - d = c + w x d - k * d + noise``, with the position c of the ball when the point's
+gauges were zeroed, the small rotation w of the gauges against the base, and the scale errors k of the
+gauges, which are along their axes. All of them are linear, so for given weights their best values are
+computed and subtracted, and they never become parameters (variable projection; Golub and Pereyra 1973): c
+and w for each point, with a prior on w, and k once for all points, with a prior as well. With equal
+weights and without w and k this subtracts the mean of each point, which has the same minimum as all the
+pairs of eq. 5-8 of Abtahi et al. 2010, with 2/(k-1) of the rows. The cost is linear in the number of
+records.
 """
 
 from __future__ import annotations
@@ -17,11 +25,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.identification.problem.problem import Noise, Problem
+from hexacell.identification.problem.prior import Noise
+from hexacell.identification.problem.problem import Problem
 from hexacell.kinematics.forward import ForwardResult, apply_twist, forward_kinematics
 from hexacell.kinematics.free_sensitivity import free_sensitivity
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rotations import Array, Mask, skew
 
 LARGEST_AMPLIFICATION = 100.0
 """mm of the ball per mm of a slider. Beyond it a record has no information and its linearization fails."""
@@ -58,21 +67,14 @@ class Prediction:
         return self.pose_jacobian[:, :3]
 
 
-def evaluate_step(problem: Problem, present: Prediction, step: Array) -> ForwardResult:
-    """The poses after a step (p,), mm, of the free parameters.
-
-    Forward kinematics starts at the linearized poses. If that fails, it starts at the present ones.
-    """
-    geometry = problem.geometry(present.free + step)
-    for start in (apply_twist(present.poses, present.pose_jacobian @ step), present.poses):
-        result = forward_kinematics(problem.mechanism, geometry, problem.joints, start, mode=present.mode)
-        if result.found.all():
-            break
-    return result
-
-
 def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
-    """The linearized measurement model at poses that close the geometry."""
+    """Linearize the measurement model.
+
+    Args:
+        problem: n records.
+        free: (p,) free parameters, mm.
+        poses: that close their geometry at the joint variables of the records.
+    """
     sensitivity = free_sensitivity(problem.mechanism, problem.geometry(free), poses, problem.joints)
     by_joints = sensitivity.joints[:, :3]
     return Prediction(
@@ -85,6 +87,19 @@ def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
         mode=sensitivity.mode,
         singular=is_singular(by_joints),
     )
+
+
+def evaluate_step(problem: Problem, present: Prediction, step: Array) -> ForwardResult:
+    """The poses after a step (p,), mm, of the free parameters.
+
+    Forward kinematics starts at the linearized poses. If that fails, it starts at the present ones.
+    """
+    geometry = problem.geometry(present.free + step)
+    for start in (apply_twist(present.poses, present.pose_jacobian @ step), present.poses):
+        result = forward_kinematics(problem.mechanism, geometry, problem.joints, start, mode=present.mode)
+        if result.found.all():
+            break
+    return result
 
 
 def is_singular(position_by_joints: Array) -> Mask:
@@ -100,5 +115,110 @@ def record_covariance(position_by_joints: Array, noise: Noise) -> Array:
 
 
 def record_weights(position_by_joints: Array, noise: Noise) -> Array:
-    """Inverse of :func:`record_covariance`."""
+    """Weights (n, 3, 3), 1/mm^2, of records by ``dP/dq`` (n, 3, 6): the inverse of their covariance."""
     return np.linalg.inv(record_covariance(position_by_joints, noise))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReducedSystem:
+    """Whitened rows of the linear least-squares problem, those of the priors on w and k included.
+
+    Attributes:
+        rows: (r, p).
+        values: (r,).
+    """
+
+    rows: Array
+    values: Array
+
+    def information(self) -> Array:
+        """Fisher information of the data on the free parameters (p, p), 1/mm^2."""
+        return self.rows.T @ self.rows
+
+    def gradient(self) -> Array:
+        """Half the gradient of the cost by the free parameters (p,)."""
+        return self.rows.T @ self.values
+
+    def cost(self) -> float:
+        """Sum of squares: the chi-square of the residuals."""
+        return float(self.values @ self.values)
+
+
+class NuisanceElimination:
+    """The unknowns c, w and k of the stations at their best values, for weights (n, 3, 3), 1/mm^2."""
+
+    def __init__(self, problem: Problem, weights: Array) -> None:
+        noise = problem.noise
+        self.problem = problem
+        self._weights = weights
+        self._stations = problem.stations
+        self._turns = noise.alignment > 0.0
+        self._design: Array = np.broadcast_to(np.eye(3), (problem.records, 3, 3))  # by c, and by w
+        if self._turns:
+            self._design = np.concatenate([self._design, -skew(problem.deviations)], axis=-1)
+            normal = problem.group_sums(np.swapaxes(self._design, -1, -2) @ weights @ self._design)
+            normal[:, range(3, 6), range(3, 6)] += noise.alignment**-2
+        else:
+            normal = problem.group_sums(weights)
+        self._station_covariance = np.linalg.inv(normal)
+        self._has_scale = noise.gauge_scale > 0.0
+        if self._has_scale:
+            shown = problem.deviations @ problem.gauges
+            by_scale = -problem.gauges * shown[:, None, :]
+            self._scale_design, self._scale_rows = self._without_stations(by_scale)
+            normal = self._gram(self._scale_design, self._scale_rows)
+            self._scale_covariance = np.linalg.inv(normal + np.eye(3) / noise.gauge_scale**2)
+
+    def centred(self, values: Array) -> Array:
+        """Values (n, 3, ...) less the best c, w and k."""
+        return self._reduced(values)[0]
+
+    def system(self, residuals: Array, jacobian: Array) -> ReducedSystem:
+        """Residuals (n, 3) and their Jacobian (n, 3, p), centred and whitened."""
+        both = np.concatenate([jacobian, residuals[..., None]], axis=-1)
+        centred_values, penalties = self._reduced(both)
+        factor = np.swapaxes(np.linalg.cholesky(self._weights), -1, -2)
+        rows = np.concatenate([(factor @ centred_values).reshape(-1, both.shape[-1]), penalties])
+        return ReducedSystem(rows[:, :-1], rows[:, -1])
+
+    def cost(self, residuals: Array) -> float:
+        """The weighted sum of squares of centred residuals (n, 3), priors included."""
+        r, penalties = self._reduced(residuals)
+        weighted = np.einsum("ni,nij,nj->", r, self._weights, r)
+        return float(weighted + np.sum(penalties**2))
+
+    def nuisance_covariance(self) -> Array:
+        """Covariance (n, 3, 3), mm^2, of what is subtracted from each record."""
+        spread = self._station_covariance[self._stations]
+        taken = self._design @ spread @ np.swapaxes(self._design, -1, -2)
+        if self._has_scale:
+            design = self._scale_design
+            taken = taken + design @ self._scale_covariance @ np.swapaxes(design, -1, -2)
+        return taken
+
+    def _reduced(self, values: Array) -> tuple[Array, Array]:
+        """Centred values, and the rows (r, k) that the priors add to the sum of squares."""
+        flat = values.reshape(*values.shape[:2], -1)
+        reduced, penalties = self._without_stations(flat)
+        if self._has_scale:
+            scale = self._scale_covariance @ self._gram(reduced, penalties)
+            reduced = reduced - self._scale_design @ scale
+            prior = scale / self.problem.noise.gauge_scale
+            penalties = np.concatenate([penalties - self._scale_rows @ scale, prior])
+        return reduced.reshape(values.shape), penalties
+
+    def _without_stations(self, values: Array) -> tuple[Array, Array]:
+        """Values (n, 3, k) less the best c and w of each point, and the rows of the prior on w."""
+        if not self._turns:
+            means = self._station_covariance @ self.problem.group_sums(self._weights @ values)
+            return values - means[self._stations], np.zeros((0, values.shape[-1]))
+        transposed = np.swapaxes(self._design, -1, -2)
+        best = self._station_covariance @ self.problem.group_sums(transposed @ (self._weights @ values))
+        reduced = values - self._design @ best[self._stations]
+        turned = best[:, 3:] / self.problem.noise.alignment
+        return reduced, turned.reshape(-1, values.shape[-1])
+
+    def _gram(self, values: Array, penalties: Array) -> Array:
+        """Weighted products (3, k) of the design of k with values that contain no c and w."""
+        products: Array = np.einsum("nai,nab,nbj->ij", self._scale_design, self._weights, values)
+        return products + self._scale_rows.T @ penalties

@@ -14,8 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.measurement_model import predict
-from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
+from hexacell.identification.solver.measurement_model import NuisanceElimination, predict
 from hexacell.kinematics.geometry import GeometryBatch
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
+from enum import Enum, StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -11,17 +11,17 @@ import numpy as np
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.levenberg_marquardt import Solution, Termination
-from hexacell.identification.solver.linear_costs import LinearCosts
-from hexacell.identification.solver.measurement_model import Prediction
-from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
+from hexacell.identification.solver.linear_model import LinearCosts, LinearizedModel
+from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import Deviation, RecordId
 
 UNDETERMINED_RATIO = 0.5
 """Of the prior standard deviation: a parameter with more left was not determined by the data."""
+
+STRONG_CORRELATION = 0.9
 
 GAUGES = "xyz"
 
@@ -48,7 +48,7 @@ class DataFault:
         action: the next thing to do.
         gauges: the gauges concerned, of ``xyz``; empty if no single one is at fault.
         left_out: the records left out; empty where the data are refused.
-        offset_mm: what the gauges x, y and z of a record read too much; none where that is unknown.
+        offset_mm: what the gauges x, y and z of a record read too much; None where that is unknown.
     """
 
     kind: DataFaultKind
@@ -70,6 +70,45 @@ class GaugeFaultError(IdentifiabilityError):
         super().__init__(fault.sentence, action=fault.action)
 
 
+class Termination(Enum):
+    """Why the iteration ended, for people."""
+
+    STEP = "the parameters no longer change"
+    PRECISION = "the cost cannot be lowered within the precision of the numbers"
+    STUCK = "no step lowers the cost"
+    SINGULAR = "a record came next to a singularity on the way"
+    ITERATIONS = "the largest number of iterations was used"
+
+    @property
+    def converged(self) -> bool:
+        """Whether the iteration ended at a minimum."""
+        return self in {Termination.STEP, Termination.PRECISION}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """The last iterate of the solver.
+
+    Attributes:
+        prediction: the model at the solution.
+        information: Fisher information of the data alone (p, p), 1/mm^2.
+        chi2: weighted sum of squares of the centred residuals.
+        singular: (n,) bool, the records that ended the iteration with ``SINGULAR``.
+    """
+
+    prediction: Prediction
+    information: Array
+    chi2: float
+    iterations: int
+    termination: Termination
+    singular: Mask
+
+    @property
+    def free(self) -> Array:
+        """Free parameters (p,), mm."""
+        return self.prediction.free
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class GeometryEstimate:
     """An identified geometry with the covariance (P, P), mm^2, of its parameters.
@@ -81,6 +120,15 @@ class GeometryEstimate:
     covariance: Array
     termination: Termination
     undetermined: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CorrelatedPair:
+    """The names of two free parameters, e.g. ``l3`` and ``B3z``, and their correlation."""
+
+    first: str
+    second: str
+    correlation: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,18 +159,18 @@ class Identification:
 
     @cached_property
     def free_covariance(self) -> Array:
-        """Theirs (p, p), mm^2."""
+        """Covariance (p, p), mm^2, of the free parameters."""
         covariance = np.linalg.inv(self.solution.information + self.active_prior)
         return 0.5 * (covariance + covariance.T)  # an inverse is symmetric to rounding only
 
     @cached_property
     def geometry(self) -> Geometry:
-        """In the mechanism's frame convention, mm."""
+        """The geometry in the mechanism's frame convention."""
         return self.problem.geometry(self.free)
 
     @cached_property
     def covariance(self) -> Array:
-        """(P, P), mm^2, in that convention; zero for what it fixes."""
+        """Covariance (P, P), mm^2, of all parameters; zero for what the frame convention fixes."""
         return self.problem.basis @ self.free_covariance @ self.problem.basis.T
 
     @property
@@ -132,7 +180,7 @@ class Identification:
 
     @property
     def prior_sigma(self) -> Array:
-        """The same before measuring."""
+        """Standard deviations (P,), mm, of the parameters before measuring."""
         return self.problem.basis @ self.problem.prior.sigma
 
     @property
@@ -155,7 +203,7 @@ class Identification:
 
     @property
     def poses(self) -> PoseBatch:
-        """Of the platform at each record, under the identified geometry."""
+        """Poses of the platform at the records, under the identified geometry."""
         return self.prediction.poses
 
     @property
@@ -165,14 +213,14 @@ class Identification:
 
     @property
     def points(self) -> int:
-        """At how many points."""
+        """How many points have records."""
         return self.problem.points
 
     @property
     def residual_rms_mm(self) -> float:
         """Root mean square of the centred residuals of the deviations."""
-        centring = NuisanceElimination(self.problem, self.prediction.weights)
-        return float(np.sqrt(np.mean(centring.centred(self.prediction.residuals) ** 2)))
+        elimination = NuisanceElimination(self.problem, self.prediction.weights)
+        return float(np.sqrt(np.mean(elimination.centred(self.prediction.residuals) ** 2)))
 
     @property
     def chi2(self) -> float:
@@ -195,6 +243,28 @@ class Identification:
         """The chi-square test of the residuals, which the stated systematic errors may enlarge."""
         costs = LinearCosts.at(self.problem, self.prediction)
         return self.noise_test if costs.are_of_noise else costs.residual_test(self.active_prior)
+
+    @property
+    def linear_model(self) -> LinearizedModel:
+        """The linear model of the records at the solution, for tests of its residuals."""
+        return LinearizedModel.at_minimum(self.problem, self.prediction, self.free_covariance)
+
+    def strongly_correlated(self, above: float = STRONG_CORRELATION) -> tuple[CorrelatedPair, ...]:
+        """Pairs of free parameters with an absolute correlation above a limit, the strongest first.
+
+        The difference or sum of two such parameters is known well and each of them poorly. The geometry may
+        still be accurate, but a change identified in one of the two may be a change of the other.
+        """
+        names = self.problem.mechanism.convention.free_names()
+        sigma = np.sqrt(np.diag(self.free_covariance))
+        correlation = self.free_covariance / np.outer(sigma, sigma)
+        rows, columns = np.triu_indices(len(names), 1)
+        order = np.argsort(-np.abs(correlation[rows, columns]), kind="stable")
+        return tuple(
+            CorrelatedPair(names[i], names[j], float(correlation[i, j]))
+            for i, j in zip(rows[order], columns[order], strict=True)
+            if abs(correlation[i, j]) > above
+        )
 
     @property
     def termination(self) -> Termination:

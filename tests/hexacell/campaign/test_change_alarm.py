@@ -17,7 +17,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.text.verdict import alarm_sentence, check_text
-from hexacell.uncertainty.encoder_effects import encoder_scales
+from hexacell.uncertainty.effect_kinds import encoder_scales
 from hexacell.verdict.decision import ErrorLimits
 
 SIGMA_MM = 0.005

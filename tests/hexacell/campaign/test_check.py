@@ -18,7 +18,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales
+from hexacell.uncertainty.effect_kinds import common_encoder_scale, encoder_scales
 from hexacell.verdict.check_statement import CheckStatement
 from hexacell.verdict.decision import ErrorLimits, Verdict
 

@@ -11,8 +11,7 @@ from hexacell.campaign.budget import usual_move_seconds
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.dry_run.campaign import dry_run
-from hexacell.identification.solver.levenberg_marquardt import Termination
-from hexacell.identification.solver.result import GeometryEstimate
+from hexacell.identification.solver.result import GeometryEstimate, Termination
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.robot.model import make_robot
 from hexacell.robot.stated_effects import stated_effects

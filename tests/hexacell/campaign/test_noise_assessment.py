@@ -15,9 +15,13 @@ from hexacell.cell.loader import load_cell
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.sensitivity import position_sensitivity
 from hexacell.noise.approach_scatter import ScatterSource
-from hexacell.noise.averaging import AveragingForecaster, worthwhile_windows
 from hexacell.noise.measured_noise import AveragingForecast, with_measured_noise
-from hexacell.noise.noise_assessment import NoiseReadings, assess_noise
+from hexacell.noise.noise_assessment import (
+    AveragingForecaster,
+    NoiseReadings,
+    assess_noise,
+    worthwhile_windows,
+)
 from hexacell.robot.model import noise_of, robot_of
 from hexacell.robot.stated_effects import stated_effects
 from hexacell.uncertainty.effects import Occurrence

@@ -18,7 +18,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.measuring import AcceptanceSettings, TaskSettings
 from hexacell.config.interface import ControllerGeometry
-from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
+from hexacell.identification.diagnostics.frame_alignment import PoseErrors
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide

@@ -10,7 +10,7 @@ import pytest
 
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide

@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.design.candidates import workspace_poses
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.limits.limits import Limits
 
 LIMITS = Limits(5.0, np.radians(45.0), -800.0, 800.0, 0.05)

@@ -9,7 +9,6 @@ import pytest
 
 from hexacell.design.decorrelation import decorrelating_poses
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.diagnostics.correlations import strongly_correlated
 from hexacell.identification.estimator import identify
 from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet, Record
@@ -44,7 +43,7 @@ def belief(found, paper, hexaglide):
 
 
 def correlation_of(found, pair):
-    everything = strongly_correlated(found, above=-1.0)
+    everything = found.strongly_correlated(above=-1.0)
     return next(
         other.correlation
         for other in everything
@@ -55,7 +54,7 @@ def correlation_of(found, pair):
 def test_the_record_changes_the_correlation_as_predicted(
     found, belief, measured, visit, reach, paper, make_problem
 ):
-    pairs = strongly_correlated(found)[:6]
+    pairs = found.strongly_correlated()[:6]
     tried = [
         (pair, part)
         for pair, part in zip(pairs, decorrelating_poses(belief, found, pairs), strict=True)
@@ -75,7 +74,7 @@ def test_the_record_changes_the_correlation_as_predicted(
 
 def test_the_ball_stays_within_the_travel(found, belief, visit, reach, paper):
     exact = visit(seed=SEED, degrees=DEGREES)
-    pairs = strongly_correlated(found)[:6]
+    pairs = found.strongly_correlated()[:6]
     for part in filter(None, decorrelating_poses(belief, found, pairs)):
         _, pose = reach(paper.actual, paper.nominal, part.command)
         reference = exact.balls[exact.labels.index((part.point, 1))]
@@ -84,20 +83,20 @@ def test_the_ball_stays_within_the_travel(found, belief, visit, reach, paper):
 
 def test_limits_are_kept(found, belief):
     narrow = replace(belief, limits=replace(LIMITS, tilt=np.radians(15.0)))
-    pairs = strongly_correlated(found)[:6]
+    pairs = found.strongly_correlated()[:6]
     parts = [part for part in decorrelating_poses(narrow, found, pairs) if part]
     assert all(abs(part.degrees) < 15.0 for part in parts if part.axis != "z")
 
 
 def test_with_almost_no_travel_there_is_no_record(found, belief):
     blind = replace(belief, limits=replace(LIMITS, gauge_travel_mm=1e-6))
-    pairs = strongly_correlated(found)[:3]
+    pairs = found.strongly_correlated()[:3]
     assert decorrelating_poses(blind, found, pairs) == (None, None, None)
 
 
 def test_where_no_pose_is_in_reach_there_is_no_record(found, belief):
     stuck = replace(belief, limits=replace(LIMITS, joint_min=0.0, joint_max=1.0))
-    pairs = strongly_correlated(found)[:1]
+    pairs = found.strongly_correlated()[:1]
     assert decorrelating_poses(stuck, found, pairs) == (None,)
 
 

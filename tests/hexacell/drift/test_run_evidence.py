@@ -10,7 +10,7 @@ import pytest
 from hexacell.drift.carried_posterior import CarriedPosterior
 from hexacell.drift.run_evidence import whiten_records
 from hexacell.drift.single_cause import single_cause_test
-from hexacell.identification.problem.systematic_errors import SystematicErrors
+from hexacell.identification.problem.prior import SystematicErrors
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
 

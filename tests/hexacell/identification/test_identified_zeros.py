@@ -19,7 +19,7 @@ from hexacell.identification.identified_zeros import (
     ParameterChoice,
     zero_columns,
 )
-from hexacell.identification.problem.problem import Tolerances
+from hexacell.identification.problem.prior import Tolerances
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot, robot_of

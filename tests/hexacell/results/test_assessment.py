@@ -16,8 +16,7 @@ from hexacell.cell.measuring import TaskSettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.estimator import identify
-from hexacell.identification.solver.levenberg_marquardt import Termination
-from hexacell.identification.solver.result import DataFault, DataFaultKind
+from hexacell.identification.solver.result import DataFault, DataFaultKind, Termination
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hexacell.errors import UsageError
-from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.solver.result import Termination
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS as PARAMETERS
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.results.result import IdentificationResult

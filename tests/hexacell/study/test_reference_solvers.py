@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from hexacell.errors import ConvergenceError
-from hexacell.identification.problem.problem import Noise
-from hexacell.identification.solver import levenberg_marquardt
-from hexacell.identification.solver.levenberg_marquardt import FINE
+from hexacell.identification.problem.prior import Noise
+from hexacell.identification.solver import fit as levenberg_marquardt
+from hexacell.identification.solver.fit import FINE
 from hexacell.study import reference_solvers
 
 

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Prior
-from hexacell.identification.solver.levenberg_marquardt import FINE, solve
+from hexacell.identification.problem.prior import Prior
+from hexacell.identification.solver.fit import FINE, solve
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch

@@ -8,11 +8,19 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.uncertainty.budget import UncertaintyBudget
-from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, stop_repeatability
-from hexacell.uncertainty.gauge_effects import ball_beside_tool, ball_roundness, gauge_scales
-from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
+from hexacell.uncertainty.effect_kinds import (
+    ball_beside_tool,
+    ball_roundness,
+    common_encoder_scale,
+    common_sag,
+    encoder_scales,
+    gauge_scales,
+    rail_directions,
+    rail_waves,
+    stop_repeatability,
+)
 from hexacell.uncertainty.statement import TaskErrors
 from tests.hexacell.uncertainty.conftest import belief_of
 

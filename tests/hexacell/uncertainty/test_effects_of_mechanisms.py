@@ -14,14 +14,17 @@ from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart, gough_ste
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import robot_of
-from hexacell.uncertainty.effects import Effect, Placement
-from hexacell.uncertainty.encoder_effects import (
+from hexacell.uncertainty.effect_kinds import (
+    common_sag,
     encoder_eccentricities,
     encoder_scales,
+    load_at_work,
+    rail_directions,
+    rail_waves,
     stop_repeatability,
+    temperature_at_work,
 )
-from hexacell.uncertainty.environment_effects import load_at_work, temperature_at_work
-from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
+from hexacell.uncertainty.effects import Effect, Placement
 
 STEP_MM = 1e-4
 CONFIGS = Path(__file__).parents[3] / "configs"

@@ -12,9 +12,9 @@ from hexacell.design.candidates import ReachableTargets
 from hexacell.design.predicted_records import position_derivatives
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
-from hexacell.identification.problem.build import build_problem
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
-from hexacell.identification.problem.problem import Noise, Prior, Tolerances
+from hexacell.identification.problem.prior import Noise, Prior, Tolerances
+from hexacell.identification.problem.problem import Assumptions
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
@@ -71,7 +71,7 @@ def test_the_marginal_likelihood_is_that_of_a_normal_distribution(
         prior = Prior(geometry, free, scale**2 * covariance)
         controller = CommandingGeometry.of(hexaglide, paper.actual)
         arguments = {"controller": controller, "branch": paper.branch, "noise": noise}
-        problem = build_problem(hexaglide, records, prior=prior, **arguments)
+        problem = Assumptions(hexaglide, prior=prior, **arguments).problem(records)
         return log_marginal_likelihood(estimate_online(problem))
 
     def directly(scale: float) -> float:

@@ -12,14 +12,19 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.uncertainty.budget import UncertaintyBudget
-from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, stop_repeatability
-from hexacell.uncertainty.gauge_effects import ball_roundness
-from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
+from hexacell.uncertainty.effect_kinds import (
+    ball_roundness,
+    common_encoder_scale,
+    common_sag,
+    encoder_scales,
+    rail_directions,
+    rail_waves,
+    stop_repeatability,
+)
 from hexacell.uncertainty.length_check import LengthCheck
-from hexacell.uncertainty.length_errors import JudgedGeometry
-from hexacell.uncertainty.length_records import LengthRecords
+from hexacell.uncertainty.length_records import JudgedGeometry, LengthRecords
 from tests.hexacell.uncertainty.conftest import belief_of
 from tests.hexacell.uncertainty.two_seats import TwoSeats
 

@@ -10,11 +10,9 @@ import pytest
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.measurements.records import MeasurementSet
+from hexacell.uncertainty.effect_kinds import load_at_work, rail_waves
 from hexacell.uncertainty.effects import Placement
-from hexacell.uncertainty.environment_effects import load_at_work
-from hexacell.uncertainty.excess_test import ExcessTest
-from hexacell.uncertainty.guide_effects import rail_waves
-from hexacell.uncertainty.possible_causes import possible_causes
+from hexacell.uncertainty.possible_causes import ExcessTest, possible_causes
 
 ENCODERS, GUIDES, LOAD, TEMPERATURE, GAUGES = (
     "errors of the encoders",

@@ -13,11 +13,20 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hexacell.kinematics.parameters import MachinePart
+from hexacell.uncertainty.effect_kinds import (
+    ball_beside_tool,
+    ball_roundness,
+    common_encoder_scale,
+    common_sag,
+    encoder_scales,
+    gauge_scales,
+    load_at_work,
+    rail_directions,
+    rail_waves,
+    stop_repeatability,
+    temperature_at_work,
+)
 from hexacell.uncertainty.effects import Effect, Occurrence
-from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, stop_repeatability
-from hexacell.uncertainty.environment_effects import load_at_work, temperature_at_work
-from hexacell.uncertainty.gauge_effects import ball_beside_tool, ball_roundness, gauge_scales
-from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
 
 ALUMINIUM = {MachinePart.BASE: 6.0, MachinePart.LEGS: 23.0, MachinePart.PLATFORM: 12.0}
 HALF_LENGTH_MM = 800.0

@@ -7,13 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.identification.data_faults import proof
-from hexacell.identification.data_faults.fault_model import LARGEST_TRUSTED_RATIO, CorrectedFit
-from hexacell.identification.data_faults.hypotheses import ALL_IN_INCHES
-from hexacell.identification.data_faults.proof import required_significance
+from hexacell.identification.data_faults import deletion_tests as proof
+from hexacell.identification.data_faults.deletion_tests import required_significance
+from hexacell.identification.data_faults.hypotheses import (
+    ALL_IN_INCHES,
+    LARGEST_TRUSTED_RATIO,
+    CorrectedFit,
+)
+from hexacell.identification.data_faults.hypothesis_search import refitted
+from hexacell.identification.data_faults.stepwise_selection import confirmed_by_refit
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
-from hexacell.identification.solver.regularized_fit import fit_regularized
+from hexacell.identification.solver.fit import fit_regularized
 from hexacell.identification.solver.result import DataFaultKind, GaugeFaultError
 from hexacell.measurements.records import MeasurementSet
 
@@ -170,14 +175,14 @@ def test_a_gauge_fault_is_confirmed_by_agreement_or_by_far_smaller_residuals(
     current, corrected = fitted(before_mm), fitted(after_mm)
     assert corrected.fit.goodness.chi2 < 0.5 * current.fit.goodness.chi2
     monkeypatch.setattr(CorrectedFit, "corrected_for", lambda *_: corrected)
-    found = replace(ALL_IN_INCHES, gain=0.5 * current.fit.goodness.chi2).confirmed(current)
+    found = confirmed_by_refit(current, replace(ALL_IN_INCHES, gain=0.5 * current.fit.goodness.chi2))
     assert found is (corrected if confirmed else None)
 
 
 def test_a_gauge_fault_needs_equations_that_could_contradict_it(visit, make_problem):
     few, many = (visit(points=2, orientations=n, seed=81).measured(0.01, seed=81) for n in (8, 9))
-    assert ALL_IN_INCHES.trial(CorrectedFit.uncorrected(make_problem(few))) is None
-    assert ALL_IN_INCHES.trial(CorrectedFit.uncorrected(make_problem(many))) is not None
+    assert refitted(CorrectedFit.uncorrected(make_problem(few)), ALL_IN_INCHES) is None
+    assert refitted(CorrectedFit.uncorrected(make_problem(many)), ALL_IN_INCHES) is not None
 
 
 @pytest.mark.parametrize(

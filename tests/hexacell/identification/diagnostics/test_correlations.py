@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.identification.diagnostics.correlations import strongly_correlated
-
 
 def test_pairs_are_those_of_repeated_measurements(repeated, hexaglide):
     """Against the correlation of 40 estimates, good to (1 - rho^2) / sqrt(40)."""
     names = hexaglide.convention.free_names()
     seen = np.corrcoef(np.array([found.free for found in repeated]).T)
-    pairs = strongly_correlated(repeated[0])
+    pairs = repeated[0].strongly_correlated()
     assert pairs
     for pair in pairs:
         i, j = names.index(pair.first), names.index(pair.second)
@@ -21,11 +19,11 @@ def test_pairs_are_those_of_repeated_measurements(repeated, hexaglide):
 
 
 def test_all_pairs_beyond_the_limit_are_named_the_strongest_first(identified):
-    everything = strongly_correlated(identified, above=-1.0)
+    everything = identified.strongly_correlated(above=-1.0)
     strengths = [abs(pair.correlation) for pair in everything]
     assert len(everything) == 35 * 34 // 2
     assert strengths == sorted(strengths, reverse=True)
-    assert strongly_correlated(identified, above=0.8) == tuple(
+    assert identified.strongly_correlated(above=0.8) == tuple(
         pair for pair in everything if abs(pair.correlation) > 0.8
     )
     assert all(pair.first != pair.second for pair in everything)

@@ -11,8 +11,12 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from hexacell.identification.diagnostics.frame_alignment import pose_errors
-from hexacell.identification.diagnostics.frame_choice import FrameChoice, choose_frames, closest_frames
+from hexacell.identification.diagnostics.frame_alignment import (
+    FrameChoice,
+    choose_frames,
+    closest_frames,
+    pose_errors,
+)
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.mechanism import FrameFreedom, FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide

@@ -10,7 +10,7 @@ import pytest
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.diagnostics.model_tests import leave_one_point_out, prediction_test, update
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.measurements.records import MeasurementSet
 
 NOISE_MM = 0.01

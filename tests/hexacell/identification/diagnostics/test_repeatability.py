@@ -7,7 +7,7 @@ import pytest
 
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.noise.repeatability import Repeatability, repeatability
+from hexacell.noise.record_noise import Repeatability, repeatability
 
 STILL = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
-from hexacell.identification.problem.problem import Tolerances
-from hexacell.identification.solver.levenberg_marquardt import Termination
-from hexacell.identification.solver.result import GeometryEstimate
+from hexacell.identification.problem.prior import Tolerances
+from hexacell.identification.solver.result import GeometryEstimate, Termination
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform

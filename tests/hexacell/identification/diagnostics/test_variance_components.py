@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import MeasurementSet
-from hexacell.noise.variance_components import NoiseLevel, NoiseLevels, noise_levels
+from hexacell.noise.record_noise import NoiseLevel, NoiseLevels, noise_levels
 from hexacell.verdict.findings import noise_sentence
 
 REPETITIONS = 30

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from hexacell.identification.problem import build
-from hexacell.identification.problem.build import build_problem
+from hexacell.identification.problem import problem as build
 from hexacell.identification.problem.commanded_poses import CommandedPoses, CommandingGeometry
-from hexacell.identification.problem.problem import Noise, Prior, Tolerances
+from hexacell.identification.problem.prior import Noise, Prior, Tolerances
+from hexacell.identification.problem.problem import Assumptions
 from hexacell.measurements.records import MeasurementSet
 
 
 @pytest.fixture
-def arguments(hexaglide, paper):
-    """All but the records: those of one robot are the same objects each time."""
-    return {
-        "controller": CommandingGeometry.of(hexaglide, paper.nominal),
-        "branch": paper.branch,
-        "prior": Prior.of(hexaglide, paper.nominal, Tolerances({"S": 7.0, "B": 3.0, "l": 1.0})),
-        "noise": Noise(0.01, 0.01),
-    }
+def assumptions(hexaglide, paper):
+    prior = Prior.of(hexaglide, paper.nominal, Tolerances({"S": 7.0, "B": 3.0, "l": 1.0}))
+    controller = CommandingGeometry.of(hexaglide, paper.nominal)
+    return Assumptions(hexaglide, controller, paper.branch, prior, Noise(0.01, 0.01))
 
 
 @pytest.fixture
@@ -41,17 +39,14 @@ def assert_same(one, other):
 
 
 @pytest.mark.parametrize("known", [[0], [0, 1, 2, 3, 4], [0, 4, 5, 8, 11], [0, 1, 4, 6, 9, 10]])
-def test_it_is_that_of_all_records_whichever_were_known(hexaglide, arguments, records, known):
-    before = build_problem(hexaglide, MeasurementSet(tuple(records[row] for row in known)), **arguments)
+def test_it_is_that_of_all_records_whichever_were_known(assumptions, records, known):
+    some = assumptions.problem(MeasurementSet(tuple(records[row] for row in known)))
     every = MeasurementSet(records)
-    assert_same(
-        build_problem(hexaglide, every, before=before, **arguments),
-        build_problem(hexaglide, every, **arguments),
-    )
+    assert_same(assumptions.problem(every, known=some), assumptions.problem(every))
 
 
-def test_only_new_records_are_attributed(hexaglide, arguments, records, monkeypatch):
-    before = build_problem(hexaglide, MeasurementSet(records[:-1]), **arguments)
+def test_only_new_records_are_attributed(hexaglide, assumptions, records, monkeypatch):
+    known = assumptions.problem(MeasurementSet(records[:-1]))
     attributed = []
 
     class Counted(CommandedPoses):
@@ -61,7 +56,7 @@ def test_only_new_records_are_attributed(hexaglide, arguments, records, monkeypa
             return CommandedPoses.of(mechanism, commands, *others)
 
     monkeypatch.setattr(build, "CommandedPoses", Counted)
-    build_problem(hexaglide, MeasurementSet(records), before=before, **arguments)
-    another = {**arguments, "controller": CommandingGeometry.of(hexaglide, arguments["prior"].centre)}
-    build_problem(hexaglide, MeasurementSet(records), before=before, **another)
+    assumptions.problem(MeasurementSet(records), known)
+    another = CommandingGeometry.of(hexaglide, assumptions.prior.centre)
+    replace(assumptions, controller=another).problem(MeasurementSet(records), known)
     assert attributed == [1, len(records)]

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hexacell.identification.estimator import estimate_online, identify
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import PoseBatch

@@ -9,8 +9,8 @@ import pytest
 
 from hexacell.errors import ExitCode, IdentifiabilityError
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
-from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.problem.prior import Noise
+from hexacell.identification.solver.result import Termination
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.measurements.records import MeasurementSet
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.measurement_model import record_covariance
 
 ENCODERS = (0.01, 0.02, 0.005, 0.01, 0.03, 0.01)

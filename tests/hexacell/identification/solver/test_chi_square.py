@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.verdict.findings import residual_sentence
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise, Tolerances
-from hexacell.identification.solver import levenberg_marquardt
-from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.problem.prior import Noise, Tolerances
+from hexacell.identification.solver import fit as levenberg_marquardt
+from hexacell.identification.solver.result import Termination
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.study import reference_solvers

@@ -11,14 +11,12 @@ from scipy.stats import binomtest
 
 from hexacell.identification.diagnostics.model_tests import leave_one_point_out, prediction_test
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
-from hexacell.identification.problem.systematic_errors import no_systematic_errors
-from hexacell.identification.solver.linear_costs import LinearCosts, systematic_errors
+from hexacell.identification.problem.prior import Noise, no_systematic_errors
+from hexacell.identification.solver.linear_model import LinearCosts, systematic_errors
 from hexacell.kinematics.rotations import skew
 from hexacell.measurements.records import MeasurementSet
-from hexacell.uncertainty.encoder_effects import encoder_scales, stop_repeatability
-from hexacell.uncertainty.gauge_effects import ball_roundness
-from hexacell.uncertainty.record_effects import RecordEffects
+from hexacell.uncertainty.effect_kinds import ball_roundness, encoder_scales, stop_repeatability
+from hexacell.uncertainty.effects import RecordEffects
 
 NOISE = Noise(0.01, 0.01, alignment=0.005, gauge_scale=1e-3)
 EFFECTS = RecordEffects((encoder_scales(30.0), stop_repeatability(8.0), ball_roundness(6.0)))

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from hexacell.identification.solver import multistart
-from hexacell.identification.solver.measurement_model import predict
+from hexacell.identification.solver.measurement_model import NuisanceElimination, predict
 from hexacell.identification.solver.multistart import restarts
-from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
 from hexacell.measurements.records import MeasurementSet
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.measurements.records import MeasurementSet
 
 ALIGNMENT = float(np.radians(0.3))

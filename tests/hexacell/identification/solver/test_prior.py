@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import estimate_online, identify
-from hexacell.identification.problem.problem import Prior, Tolerances
+from hexacell.identification.problem.prior import Prior, Tolerances
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform

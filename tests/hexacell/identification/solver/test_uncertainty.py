@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.problem import Noise
+from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.study import reference_solvers
 

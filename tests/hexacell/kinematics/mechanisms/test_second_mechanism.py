@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 from hexacell.cell.by_mechanism import geometry_settings, tolerance_settings
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
-from hexacell.identification.diagnostics.frame_choice import choose_frames
+from hexacell.identification.diagnostics.frame_alignment import choose_frames
 from hexacell.identification.estimator import identify
-from hexacell.identification.problem.build import build_problem
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
-from hexacell.identification.problem.problem import Noise, Prior, Tolerances
+from hexacell.identification.problem.prior import Noise, Prior, Tolerances
+from hexacell.identification.problem.problem import Assumptions
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
@@ -97,14 +97,13 @@ def measurements(drawing: Geometry, truth: Geometry) -> MeasurementSet:
 def test_a_second_mechanism_is_identified_from_exact_records(
     drawing: Geometry, truth: Geometry, measurements: MeasurementSet
 ) -> None:
-    problem = build_problem(
+    problem = Assumptions(
         MECHANISM,
-        measurements,
         controller=CommandingGeometry.of(MECHANISM, drawing),
         branch=BRANCH,
         prior=Prior.of(MECHANISM, drawing, TOLERANCES),
         noise=Noise(1e-4, 1e-4),
-    )
+    ).problem(measurements)
     found = identify(problem)
     assert found.converged
     assert found.undetermined == ()

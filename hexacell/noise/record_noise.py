@@ -1,18 +1,22 @@
-"""Variance components: the noise of the encoders and of the gauges, estimated from the residuals.
+"""The noise that the records of a calibration show: repeatability, and the shares of encoders and gauges.
 
-A record's covariance is ``V = s1 Q1 + s2 Q2``: the variance s1 of the encoders, propagated through
-the machine, ``Q1 = Gq Gq^T``, and the variance s2 of the gauges, ``Q2 = I``. Where encoders or gauges
-are not alike, the ratios of their noise are known. Both variances are separable because Gq changes from
-pose to pose and differs in x, y and z. Restricted maximum likelihood (REML) requires for both
+Repeatability is the scatter of deviations where the same pose was commanded more than once. It needs no
+geometry: all visits of a commanded pose at a point have the same deviation, except for the scatter of the
+machine, which no calibration can remove.
+
+Variance components are estimated from the residuals. A record's covariance is ``V = s1 Q1 + s2 Q2``: the
+variance s1 of the encoders, propagated through the machine, ``Q1 = Gq Gq^T``, and the variance s2 of the
+gauges, ``Q2 = I``. Where encoders or gauges are not alike, the ratios of their noise are known. Both
+variances are separable because Gq changes from pose to pose and differs in x, y and z. Restricted maximum
+likelihood (REML) requires for both
 
     r^T W Qk W r = tr(P Qk),    P = W - W X C X^T W,
 
-with the residuals r, their weights W = V^-1, the Jacobian X of the unknowns and their covariance C.
-Both sides are sums over the records and need only the diagonal blocks of P, so a step costs
-as much as a step of the identification. The steps are Fisher scoring of the logarithms, so that the
-variances stay positive. The information matrix is computed from the same blocks and scaled so that
-the total noise has the standard error of its degrees of freedom; with 55 records that is within 5 %
-of the exact one.
+with the residuals r, their weights W = V^-1, the Jacobian X of the unknowns and their covariance C. Both
+sides are sums over the records and need only the diagonal blocks of P, so a step costs as much as a step
+of the identification. The steps are Fisher scoring of the logarithms, so that the variances stay
+positive. The information matrix is computed from the same blocks and scaled so that the total noise has
+the standard error of its degrees of freedom; with 55 records that is within 5 % of the exact one.
 
 Source of the equation: Patterson and Thompson 1971; its fixed point is that of the almost unbiased
 iteration ``s_k <- s_k r^T W Qk W r / tr(P Qk)`` (Horn, Horn and Duncan 1975).
@@ -20,15 +24,85 @@ iteration ``s_k <- s_k r^T W Qk W r / tr(P Qk)`` (Horn, Horn and Duncan 1975).
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.identification.solver.linearized_model import LinearizedModel
+from hexacell.distributions import chi_square_limit
+from hexacell.identification.solver.linear_model import LinearizedModel
 from hexacell.identification.solver.measurement_model import record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet
+
+COMMAND_DIGITS = 6
+"""Decimal digits, mm and deg, to which commands are compared."""
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class Repeatability:
+    """Scatter of the deviations over visits of the same pose.
+
+    Attributes:
+        per_axis_mm: pooled standard deviations along x, y and z.
+        degrees_of_freedom: of each of them: visits minus poses.
+        poses: the number of poses visited more than once.
+    """
+
+    per_axis_mm: tuple[float, float, float]
+    degrees_of_freedom: int
+    poses: int
+
+    @property
+    def distance_mm(self) -> float:
+        """Root mean square distance of a visit from the mean of its pose."""
+        return float(np.linalg.norm(self.per_axis_mm))
+
+    @property
+    def at_least_mm(self) -> float:
+        """Lower limit of the distance, with 95 % confidence."""
+        freedom = 3 * self.degrees_of_freedom
+        return self.distance_mm * float(np.sqrt(freedom / chi_square_limit(freedom, 1.0 - CONFIDENCE)))
+
+    def dominates(self, error_mm: float) -> bool:
+        """Whether an error (root mean square distance, mm) is significantly smaller than the scatter."""
+        return self.at_least_mm > error_mm
+
+
+def repeatability(
+    measurements: MeasurementSet, left_out: Collection[tuple[int, int]] = ()
+) -> Repeatability | None:
+    """The repeatability in a measurement set; None if no pose was visited twice.
+
+    ``left_out`` are the point and orientation of each record known to be wrong.
+    """
+    groups = [rows for rows in _visits(measurements, left_out) if len(rows) > 1]
+    freedom = sum(len(rows) - 1 for rows in groups)
+    if not freedom:
+        return None
+    squares = sum(_sum_of_squares(measurements.deviations[rows]) for rows in groups)
+    x, y, z = np.sqrt(squares / freedom)
+    return Repeatability((float(x), float(y), float(z)), freedom, len(groups))
+
+
+def _visits(measurements: MeasurementSet, left_out: Collection[tuple[int, int]]) -> Iterable[list[int]]:
+    """Rows of each pose commanded at each point."""
+    visits: defaultdict[tuple[float, ...], list[int]] = defaultdict(list)
+    for row, record in enumerate(measurements.records):
+        if record.id not in left_out:
+            command = (round(value, COMMAND_DIGITS) for value in record.pose.as_tuple())
+            visits[record.point, *command].append(row)
+    return visits.values()
+
+
+def _sum_of_squares(deviations: Array) -> Array:
+    squares: Array = np.sum((deviations - deviations.mean(axis=0)) ** 2, axis=0)
+    return squares
+
 
 MAX_STEPS = 60
 MAX_LOG_STEP = 1.5

@@ -1,0 +1,236 @@
+"""What is known before measuring: the noise of the readings, the drawing with its tolerances, other errors.
+
+Systematic errors are no noise: a machine that is as good as is stated of it still has effects that the
+kinematic model leaves out. They make the residuals larger than the noise does, which is no evidence
+against the model. Some are the same in all records, which makes these errors correlated; others differ
+from record to record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.parameters import LEGS, ParameterSet, ParameterUnit
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Standard deviations of the readings of a record and of the gauges' alignment and scale.
+
+    Attributes:
+        encoder: of an encoder; where they differ, the root mean square of all.
+        gauge_mm: likewise of a gauge.
+        alignment: of each component of a station's small rotation against the base, rad; zero if exact.
+        gauge_scale: of each gauge's relative scale error; zero if exact.
+        encoder_shares: of each encoder, in units of ``encoder``; empty where all are alike.
+        gauge_shares: of each gauge, x, y, z, in units of ``gauge_mm``.
+        gauge_axes: rows of the matrix whose columns are the gauges' directions in the frame convention;
+            empty where all gauges are alike, or along its axes.
+    """
+
+    encoder: float
+    gauge_mm: float
+    alignment: float = 0.0
+    gauge_scale: float = 0.0
+    encoder_shares: tuple[float, ...] = ()
+    gauge_shares: tuple[float, ...] = ()
+    gauge_axes: tuple[tuple[float, ...], ...] = ()
+
+    def with_devices(self, encoders: Sequence[float], gauges_mm: Sequence[float]) -> Noise:
+        """This noise with that of each encoder, and of the gauges x, y and z."""
+        encoder, gauge = (float(np.sqrt(np.mean(np.square(one)))) for one in (encoders, gauges_mm))
+        return replace(
+            self,
+            encoder=encoder,
+            gauge_mm=gauge,
+            encoder_shares=tuple(mm / encoder for mm in encoders),
+            gauge_shares=tuple(mm / gauge for mm in gauges_mm),
+        )
+
+    def scaled(self, factor: float) -> Noise:
+        """This noise with all readings noisier by a factor."""
+        return replace(self, encoder=factor * self.encoder, gauge_mm=factor * self.gauge_mm)
+
+    def along(self, gauges: Array) -> Noise:
+        """This noise for gauges whose directions in the frame convention are the columns (3, 3)."""
+        if not self.gauge_shares:
+            return self
+        return replace(self, gauge_axes=tuple(tuple(row) for row in gauges.tolist()))
+
+    @property
+    def encoders(self) -> Array:
+        """Standard deviation of each encoder (6,), in its unit."""
+        return self.encoder * np.array(self.encoder_shares or (1.0,) * LEGS)
+
+    @property
+    def gauges_mm(self) -> Array:
+        """Standard deviation of the gauges x, y and z (3,), mm."""
+        return self.gauge_mm * np.array(self.gauge_shares or (1.0,) * 3)
+
+    def encoder_covariance(self, position_by_joints: Array) -> Array:
+        """Covariance (n, 3, 3), mm^2, of the ball's position by ``dP/dq`` (n, 3, 6)."""
+        scaled = position_by_joints * self.encoders
+        covariance: Array = scaled @ np.swapaxes(scaled, -1, -2)
+        return covariance
+
+    @property
+    def gauge_covariance(self) -> Array:
+        """Covariance (3, 3), mm^2, of what the gauges show, in the frame convention."""
+        if not self.gauge_axes:
+            return np.diag(self.gauges_mm**2)
+        scaled = np.array(self.gauge_axes) * self.gauges_mm
+        covariance: Array = scaled @ scaled.T
+        return covariance
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerances:
+    """Half-widths within which the built robot differs from its drawing.
+
+    Attributes:
+        by_kind: for all parameters of a kind, in its unit, by the kind's symbol.
+        ball_mm: for the ball's mounting, an offset common to all platform joints.
+    """
+
+    by_kind: Mapping[str, float]
+    ball_mm: float = 0.0
+
+    @classmethod
+    def of_settings(cls, parameters: ParameterSet, settings: Mapping[str, float]) -> Tolerances:
+        """The tolerances of a cell file: under the keys of the kinds, and ``ball_mm``."""
+        by_kind = {kind.symbol: settings[kind.tolerance_key] for kind in parameters.kinds}
+        return cls(by_kind, settings["ball_mm"])
+
+    def widths(self, parameters: ParameterSet) -> Array:
+        """The half-width of each parameter (P,), without the ball's offset."""
+        return parameters.by_kind(self.by_kind)
+
+    def scaled(self, share: float) -> Tolerances:
+        """A share of all of them."""
+        by_kind = {symbol: share * width for symbol, width in self.by_kind.items()}
+        return Tolerances(by_kind, share * self.ball_mm)
+
+    def sum_mm(self, parameters: ParameterSet) -> float:
+        """Sum of all length tolerances, the ball's offset included."""
+        lengths = (self.by_kind[kind.symbol] for kind in parameters.kinds if kind.unit is ParameterUnit.MM)
+        return sum(lengths) + self.ball_mm
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """The Gaussian prior of the geometry: the drawing and its tolerances.
+
+    Attributes:
+        centre: the drawing, in the mechanism's frame convention.
+        free: its free parameters (p,), mm.
+        covariance: (p, p) of the free parameters, mm^2.
+        tolerance_sigma: (p,) their standard deviations by their own tolerances, mm, without those of the
+            parameters that define the frames; None where the prior is no drawing.
+        is_estimate: whether it is an earlier estimate, with what may have drifted since.
+    """
+
+    centre: Geometry
+    free: Array
+    covariance: Array
+    tolerance_sigma: Array | None = None
+    is_estimate: bool = False
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, drawing: Geometry, tolerances: Tolerances) -> Prior:
+        """The Gaussian with the second moments of errors uniform within the tolerances, to first order.
+
+        The tolerances hold for all parameters in the frames of the ``drawing``; the change to the
+        convention's frames correlates them.
+        """
+        centre, _ = mechanism.normalize_frames(drawing)
+        by_parameters = free_parameter_derivatives(mechanism, drawing)
+        by_ball = mechanism.parameters.ball_offset @ by_parameters
+        widths = tolerances.widths(mechanism.parameters)[:, None]
+        factor = np.vstack([widths * by_parameters, tolerances.ball_mm * by_ball])
+        own = np.vstack([np.diag(widths[:, 0]), tolerances.ball_mm * mechanism.parameters.ball_offset])
+        own_sigma = np.linalg.norm(own, axis=0)[mechanism.convention.free_rows()] / np.sqrt(3.0)
+        free = mechanism.convention.free_parameters(centre)
+        return cls(centre, free, factor.T @ factor / 3.0, own_sigma)
+
+    @property
+    def sigma(self) -> Array:
+        """What counts as unknown of each free parameter (p,): the tolerances, if there are any; mm."""
+        if self.tolerance_sigma is not None:
+            return self.tolerance_sigma
+        sigma: Array = np.sqrt(np.diag(self.covariance))
+        return sigma
+
+    @cached_property
+    def precision(self) -> Array:
+        """Precision (p, p) of the free parameters, 1/mm^2."""
+        return np.linalg.inv(self.covariance)
+
+    def squared_distance(self, free: Array) -> float:
+        """Squared distance of free parameters (p,), mm, from the drawing, in standard deviations."""
+        change = free - self.free
+        return float(change @ np.linalg.solve(self.covariance, change))
+
+    def leg_widths(self, mechanism: Mechanism) -> Array:
+        """The largest tolerances (c,) of the numbers of one leg, the ball's offset included."""
+        widths = np.zeros(len(mechanism.parameters))
+        widths[mechanism.convention.free_rows()] = np.sqrt(3.0 * np.diag(self.covariance))
+        parameters = mechanism.parameters
+        largest = [parameters.array(widths, kind.symbol).max() for kind in parameters.kinds]
+        return np.repeat(largest, [kind.numbers_per_leg for kind in parameters.kinds])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredPoses:
+    """What is known of n records under a geometry.
+
+    Attributes:
+        geometry: in the mechanism's frame convention.
+        poses: of the platform.
+        joints: (n, 6), mm.
+        deviations: (n, 3), mm, along the base axes.
+        gauges: (3, 3), columns: measuring directions of the gauges.
+    """
+
+    mechanism: Mechanism
+    geometry: Geometry
+    poses: PoseBatch
+    joints: Array
+    deviations: Array
+    gauges: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SystematicErrors:
+    """Errors of n records, mm, beside their noise.
+
+    Attributes:
+        common: (n, 3, k) by one standard deviation of each of k independent causes.
+        own: (n, 3, 3) covariance, mm^2, of what is another error in each record.
+    """
+
+    common: Array
+    own: Array
+
+    @property
+    def are_none(self) -> bool:
+        """Whether the records have noise alone."""
+        return not self.common.shape[-1] and not self.own.any()
+
+
+SystematicModel = Callable[[MeasuredPoses], SystematicErrors]
+"""The errors that some measured poses have, which are no noise."""
+
+
+def no_systematic_errors(measured: MeasuredPoses) -> SystematicErrors:
+    """The systematic errors of a machine that has none: zero."""
+    records = len(measured.joints)
+    return SystematicErrors(np.zeros((records, 3, 0)), np.zeros((records, 3, 3)))

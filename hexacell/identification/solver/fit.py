@@ -1,0 +1,307 @@
+"""The fit of a geometry to records: Levenberg-Marquardt with a Gaussian prior and reweighting.
+
+The cost at free parameters p is
+
+    F(p) = r~^T W r~ + (p - p0)^T L (p - p0),
+
+with the residuals r~ that are left once the unknowns of the stations have their best values, the weights W
+of the records, the centre p0 of the prior, and its precision L. One iteration (:func:`_advance`):
+
+1. The model at p is linearized: residuals r, their Jacobian J, weights W (:func:`.predict`).
+2. The unknowns of the stations are eliminated (:class:`.NuisanceElimination`); whitened rows J~ are left.
+3. The step s solves ``(N + m diag N) s = -g`` with ``N = J~^T J~ + L``, ``g = J~^T r~ + L (p - p0)`` and
+   the damping m (:func:`_damped_step`).
+4. Forward kinematics gives the poses at p + s, in the same assembly mode (:func:`.evaluate_step`).
+5. If F falls, under the weights of p, the step is accepted, and the damping follows the ratio of actual to
+   predicted gain; otherwise it grows (Nielsen's rule: cubic decrease, doubling increase).
+
+An accepted step changes the weights. At the end the gradient under the weights of the last iterate is zero,
+which solves the weighted estimating equation.
+
+The functions, from the outermost to the innermost:
+
+- :func:`fit_regularized` solves twice. The prior keeps the first solution near the drawing and determines
+  what the data do not. In a direction that the data determine much better than the drawing does it would
+  only bias the result; there it is released in the second solution. The directions are the eigenvectors of
+  the data's information in coordinates in which the prior's covariance is the identity, as in truncated
+  Tikhonov regularization.
+- :func:`solve_around_singularities` sets records aside. On the way the pose of a record may come next to a
+  singularity although it is far from one at the start and at the solution, or a singularity lies between
+  the geometry that commanded the record and the start, so that it has no start pose. The other records are
+  solved, and the record is restored at their solution, where its pose is continued from the commanded one.
+  A record that cannot be restored is left out.
+- :func:`solve` iterates.
+
+Sources: Marquardt 1963; Nielsen, Damping Parameter in Marquardt's Method, IMM-REP-1999-05, 1999; Hansen,
+Rank-Deficient and Discrete Ill-Posed Problems, 1998 (release of the prior); Gosselin and Angeles,
+Singularity analysis of closed-loop kinematic chains, IEEE Transactions on Robotics and Automation 6,
+1990. Setting records aside is this program's own method.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexacell.identification.problem.problem import Problem
+from hexacell.identification.solver.measurement_model import (
+    NuisanceElimination,
+    Prediction,
+    ReducedSystem,
+    evaluate_step,
+    is_singular,
+    predict,
+)
+from hexacell.identification.solver.result import Identification, Solution, Termination
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.sensitivity import pose_sensitivity
+
+INITIAL_DAMPING = 1e-4
+SMALL_DAMPING = 1e-9
+SMALLEST_DAMPING = 1e-12
+LARGEST_DAMPING = 1e12
+
+FINAL_STEP_MM = 1e-9
+ITERATIONS = 200
+SEARCHES = 1000
+
+FAILURES_BEFORE_SINGULAR = 6
+"""Steps in a row after which a record has no pose, until it counts as next to a singularity."""
+
+NEGLIGIBLE_GAIN = 1e-13
+"""Share of the cost that the numbers cannot resolve."""
+
+RELEASE_RATIO = 9.0
+"""Data information over prior information from which the prior is released (sigma: a third)."""
+
+LEAST_REDUNDANCY = 10
+"""Equations beyond the unknowns from which the residuals give an estimate of the noise."""
+
+SMALLEST_CHI2 = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class SolverOptions:
+    """Options of the solver.
+
+    Attributes:
+        damping: initial damping.
+        step_mm: the iteration ends when the largest step is below this; mrad of an angle.
+        iterations: the largest number of iterations in one search.
+        searches: the largest number of searches around singularities.
+    """
+
+    damping: float
+    step_mm: float
+    iterations: int = ITERATIONS
+    searches: int = SEARCHES
+
+
+COARSE = SolverOptions(INITIAL_DAMPING, 1e-3)
+"""From the drawing, millimetres away, to near the solution."""
+
+QUICK = SolverOptions(INITIAL_DAMPING, 1e-3, iterations=60, searches=12)
+"""Twice the iterations that consistent records need."""
+
+INCREMENTAL = SolverOptions(SMALL_DAMPING, 1e-3)
+"""From the solution without the last record."""
+
+FINE = SolverOptions(SMALL_DAMPING, FINAL_STEP_MM)
+"""From near the solution to the solution: Gauss-Newton steps unless one fails."""
+
+
+def fit_regularized(problem: Problem, options: SolverOptions = COARSE) -> Identification:
+    """Fit the records with the prior, and release it where the data determine the parameters.
+
+    Args:
+        problem: the records, and the parameters and poses at which the solver starts.
+        options: for the first of the two solutions.
+
+    Returns:
+        The fit of the records that could be used.
+    """
+    kept, first = solve_around_singularities(problem, problem.prior.precision, options)
+    information = _noise_correction(kept, first) * first.information
+    active_prior = _unreleased_precision(information, problem.prior.covariance)
+    second = solve(kept, active_prior, free=first.free, poses=first.prediction.poses, options=FINE)
+    return Identification(kept, second, active_prior)
+
+
+def _noise_correction(problem: Problem, solution: Solution) -> float:
+    """The factor of the stated information that residuals below the stated noise justify; at least 1.
+
+    Without it, a prior would bias records with hardly any noise, which have far more information.
+    """
+    redundancy = problem.coordinates - len(solution.free)
+    if redundancy < LEAST_REDUNDANCY:
+        return 1.0
+    return max(1.0, redundancy / max(solution.chi2, SMALLEST_CHI2))
+
+
+def _unreleased_precision(information: Array, prior_covariance: Array) -> Array:
+    """The prior's precision in the directions that the data do not determine, zero in the others."""
+    factor = np.linalg.cholesky(prior_covariance)
+    ratios, directions = np.linalg.eigh(factor.T @ information @ factor)
+    undetermined = directions[:, ratios < RELEASE_RATIO]
+    back = np.linalg.solve(factor.T, undetermined)
+    return back @ back.T
+
+
+def solve_around_singularities(
+    problem: Problem, precision: Array, options: SolverOptions
+) -> tuple[Problem, Solution]:
+    """Minimize the cost from the problem's start, without records that come next to a singularity.
+
+    Args:
+        problem: n records, some of which may have no start pose.
+        precision: (p, p) of the prior, 1/mm^2.
+        options: of the solver.
+
+    Returns:
+        The records that were used, and their solution.
+    """
+    used = problem.has_start_pose.copy()
+    free, poses = problem.initial_parameters, problem.start[used]
+    restored = np.zeros(problem.records, dtype=bool)
+    for search in itertools.count(1):
+        kept = problem.subset(used)
+        solution = solve(kept, precision, free=free, poses=poses, options=options)
+        if search == options.searches:
+            break
+        free, poses = solution.free, solution.prediction.poses
+        if solution.termination is Termination.SINGULAR and not solution.singular.all():
+            used[np.flatnonzero(used)[solution.singular]] = False
+            poses = poses[~solution.singular]
+            continue
+        aside = ~used & ~restored
+        if not aside.any():
+            break
+        restorable, their_poses = _restorable(problem, free, aside)
+        if not restorable.any():
+            break
+        every = problem.start.with_rows(used, poses).with_rows(restorable, their_poses)
+        used, restored = used | restorable, restored | restorable
+        poses = every[used]
+    return kept, solution
+
+
+def _restorable(problem: Problem, free: Array, aside: Mask) -> tuple[Mask, PoseBatch]:
+    """Which of the records set aside are clear of singularities at a geometry, and their poses."""
+    some = problem.subset(aside)
+    solved = some.solve_poses(free)
+    sensitivity = pose_sensitivity(some.mechanism, some.geometry(free), solved.poses, some.joints)
+    clear = solved.found & ~is_singular(sensitivity.joints[:, :3])
+    restorable = np.zeros(problem.records, dtype=bool)
+    restorable[aside] = clear
+    return restorable, solved.poses[clear]
+
+
+def solve(
+    problem: Problem, precision: Array, *, free: Array, poses: PoseBatch, options: SolverOptions = COARSE
+) -> Solution:
+    """Minimize the cost from some free parameters and the poses that close their geometry.
+
+    Args:
+        problem: the n records and the prior's centre.
+        precision: (p, p) of the prior, 1/mm^2; zero for no prior.
+        free: (p,) where to start, mm.
+        poses: the platform at each record under ``free``.
+        options: of the solver.
+
+    Returns:
+        The last iterate, and why the iteration ended there.
+    """
+    now = _Iterate.at(problem, precision, predict(problem, free, poses), options.damping)
+    iterations, ended = 0, None
+    while ended is None:
+        iterations += 1
+        following = _advance(now, options) if iterations <= options.iterations else Termination.ITERATIONS
+        if isinstance(following, Termination):
+            ended = following
+        else:
+            now = following
+    information, chi2 = now.linear.information(), now.linear.cost()
+    return Solution(now.prediction, information, chi2, iterations, ended, now.singular)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Iterate:
+    """The model at the parameters of one iteration, and the damping of the next step.
+
+    Attributes:
+        linear: the whitened rows and values without the unknowns of the stations.
+        growth: the factor of the damping if the next step fails.
+        failures: steps in a row after which a record had no pose.
+        singular: (n,) the records that are next to a singularity, or had no pose too often.
+    """
+
+    problem: Problem
+    precision: Array
+    prediction: Prediction
+    elimination: NuisanceElimination
+    linear: ReducedSystem
+    damping: float
+    singular: Mask
+    growth: float = 2.0
+    failures: int = 0
+
+    @classmethod
+    def at(cls, problem: Problem, precision: Array, prediction: Prediction, damping: float) -> _Iterate:
+        elimination = NuisanceElimination(problem, prediction.weights)
+        linear = elimination.system(prediction.residuals, prediction.jacobian)
+        return cls(problem, precision, prediction, elimination, linear, damping, prediction.singular)
+
+    def from_centre(self, step: Array | float = 0.0) -> Array:
+        """The parameters less the prior's centre (p,), mm, after a step."""
+        difference: Array = self.prediction.free - self.problem.prior.free
+        return difference + step
+
+    def cost(self, residuals: Array, from_centre: Array) -> float:
+        """F for residuals (n, 3), mm, under the weights of this iterate."""
+        return float(self.elimination.cost(residuals) + from_centre @ self.precision @ from_centre)
+
+    def damped(self) -> _Iterate | Termination:
+        """The same parameters with more damping."""
+        damping = self.damping * self.growth
+        if damping > LARGEST_DAMPING:
+            return Termination.STUCK
+        return replace(self, damping=damping, growth=2.0 * self.growth)
+
+
+def _advance(now: _Iterate, options: SolverOptions) -> _Iterate | Termination:
+    """Try one step: the next iterate, or why the iteration has ended."""
+    if now.singular.any():
+        return Termination.SINGULAR
+    step, predicted = _damped_step(now)
+    largest = float(np.abs(step / now.problem.like_a_mm).max())
+    if largest < options.step_mm and now.damping <= options.damping:
+        return Termination.STEP
+    trial = evaluate_step(now.problem, now.prediction, step)
+    if not trial.found.all():
+        failures = now.failures + 1
+        singular = ~trial.found if failures >= FAILURES_BEFORE_SINGULAR else now.singular
+        return replace(now, failures=failures, singular=singular).damped()
+    cost = now.cost(now.prediction.residuals, now.from_centre())
+    actual = cost - now.cost(trial.poses.positions - now.problem.deviations, now.from_centre(step))
+    if actual > 0.0:
+        return _accepted(now, step, trial.poses, actual / predicted if predicted > 0.0 else 0.0)
+    return Termination.PRECISION if predicted <= NEGLIGIBLE_GAIN * max(cost, 1e-12) else now.damped()
+
+
+def _damped_step(now: _Iterate) -> tuple[Array, float]:
+    """The step (p,), mm, and by how much the linear model predicts that it lowers the cost."""
+    normal = now.linear.information() + now.precision
+    gradient = now.linear.gradient() + now.precision @ now.from_centre()
+    scaling = now.damping * np.diag(normal)
+    step = -np.linalg.solve(normal + np.diag(scaling), gradient)
+    return step, float(step @ (scaling * step) - step @ gradient)
+
+
+def _accepted(now: _Iterate, step: Array, poses: PoseBatch, ratio: float) -> _Iterate:
+    """The iterate after a step, by the ratio of its actual to its predicted gain."""
+    damping = max(now.damping * max(0.1, 1.0 - (2.0 * ratio - 1.0) ** 3), SMALLEST_DAMPING)
+    prediction = predict(now.problem, now.prediction.free + step, poses)
+    return _Iterate.at(now.problem, now.precision, prediction, damping)

@@ -1,0 +1,201 @@
+"""The measurement model linearized around a geometry, for tests of its residuals.
+
+:class:`LinearizedModel`: with residuals r, their Jacobian J and weights W, all with the stations'
+unknowns eliminated, the estimate of further unknowns b that add ``Z b`` to the residuals needs only ``M
+r`` and blocks of
+
+    M = W - W (A + J C J^T) W,
+
+where A is what the stations and the gauges' scale absorb and C the covariance of the parameters. At a
+minimum ``M r = W r``. Around any other geometry the residuals are those that remain after the linear
+problem's own step.
+
+:class:`LinearCosts`: least costs of some of the records. Unknown are the free parameters p, the constants
+of stations and gauges, and the causes b of systematic errors (:class:`.SystematicErrors`), which have
+unit variance:
+
+    cost = (r + J dp + Z b)^T W (r + J dp + Z b) + b^T b + (p - p0)^T L (p - p0),
+
+with the columns Z of the errors that records share, W the inverse of the records' covariance with the
+errors of each of its own, and L the precision of the prior. At the minimum over b the first two terms are
+the weighted squares under the full covariance ``W^-1 + Z Z^T``, so that nothing more need be estimated.
+
+Sources: Cook and Weisberg, Residuals and Influence in Regression, 1982 (added variables); Aitken 1936;
+Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, section 2.7 (explicit basis
+functions).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.identification.problem.prior import MeasuredPoses, SystematicErrors
+from hexacell.identification.problem.problem import Problem
+from hexacell.identification.solver.chi_square import ChiSquareTest
+from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction
+from hexacell.kinematics.rotations import Array, Mask
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearizedModel:
+    """The linear model of n records at its own minimum.
+
+    Attributes:
+        problem: the records.
+        weights: (n, 3, 3), 1/mm^2.
+        residuals: (n, 3), mm, centred: predicted position less measured deviation.
+        jacobian: (n, 3, p), centred.
+        covariance: of the free parameters (p, p), mm^2.
+        explained: (n, 3, 3), mm^2, ``A + J C J^T``, the covariance that the unknowns absorb.
+    """
+
+    problem: Problem
+    weights: Array
+    residuals: Array
+    jacobian: Array
+    covariance: Array
+    explained: Array
+
+    @classmethod
+    def at_minimum(cls, problem: Problem, prediction: Prediction, covariance: Array) -> LinearizedModel:
+        """Linearize at a minimum of the cost, where the parameters have the covariance (p, p), mm^2."""
+        elimination = NuisanceElimination(problem, prediction.weights)
+        return cls._of(elimination, prediction, covariance, np.zeros(len(covariance)))
+
+    @classmethod
+    def around(cls, problem: Problem, prediction: Prediction, active_prior: Array) -> LinearizedModel:
+        """Linearize around any geometry.
+
+        Args:
+            problem: the n records.
+            prediction: of them by that geometry.
+            active_prior: precision (p, p), 1/mm^2, of the prior where it was not released.
+        """
+        elimination = NuisanceElimination(problem, prediction.weights)
+        system = elimination.system(prediction.residuals, prediction.jacobian)
+        covariance = np.linalg.inv(system.information() + active_prior)
+        gradient = system.gradient() + active_prior @ (prediction.free - problem.prior.free)
+        return cls._of(elimination, prediction, covariance, -covariance @ gradient)
+
+    @classmethod
+    def _of(
+        cls, elimination: NuisanceElimination, prediction: Prediction, covariance: Array, step: Array
+    ) -> LinearizedModel:
+        jacobian = elimination.centred(prediction.jacobian)
+        by_parameters = jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)
+        return cls(
+            problem=elimination.problem,
+            weights=prediction.weights,
+            residuals=elimination.centred(prediction.residuals) + jacobian @ step,
+            jacobian=jacobian,
+            covariance=covariance,
+            explained=elimination.nuisance_covariance() + by_parameters,
+        )
+
+    @property
+    def scores(self) -> Array:
+        """``W r`` (n, 3), 1/mm."""
+        scores: Array = np.einsum("nij,nj->ni", self.weights, self.residuals)
+        return scores
+
+    @property
+    def residual_covariance(self) -> Array:
+        """Covariance V (n, 3, 3), mm^2, of each residual; ``W V W`` is the record's block of M."""
+        remaining: Array = np.linalg.inv(self.weights) - self.explained
+        return remaining
+
+    @property
+    def chi2(self) -> float:
+        """Weighted sum of squares of the residuals."""
+        return float(np.sum(self.scores * self.residuals))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearCosts:
+    """The records of an identification at its solution.
+
+    Attributes:
+        weights: (n, 3, 3), 1/mm^2, under the errors that each record has of its own.
+        common: (n, 3, k), mm, columns of the errors that records share.
+        are_of_noise: whether no systematic errors are stated.
+    """
+
+    problem: Problem
+    prediction: Prediction
+    weights: Array
+    common: Array
+    are_of_noise: bool
+
+    @classmethod
+    def at(cls, problem: Problem, prediction: Prediction) -> LinearCosts:
+        """Linearize at the ``prediction`` of all records of a problem."""
+        errors = systematic_errors(problem, prediction)
+        weights = prediction.weights
+        if errors.own.any():
+            weights = np.linalg.inv(np.linalg.inv(weights) + errors.own)
+        return cls(problem, prediction, weights, errors.common, errors.are_none)
+
+    def least(self, rows: Mask) -> float:
+        """The least cost of some records (n,), the full prior included."""
+        prior = self.problem.prior
+        system, values = self._system(rows)
+        factor = np.linalg.cholesky(prior.precision).T
+        both = np.concatenate([system, self._only_parameters(factor)])
+        from_centre = factor @ (self.prediction.free - prior.free)
+        return _least_squares(both, np.concatenate([values, from_centre]))[1]
+
+    def residual_test(self, active_prior: Array) -> ChiSquareTest:
+        """The chi-square of all residuals, under a prior of precision (p, p), 1/mm^2."""
+        system, values = self._system(np.ones(self.problem.records, dtype=bool))
+        eigenvalues, vectors = np.linalg.eigh(active_prior)  # which may be singular
+        factor = np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * vectors.T
+        both = np.concatenate([system, self._only_parameters(factor)])
+        from_centre = factor @ (self.prediction.free - self.problem.prior.free)
+        step, cost = _least_squares(both, np.concatenate([values, from_centre]))
+        of_prior = from_centre + factor @ step[: len(self.prediction.free)]
+        covariance = np.linalg.inv(both.T @ both)[: len(step) - self.common.shape[-1]]
+        taken = float(np.sum(covariance[:, : len(covariance)] * self._information(system)))
+        return ChiSquareTest(cost - float(of_prior @ of_prior), self.problem.coordinates - taken)
+
+    def _system(self, rows: Mask) -> tuple[Array, Array]:
+        """Whitened rows (r, p + k) and values (r,) of some records and of the causes' unit variance."""
+        elimination = NuisanceElimination(self.problem.subset(rows), self.weights[rows])
+        jacobian = np.concatenate([self.prediction.jacobian[rows], self.common[rows]], axis=-1)
+        system = elimination.system(self.prediction.residuals[rows], jacobian)
+        causes = self.common.shape[-1]
+        unit = np.eye(jacobian.shape[-1])[jacobian.shape[-1] - causes :]
+        return np.concatenate([system.rows, unit]), np.concatenate([system.values, np.zeros(causes)])
+
+    def _information(self, system: Array) -> Array:
+        """Fisher information (p, p) of the rows on the parameters, whatever the causes are."""
+        by_parameters, by_causes = np.split(system, [len(self.prediction.free)], axis=1)
+        shared = by_causes.T @ by_parameters
+        information: Array = by_parameters.T @ by_parameters
+        return information - shared.T @ np.linalg.solve(by_causes.T @ by_causes, shared)
+
+    def _only_parameters(self, factor: Array) -> Array:
+        """Rows that do not depend on the causes."""
+        return np.pad(factor, ((0, 0), (0, self.common.shape[-1])))
+
+
+def systematic_errors(problem: Problem, prediction: Prediction) -> SystematicErrors:
+    """The errors of a problem's records at their predicted poses, beside the noise."""
+    return problem.systematic(
+        MeasuredPoses(
+            problem.mechanism,
+            problem.geometry(prediction.free),
+            prediction.poses,
+            problem.joints,
+            problem.deviations,
+            problem.gauges,
+        )
+    )
+
+
+def _least_squares(system: Array, values: Array) -> tuple[Array, float]:
+    """The step that makes ``values + system @ step`` least, and the sum of squares there."""
+    step = -np.linalg.lstsq(system, values, rcond=None)[0]
+    remaining = values + system @ step
+    return step, float(remaining @ remaining)

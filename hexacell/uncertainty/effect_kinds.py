@@ -1,0 +1,237 @@
+"""The kinds of systematic effects: of encoders, gauges and ball, guides, temperature and load.
+
+Encoders have errors of their scales, and stops that they do not see. The kinematic model has all rails
+straight and parallel. A displacement of a slider across its rail moves its joint, and the legs on the
+same rail have the same guide; the effects of a mechanism without rails have no columns. A temperature
+that differs from that of the measuring changes every length of a part by its coefficient of expansion;
+the encoders' scales expand with the base that they are fixed to. A force on the tool that was not there
+while measuring shortens the legs, each by its share of the force and its compliance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+
+from hexacell.kinematics.parameters import LEGS, JointUnit, MachinePart
+from hexacell.kinematics.rotations import Array
+from hexacell.uncertainty.effects import UM, Effect, Occurrence, Placement, Readings
+
+COMMON_SCALE = "scale common to all encoders"
+"""The effect that a length check measures."""
+
+THOUSANDTH = 1e-3
+"""A micrometre in mm, a millidegree in deg."""
+
+
+def common_encoder_scale(um_per_m: float, source: str = "") -> Effect:
+    """All encoders are wrong by the same share, as of a common temperature or calibration.
+
+    Nothing that the gauges measure tells it from a machine that is larger by the same share.
+    """
+    return Effect(COMMON_SCALE, um_per_m, "um/m", Occurrence.CONSTANT, _common_scale, source=source)
+
+
+def encoder_scales(um_per_m: float, source: str = "") -> Effect:
+    """Each encoder is wrong by a share of its own."""
+    return Effect(
+        "scale of each encoder", um_per_m, "um/m", Occurrence.CONSTANT, _each_scale, source=source
+    )
+
+
+def encoder_eccentricities(mdeg: float, source: str = "") -> Effect:
+    """The disc of each rotary encoder is off its axis in any direction: its error is a sine over a turn."""
+    name = "eccentricity of each encoder"
+    return Effect(name, mdeg, "mdeg", Occurrence.CONSTANT, _each_eccentricity, source=source)
+
+
+def stop_repeatability(
+    size: float,
+    source: str = "",
+    *,
+    is_in_noise: bool = False,
+    joint: str = "joint",
+    unit: JointUnit = JointUnit.MM,
+) -> Effect:
+    """A joint stops beside what its encoder shows, each time elsewhere: play, friction.
+
+    ``size`` is in um or mdeg. ``is_in_noise``: the noise of the records contains it. ``joint`` is the
+    mechanism's word for it.
+    """
+    occurrence = Occurrence.STOPS_AT_WORK if is_in_noise else Occurrence.EVERY_STOP
+    name = f"repeatability of a {joint}"
+    return Effect(name, size, unit.thousandth, occurrence, _each_joint, source=source)
+
+
+def _common_scale(placement: Placement) -> Array:
+    return placement.by_joints(1e-6 * placement.joints[..., None])
+
+
+def _each_scale(placement: Placement) -> Array:
+    return placement.by_joints(1e-6 * placement.joints[..., None] * np.eye(LEGS))
+
+
+def _each_eccentricity(placement: Placement) -> Array:
+    """Two causes a joint; a wave whose phase is unknown has half the variance in each."""
+    angles = np.radians(placement.joints)[..., None]
+    waves = np.sqrt(0.5) * np.concatenate(
+        [np.cos(angles) * np.eye(LEGS), np.sin(angles) * np.eye(LEGS)], axis=-1
+    )
+    return placement.by_joints(THOUSANDTH * waves)
+
+
+def _each_joint(placement: Placement) -> Array:
+    return placement.by_joints(np.broadcast_to(THOUSANDTH * np.eye(LEGS), (len(placement), LEGS, LEGS)))
+
+
+UM_PER_M = 1e-6
+"""A relative expansion."""
+
+
+def temperature_at_work(kelvin: float, um_per_m_k: Mapping[MachinePart, float], source: str = "") -> Effect:
+    """The whole machine is warmer at work than it was while measuring."""
+
+    def expansion(placement: Placement) -> Array:
+        return _warmer(placement, um_per_m_k)
+
+    return Effect("temperature at work", kelvin, "K", Occurrence.AT_WORK, expansion, source=source)
+
+
+def temperature_while_measuring(
+    kelvin: float, um_per_m_k: Mapping[MachinePart, float], source: str = ""
+) -> Effect:
+    """The whole machine becomes warmer by this much from the first record to the last, evenly."""
+
+    def expansion(placement: Placement) -> Array:
+        progress = np.linspace(-0.5, 0.5, len(placement))
+        return progress[:, None, None] * _warmer(placement, um_per_m_k)
+
+    name = "temperature while measuring"
+    return Effect(name, kelvin, "K", Occurrence.MEASURING, expansion, source=source)
+
+
+def load_at_work(newton: float, um_per_n: float, source: str = "") -> Effect:
+    """A force on the tool in any direction; ``um_per_n`` is the compliance of a leg with its joints."""
+
+    def bending(placement: Placement) -> Array:
+        # Virtual work: leg forces t hold a force F on the platform if J^T t = F. With A = -J^-1 the legs
+        # yield by c t, and the platform by c A A^T F.
+        inverse = placement.by_constraints
+        bent: Array = UM * um_per_n * inverse @ np.swapaxes(inverse[:, :3], -1, -2)
+        return bent
+
+    return Effect("load at work", newton, "N", Occurrence.AT_WORK, bending, source=source)
+
+
+def _warmer(placement: Placement, um_per_m_k: Mapping[MachinePart, float]) -> Array:
+    """Errors of the poses (n, 6, 1) by one kelvin."""
+    parameters = placement.mechanism.parameters
+    coefficients = {kind.symbol: um_per_m_k[kind.part] if kind.part else 0.0 for kind in parameters.kinds}
+    changes = parameters.by_kind(coefficients) * placement.geometry.vector
+    joints = um_per_m_k[MachinePart.BASE] * placement.joints
+    moved = placement.by_parameters(changes[:, None]) + placement.by_joints(joints[..., None])
+    warmer: Array = UM_PER_M * moved
+    return warmer
+
+
+def gauge_scales(um_per_mm: float, *, is_estimated: bool, source: str = "") -> Effect:
+    """Each gauge is wrong by a share of its own."""
+    return Effect(
+        "scale of each gauge",
+        um_per_mm,
+        "um/mm",
+        Occurrence.MEASURING,
+        on_readings=_scales,
+        source=source,
+        is_estimated=is_estimated,
+    )
+
+
+def ball_roundness(um: float, source: str = "") -> Effect:
+    """The ball is oval: its radius differs from the mean by up to ``um``, in unknown directions."""
+    return Effect("roundness of the ball", um, "um", Occurrence.MEASURING, on_readings=_oval, source=source)
+
+
+def ball_beside_tool(mm: float, source: str = "") -> Effect:
+    """The tool that works is not centred where the ball was, in any direction of the platform."""
+    return Effect("ball beside the tool's centre", mm, "mm", Occurrence.WITH_TOOL, _beside, source=source)
+
+
+def _scales(readings: Readings) -> Array:
+    # Along the base axes, as the estimator has them: the gauges' own are within a degree of these.
+    shares: Array = 1e-3 * readings.deviations[:, :, None] * np.eye(3)
+    return shares
+
+
+def _oval(readings: Readings) -> Array:
+    """By each spherical harmonic of degree 2, the mean square of all five together being 1/2.
+
+    The plate of a gauge touches the ball where its normal is the gauge's direction.
+    """
+    touched = np.swapaxes(readings.rotations, -1, -2) @ readings.gauges
+    x, y, z = np.moveaxis(touched, -2, 0)
+    harmonics = np.stack(
+        [x * y, y * z, z * x, 0.5 * (x * x - y * y), (3.0 * z * z - 1.0) / np.sqrt(12.0)], axis=-1
+    )
+    amplitude = UM * np.sqrt(1.5)
+    errors: Array = amplitude * np.einsum("ag,ngk->nak", readings.gauges, harmonics)
+    return errors
+
+
+def _beside(placement: Placement) -> Array:
+    rotations = placement.poses.rotations
+    return np.concatenate([rotations, np.zeros_like(rotations)], axis=1)
+
+
+def rail_directions(mrad: float, source: str = "") -> Effect:
+    """Each rail points elsewhere, horizontally and vertically."""
+    columns = partial(_across_rails, shapes=lambda along: 1e-3 * along[..., None])
+    return Effect("direction of each rail", mrad, "mrad", Occurrence.CONSTANT, columns, source=source)
+
+
+def rail_waves(um: float, wavelength_mm: float, source: str = "") -> Effect:
+    """Each rail is wavy with an amplitude and a wavelength, horizontally and vertically.
+
+    The phase may be any; a sine and a cosine whose factors have the variance a^2 / 2 each have the same
+    second moments.
+    """
+
+    def waves(along: Array) -> Array:
+        phase = 2.0 * np.pi * along / wavelength_mm
+        both: Array = UM / np.sqrt(2.0) * np.stack([np.sin(phase), np.cos(phase)], axis=-1)
+        return both
+
+    name = f"waves of the rails, {wavelength_mm:g} mm long"
+    columns = partial(_across_rails, shapes=waves)
+    return Effect(name, um, "um", Occurrence.CONSTANT, columns, source=source)
+
+
+def common_sag(um: float, half_length_mm: float, source: str = "") -> Effect:
+    """All rails hang through alike, as a parabola ``um`` deep with its ends ``half_length_mm`` away.
+
+    Nothing that the gauges measure tells it from a slightly different geometry.
+    """
+
+    def sagging(placement: Placement) -> Array:
+        if placement.guides is None:
+            return np.zeros((len(placement), 6, 0))
+        depth = UM * (placement.guides.along / half_length_mm) ** 2
+        moved: Array = placement.by_constraints @ (placement.guides.across[..., 1] * depth)[..., None]
+        return moved
+
+    return Effect("sag common to all rails", um, "um", Occurrence.CONSTANT, sagging, source=source)
+
+
+def _across_rails(placement: Placement, shapes: Callable[[Array], Array]) -> Array:
+    """Errors by displacements of some shapes (n, 6, m) along the rails, each rail and direction alone."""
+    guides = placement.guides
+    if guides is None:
+        return np.zeros((len(placement), 6, 0))
+    on_rail = np.zeros((6, len(guides.rails)))
+    for rail, legs in enumerate(guides.rails):
+        on_rail[list(legs), rail] = 1.0
+    columns = np.einsum("nid,nim,ir->nidmr", guides.across, shapes(guides.along), on_rail)
+    moved: Array = placement.by_constraints @ columns.reshape(len(placement), 6, -1)
+    return moved

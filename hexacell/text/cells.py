@@ -1,4 +1,4 @@
-"""The cells at a glance: for people, as a document, and as metrics that a monitoring system collects.
+"""Cells at a glance: of this computer, and of all that share an archive, as text, documents and metrics.
 
 The metrics are in the text format of Prometheus, for the textfile collector of its node exporter.
 """
@@ -6,7 +6,6 @@ The metrics are in the text format of Prometheus, for the textfile collector of 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from datetime import datetime
 from textwrap import indent
 from typing import Any
 
@@ -15,14 +14,15 @@ from hexacell.services.history.cell_status import (
     FleetCell,
     FleetRun,
     UnreadableCell,
-    is_overdue_now,
 )
-from hexacell.services.history.run_index import PastRun
+from hexacell.services.history.run_index import PastRun, RunSummary
 from hexacell.text.changes import legs_text
-from hexacell.text.history import error_text
+from hexacell.text.layout import error_with_u, figure_with_u, iso, minute, verdict_word
 from hexacell.verdict.decision import Verdict
 
 LONGEST_NAME = 22
+NO_CELLS = "No cell has put anything into this archive: hexacell status CELL does, and each run."
+NO_FLEET_RUNS = "There are no runs in this archive."
 
 HELP = {
     "hexacell_in_use": "Whether a process holds the cell.",
@@ -77,20 +77,14 @@ def metrics_text(found: Sequence[CellStatus]) -> str:
 
 
 def _lines(one: CellStatus) -> Iterator[str]:
-    judged = one.judged
-    verdict = "-" if judged is None or judged.summary.verdict is None else judged.summary.verdict.value
-    error = "-" if judged is None else error_text(judged)
-    when = (
-        "-" if judged is None or judged.summary.ended is None else f"{judged.summary.ended:%Y-%m-%d %H:%M}"
-    )
-    used = "no" if one.in_use_by is None else f"by {one.in_use_by}"
+    judged, latest = _summary(one.judged), one.latest
+    verdict, error = verdict_word(judged.verdict), error_with_u(judged.accuracy)
+    when, used = minute(judged.ended), "no" if one.in_use_by is None else f"by {one.in_use_by}"
     yield f"{one.cell.settings.name[:LONGEST_NAME]:{LONGEST_NAME}} {verdict:17} {error:16} {when:17} {used}"
     if one.proposal is not None:
         yield f"  a proposal waits for a person: hexacell apply {one.proposal.folder.path}"
-    if one.latest is not None and not one.latest.summary.has_begun:
-        yield f"  {one.latest.name}: {one.latest.summary.line}"
-    if one.latest is not None and not one.latest.summary.is_over:
-        yield f"  {one.latest.name}: {one.latest.summary.line}"
+    if latest is not None and not (latest.summary.has_begun and latest.summary.is_over):
+        yield f"  {latest.name}: {latest.summary.line}"
     if one.ends_in_future is not None:
         yield f"  {one.ends_in_future.name} ended in the future: this computer's clock is wrong, or was"
     if one.due_at is not None:
@@ -98,30 +92,33 @@ def _lines(one: CellStatus) -> Iterator[str]:
     if one.drift.changes:
         last = one.drift.changes[-1]
         noticed = f"noticed on {last.noticed:%Y-%m-%d}"
-        yield f"  leg {legs_text(last)} changed, {noticed}; hexacell history --drift tells more"
+        yield f"  leg {legs_text(last)} changed, {noticed}; hexacell history --drift shows more"
 
 
 def _document(one: CellStatus) -> dict[str, Any]:
-    judged = one.judged
-    verdict = None if judged is None else judged.summary.verdict
-    accuracy = None if judged is None else judged.summary.accuracy
-    worst = one.worst_share
+    judged, worst = _summary(one.judged), one.worst_share
+    position = judged.position
     return {
         "cell": str(one.cell.path),
         "name": one.cell.settings.name,
         "in_use_by": one.in_use_by,
-        "verdict": None if verdict is None else verdict.value,
-        "position_mm": None if accuracy is None else accuracy.position.value,
-        "expanded_mm": None if accuracy is None else accuracy.position.expanded,
-        "judged_at": None if judged is None else _iso(judged.summary.ended),
-        "passed_at": _iso(one.passed_at),
-        "in_force": None if one.in_force is None else str(one.in_force.folder.path),
-        "due_at": _iso(one.due_at),
-        "proposal": None if one.proposal is None else str(one.proposal.folder.path),
-        "not_begun": None if not _is_refused(one) or one.latest is None else one.latest.summary.line,
+        "verdict": judged.verdict and judged.verdict.value,
+        "position_mm": position and position.value,
+        "expanded_mm": position and position.expanded,
+        "judged_at": iso(judged.ended),
+        "passed_at": iso(one.passed_at),
+        "in_force": one.in_force and str(one.in_force.folder.path),
+        "due_at": iso(one.due_at),
+        "proposal": one.proposal and str(one.proposal.folder.path),
+        "not_begun": one.latest.summary.line if one.latest and not one.latest.summary.has_begun else None,
         "changes": len(one.drift.changes),
-        "largest_sum": None if worst is None else {"parameter": worst[0], "ratio": worst[1]},
+        "largest_sum": worst and {"parameter": worst[0], "ratio": worst[1]},
     }
+
+
+def _summary(run: PastRun | None) -> RunSummary:
+    """What a run was; without one, that nothing is known."""
+    return RunSummary() if run is None else run.summary
 
 
 def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
@@ -129,11 +126,11 @@ def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
     yield "hexacell_open_proposal", {}, _flag(one.proposal is not None)
     yield "hexacell_changes_found", {}, str(len(one.drift.changes))
     if one.latest is not None:
-        yield "hexacell_last_run_begun", {}, _flag(not _is_refused(one))
+        yield "hexacell_last_run_begun", {}, _flag(one.latest.summary.has_begun)
     times = {
-        "hexacell_last_run_timestamp_seconds": _ended(one.latest),
+        "hexacell_last_run_timestamp_seconds": _summary(one.latest).ended,
         "hexacell_last_pass_timestamp_seconds": one.passed_at,
-        "hexacell_calibration_timestamp_seconds": _ended(one.in_force),
+        "hexacell_calibration_timestamp_seconds": _summary(one.in_force).ended,
         "hexacell_calibration_due_timestamp_seconds": one.due_at,
     }
     yield from ((name, {}, repr(at.timestamp())) for name, at in times.items() if at is not None)
@@ -146,122 +143,85 @@ def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
             yield name, {"parameter": found[0]}, repr(found[1])
     if one.judged is None:
         return
-    verdict, accuracy = one.judged.summary.verdict, one.judged.summary.accuracy
+    verdict, position = one.judged.summary.verdict, one.judged.summary.position
     yield "hexacell_last_run_passed", {}, _flag(verdict is Verdict.PASS)
-    yield from (
-        ("hexacell_last_verdict", {"verdict": each.value}, _flag(each is verdict)) for each in Verdict
-    )
-    if accuracy is not None:
-        yield "hexacell_position_error_mm", {}, repr(accuracy.position.value)
-        yield "hexacell_position_expanded_mm", {}, repr(accuracy.position.expanded)
-        yield "hexacell_position_limit_mm", {}, repr(accuracy.position.limit)
-
-
-def _is_refused(one: CellStatus) -> bool:
-    """Whether the latest run never began."""
-    return one.latest is not None and not one.latest.summary.has_begun
-
-
-def _ended(run: PastRun | None) -> datetime | None:
-    return None if run is None else run.summary.ended
+    for each in Verdict:
+        yield "hexacell_last_verdict", {"verdict": each.value}, _flag(each is verdict)
+    if position is not None:
+        yield "hexacell_position_error_mm", {}, repr(position.value)
+        yield "hexacell_position_expanded_mm", {}, repr(position.expanded)
+        yield "hexacell_position_limit_mm", {}, repr(position.limit)
 
 
 def _labels(one: CellStatus, further: dict[str, str]) -> str:
     labels = {"cell": one.cell.settings.name, **further}
-    return ",".join(f'{name}="{_escaped(text)}"' for name, text in labels.items())
-
-
-def _escaped(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    escapes = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n"})
+    return ",".join(f'{name}="{text.translate(escapes)}"' for name, text in labels.items())
 
 
 def _flag(value: bool) -> str:
     return "1" if value else "0"
 
 
-def _iso(at: datetime | None) -> str | None:
-    return None if at is None else at.isoformat()
-
-
-# JOINED Text and documents for all cells that share an archive.
-
-NO_CELLS = "No cell has put anything into this archive: hexacell status CELL does, and each run."
-NO_FLEET_RUNS = "There are no runs in this archive."
-
-
 def fleet_text(cells: Sequence[FleetCell]) -> str:
-    """A line a cell of at most 80 columns, and below it what needs somebody."""
+    """A line a cell of an archive, of at most 80 columns, and below it what needs somebody."""
     if not cells:
         return NO_CELLS
     head = _fleet_columns("cell", "host", "latest verdict", "error, mm", "last run")
-    return "\n".join([head, *(line for one in cells for line in _cell_lines(one))])
+    return "\n".join([head, *(line for one in cells for line in _fleet_cell_lines(one))])
+
+
+def _fleet_cell_lines(one: FleetCell) -> Iterator[str]:
+    error = figure_with_u(one.position_mm, one.expanded_mm)
+    yield _fleet_columns(one.name, one.host, verdict_word(one.verdict), error, minute(one.latest_at))
+    if one.due_at is not None:
+        yield f"  calibration {'OVERDUE since' if one.is_overdue else 'due on'} {one.due_at:%Y-%m-%d}"
+    if one.proposal is not None:
+        yield f"  a proposal waits for a person: {one.proposal}, on {one.host}"
+    if one.changes:
+        yield "  the robot has changed; hexacell history --drift on its computer shows more"
 
 
 def fleet_document(cells: Sequence[FleetCell]) -> dict[str, Any]:
     """What ``status --archive URL --json`` prints."""
-    return {"cells": [one.model_dump(mode="json") | {"overdue": is_overdue_now(one)} for one in cells]}
+    return {"cells": [one.model_dump(mode="json") | {"overdue": one.is_overdue} for one in cells]}
 
 
 def fleet_history_text(runs: Sequence[FleetRun]) -> str:
-    """A line a run."""
+    """A line a run of an archive."""
     if not runs:
         return NO_FLEET_RUNS
-    head = _fleet_columns("cell", "host", "verdict", "error, mm", "ended")
-    return "\n".join([head, *map(_run_line, runs)])
+    lines = [
+        _fleet_columns(
+            one.cell,
+            one.host,
+            verdict_word(one.summary.verdict),
+            error_with_u(one.summary.accuracy),
+            minute(one.summary.ended),
+        )
+        for one in runs
+    ]
+    return "\n".join([_fleet_columns("cell", "host", "verdict", "error, mm", "ended"), *lines])
 
 
 def fleet_history_document(runs: Sequence[FleetRun]) -> dict[str, Any]:
     """What ``history --archive URL --json`` prints without a cell."""
-    return {"runs": [_run_document(one) for one in runs]}
+    return {"runs": [_fleet_run_document(one) for one in runs]}
 
 
-def _cell_lines(one: FleetCell) -> Iterator[str]:
-    verdict = "-" if one.verdict is None else one.verdict.value
-    yield _fleet_columns(
-        one.name, one.host, verdict, _error(one.position_mm, one.expanded_mm), _moment(one.latest_at)
-    )
-    if one.due_at is not None:
-        yield f"  calibration {'OVERDUE since' if is_overdue_now(one) else 'due on'} {one.due_at:%Y-%m-%d}"
-    if one.proposal is not None:
-        yield f"  a proposal waits for a person: {one.proposal}, on {one.host}"
-    if one.changes:
-        yield "  the robot has changed; hexacell history --drift on its computer tells more"
-
-
-def _run_line(one: FleetRun) -> str:
-    summary = one.summary
-    verdict = "-" if summary.verdict is None else summary.verdict.value
-    position = None if summary.accuracy is None else summary.accuracy.position
-    error = "-" if position is None else _error(position.value, position.expanded)
-    return _fleet_columns(one.cell, _host(one), verdict, error, _moment(summary.ended))
-
-
-def _run_document(one: FleetRun) -> dict[str, Any]:
-    summary = one.summary
-    position = None if summary.accuracy is None else summary.accuracy.position
+def _fleet_run_document(one: FleetRun) -> dict[str, Any]:
+    was, position = one.summary, one.summary.position
     return {
         "cell": one.cell,
-        "host": _host(one),
+        "host": one.host,
         "run": one.name,
-        "mode": summary.mode,
-        "began": None if summary.began is None else summary.began.isoformat(),
-        "ended": None if summary.ended is None else summary.ended.isoformat(),
-        "verdict": None if summary.verdict is None else summary.verdict.value,
-        "position_mm": None if position is None else position.value,
-        "expanded_mm": None if position is None else position.expanded,
+        "mode": was.mode,
+        "began": iso(was.began),
+        "ended": iso(was.ended),
+        "verdict": was.verdict and was.verdict.value,
+        "position_mm": position and position.value,
+        "expanded_mm": position and position.expanded,
     }
-
-
-def _host(one: FleetRun) -> str:
-    return one.place.partition(":")[0]
-
-
-def _error(value: float | None, expanded: float | None) -> str:
-    return "-" if value is None or expanded is None else f"{value:.3f} +- {expanded:.3f}"
-
-
-def _moment(at: datetime | None) -> str:
-    return "-" if at is None else f"{at:%Y-%m-%d %H:%M}"
 
 
 def _fleet_columns(cell: str, host: str, verdict: str, error: str, when: str) -> str:

@@ -19,7 +19,8 @@ from hexacell.text.report.report import (
     serial_number_of,
     temperature_ranges,
 )
-from hexacell.text.report.statement import MEANINGS, MODES, decision_rule, method_sentences, scope_sentences
+from hexacell.text.report.statement import MODES, decision_rule, method_sentences, scope_sentences
+from hexacell.text.verdict import VERDICT_MEANINGS
 from hexacell.uncertainty.statement import COVERAGE, COVERAGE_FACTOR
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy
 
@@ -139,7 +140,7 @@ def _add_statements(data: Element, run: ReportedRun, accuracy: VerifiedAccuracy)
     _add_text(conformity, "name", "Statement of conformity")
     _add_text(conformity, "description", decision_rule(accuracy))
     _add(conformity, "norm", "ILAC-G8:09/2019")
-    _add_text(conformity, "declaration", f"{verdict.value}: {MEANINGS[verdict]}")
+    _add_text(conformity, "declaration", f"{verdict.value}: {VERDICT_MEANINGS[verdict]}")
     if verdict in CONFORMITY:
         _add(conformity, "conformity", CONFORMITY[verdict])
     scope = _add(statements, "statement")
@@ -217,12 +218,9 @@ def _add_errors(parent: Element, run: ReportedRun, accuracy: VerifiedAccuracy) -
     result = _add(parent, "result")
     _add_text(result, "name", f"Largest errors at {accuracy.poses} task poses")
     data = _add(result, "data")
-    for name, unit, error in (
-        ("position error", "mm", accuracy.position),
-        ("orientation error", "deg", accuracy.orientation),
-    ):
-        _add_quantity(data, name, error.value, UNITS[unit], error.expanded)
-        _add_quantity(data, f"limit of the {name}", error.limit, UNITS[unit])
+    for name, unit, error in accuracy.errors:
+        _add_quantity(data, f"{name} error", error.value, UNITS[unit], error.expanded)
+        _add_quantity(data, f"limit of the {name} error", error.limit, UNITS[unit])
     improvement = None if run.state.identified is None else run.state.identified.improvement
     if improvement is not None:
         _add_quantity(data, "position error as found", improvement.now_mm, UNITS["mm"])

@@ -19,6 +19,7 @@ from hexacell.services.schedule.schedules import Schedule
 from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
 from hexacell.services.write_back.config_rollback import ConfigRollback
 from hexacell.services.write_back.proposals import AppliedProposal
+from hexacell.text.layout import iso
 from hexacell.text.run_story import run_story
 from hexacell.text.verdict import teaching_sentence
 from procedures.journal.line_format import Entry
@@ -218,19 +219,18 @@ def history_document(runs: Sequence[PastRun]) -> dict[str, Any]:
 
 
 def past_run_document(run: PastRun) -> dict[str, Any]:
-    """One of them."""
-    was = run.summary
-    error = None if was.accuracy is None else was.accuracy.position
+    """One of the runs that ``history --json`` prints."""
+    was, position = run.summary, run.summary.position
     return {
         "run": str(run.folder.path),
-        "began": None if was.began is None else was.began.isoformat(),
-        "ended": None if was.ended is None else was.ended.isoformat(),
+        "began": iso(was.began),
+        "ended": iso(was.ended),
         "mode": was.mode or None,
         "records": was.records,
-        "verdict": None if was.verdict is None else was.verdict.value,
-        "position_mm": None if error is None else error.value,
-        "expanded_mm": None if error is None else error.expanded,
-        "limit_mm": None if error is None else error.limit,
+        "verdict": was.verdict and was.verdict.value,
+        "position_mm": position and position.value,
+        "expanded_mm": position and position.expanded,
+        "limit_mm": position and position.limit,
         "line": was.line,
         "begun": was.has_begun,
         "over": was.is_over,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from hexacell.services.history.run_index import PastRun
-from hexacell.text.layout import wrapped
+from hexacell.text.layout import error_with_u, verdict_word, wrapped
 
 if TYPE_CHECKING:
     from hexacell.results.run_comparison import ParameterTrend, RunComparison
@@ -32,17 +32,11 @@ def history_head() -> str:
 
 def history_line(run: PastRun) -> str:
     """One run: its name, mode, verdict, error and what became of it."""
-    verdict = "-" if run.summary.verdict is None else run.summary.verdict.value
+    was = run.summary
+    error = error_with_u(was.accuracy)
     return _columns(
-        run.name[:LONGEST_RUN_NAME], run.summary.mode or "-", verdict, error_text(run), standing(run)
+        run.name[:LONGEST_RUN_NAME], was.mode or "-", verdict_word(was.verdict), error, standing(run)
     )
-
-
-def error_text(run: PastRun) -> str:
-    """The largest position error at the task poses, +- its expanded uncertainty, mm; - if there is none."""
-    if run.summary.accuracy is None:
-        return "-"
-    return f"{run.summary.accuracy.position.value:.3f} +- {run.summary.accuracy.position.expanded:.3f}"
 
 
 def standing(run: PastRun) -> str:

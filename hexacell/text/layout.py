@@ -1,8 +1,13 @@
-"""Paragraphs of text for a terminal of 80 columns."""
+"""Paragraphs for a terminal of 80 columns, and what stands in the columns of tables."""
 
 from __future__ import annotations
 
 import textwrap
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hexacell.verdict.decision import Verdict, VerifiedAccuracy
 
 COLUMNS = 80
 
@@ -17,3 +22,28 @@ def wrapped(text: str, *, indent: int = 0) -> str:
 def duration(minutes: float) -> str:
     """A duration, rounded to what is known of it."""
     return f"{60.0 * minutes:.0f} seconds" if minutes < 1.5 else f"{minutes:.0f} minutes"
+
+
+def minute(at: datetime | None) -> str:
+    """A moment to the minute in a column of a table; a dash without one."""
+    return "-" if at is None else f"{at:%Y-%m-%d %H:%M}"
+
+
+def iso(at: datetime | None) -> str | None:
+    """A moment in a JSON document."""
+    return None if at is None else at.isoformat()
+
+
+def verdict_word(verdict: Verdict | None) -> str:
+    """The verdict in a column of a table; a dash without one."""
+    return "-" if verdict is None else verdict.value
+
+
+def figure_with_u(value: float | None, expanded: float | None) -> str:
+    """A figure +- its expanded uncertainty in a column of a table; a dash without one."""
+    return "-" if value is None or expanded is None else f"{value:.3f} +- {expanded:.3f}"
+
+
+def error_with_u(accuracy: VerifiedAccuracy | None) -> str:
+    """The largest position error at the task poses, +- its expanded uncertainty, mm; a dash without one."""
+    return "-" if accuracy is None else figure_with_u(accuracy.position.value, accuracy.position.expanded)

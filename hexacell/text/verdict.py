@@ -1,7 +1,8 @@
-"""Text for the verification of a result: verdict, errors at the task poses, and evidence."""
+"""Words for what is decided: verdict, errors with U, evidence, length scale, what must be taught anew."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from hexacell.checks.change_alarm import ChangeAlarm
@@ -9,30 +10,58 @@ from hexacell.checks.check_result import CheckResult
 from hexacell.results.result import AcceptedResult, LengthResult
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.layout import wrapped
-from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
+from hexacell.verdict.decision import Verdict, VerifiedAccuracy
 from hexacell.verdict.length_check import LengthStatement, scale_words
 from hexacell.verdict.verification import Verification
+
+VERDICT_MEANINGS = {
+    Verdict.PASS: "The error and the guard band together are within the limit.",
+    Verdict.CONDITIONAL_PASS: "The error is within the limit, but not by the guard band.",
+    Verdict.NOT_EVALUATED: "The records do not decide it.",
+    Verdict.CONDITIONAL_FAIL: "The error is above the limit, but not by the guard band.",
+    Verdict.FAIL: "The error is above the limit, also with the guard band taken off.",
+}
+
+NAMED_SOURCES = 4
+"""Number of sources of uncertainty of a length check that are printed, the largest first."""
+
+SMALLEST_MOVE = 0.001
+"""Smallest displacement of what was taught that is printed, mm or deg: that of the numbers in a config."""
 
 
 def verification_text(verified: Verification) -> str:
     """A few lines: the verdict with its reason first."""
-    lines = [_verdict(verified), *_errors(verified.accuracy), *_comparison(verified)]
+    verdict = f"verdict: {verified.verdict}"
+    if verified.tests and all(test.passed for test in verified.tests):
+        verdict += f"; the model agrees with the records in {len(verified.tests)} tests"
+    lines = [verdict, *_error_lines(verified.accuracy)]
+    if verified.before_mm is not None and verified.after_mm is not None:
+        worse = ", significantly worse" if verified.is_worse else ""
+        means = f"{verified.before_mm:.2f} -> {verified.after_mm:.3f} mm"
+        lines.append(f"  mean deviation at held-out poses {means}{worse}")
     lines += [f"  {wrapped(test.sentence, indent=2)}" for test in verified.tests if not test.passed]
     if verified.accuracy is not None:
         lines += [f"  {line}" for line in scale_lines(verified.accuracy.length, verified.accuracy.scale_of)]
     return "\n".join(lines)
 
 
-def _verdict(verified: Verification) -> str:
-    """With the evidence, where all of it is for the model."""
-    if not verified.tests or not all(test.passed for test in verified.tests):
-        return f"verdict: {verified.verdict}"
-    return f"verdict: {verified.verdict}; the model agrees with the records in {len(verified.tests)} tests"
+def _error_lines(accuracy: VerifiedAccuracy | None) -> Iterator[str]:
+    """The errors at the task poses with U; the guard band where these do not explain the verdict."""
+    if accuracy is None:
+        return
+    what = "task poses" if accuracy.task_named else "poses across the workspace"
+    for name, unit, error in accuracy.errors:
+        where = f"at {accuracy.poses} {what}" if name == "position" else "there"
+        size = f"{error.value:.3f} {unit}, U {error.expanded:.3f} (limit {error.limit:g})"
+        yield f"  largest {name} error {where}: {size}"
+    guard_bands = [error.guard_band for _, _, error in accuracy.errors if error.guard_band]
+    if guard_bands:
+        yield f"  a pass and a fail keep {guard_bands[0]} from the limit"
 
 
 def check_text(found: CheckResult) -> str:
-    """The same for a check: the verdict, the error now, and what has changed."""
-    lines = [f"verdict: {found.verdict}", *_errors(found.accuracy), *_drift(found)]
+    """A few lines on a check: the verdict, the error now, and what has changed."""
+    lines = [f"verdict: {found.verdict}", *_error_lines(found.accuracy), *_change_lines(found)]
     if found.alarm is not None and found.alarm.is_raised:
         lines.append(wrapped(f"  {alarm_sentence(found.alarm)}", indent=2))
     if not found.is_consistent:
@@ -42,8 +71,20 @@ def check_text(found: CheckResult) -> str:
     return "\n".join(lines)
 
 
+def _change_lines(found: CheckResult) -> Iterator[str]:
+    """The parameter that has changed most, if that is significant."""
+    if found.earlier_at is None or not found.changes:
+        return
+    most, since = found.significant_change, f"{found.earlier_at:%Y-%m-%d}"
+    if most is not None:
+        change = f"{most.name} by {most.change:+.3f} {most.unit} (sigma {most.sigma:.3f})"
+        yield f"  changed most since {since}: {change}"
+    elif found.verdict is Verdict.PASS:
+        yield f"  no parameter has changed significantly since {since}"
+
+
 def alarm_sentence(alarm: ChangeAlarm) -> str:
-    """What an alarm says, and what to do."""
+    """What an alarm means, and what to do."""
     size = f"{alarm.change:+.3f} +- {alarm.sigma:.3f} {alarm.unit}"
     return (
         f"alarm: the first {alarm.records} records contradict an unchanged machine (score "
@@ -59,55 +100,6 @@ def check_start_text(accepted: AcceptedResult | None) -> str:
     return f"the check starts from the result of {accepted.at:%Y-%m-%d}, {Path(accepted.run).name}"
 
 
-def _drift(found: CheckResult) -> list[str]:
-    """The parameter that has changed most, if that is significant."""
-    if found.earlier_at is None or not found.changes:
-        return []
-    most, since = found.significant_change, f"{found.earlier_at:%Y-%m-%d}"
-    if most is not None:
-        change = f"{most.name} by {most.change:+.3f} {most.unit} (sigma {most.sigma:.3f})"
-        return [f"  changed most since {since}: {change}"]
-    unchanged = f"  no parameter has changed significantly since {since}"
-    return [unchanged] if found.verdict is Verdict.PASS else []
-
-
-def _errors(accuracy: VerifiedAccuracy | None) -> list[str]:
-    if accuracy is None:
-        return []
-    what = "task poses" if accuracy.task_named else "poses across the workspace"
-    return [
-        _error(f"largest position error at {accuracy.poses} {what}", accuracy.position, "mm"),
-        _error("largest orientation error there", accuracy.orientation, "deg"),
-        *_guard_band(accuracy),
-    ]
-
-
-def _error(what: str, error: JudgedError, unit: str) -> str:
-    """U is the expanded uncertainty."""
-    stated = f"{error.value:.3f} {unit}, U {error.expanded:.3f} (limit {error.limit:g})"
-    return f"  {what}: {stated}"
-
-
-def _guard_band(accuracy: VerifiedAccuracy) -> list[str]:
-    """What a verdict keeps from the limits, where value and U do not tell why it is no pass."""
-    told = [error for error in (accuracy.position, accuracy.orientation) if error.guard_band]
-    return [f"  a pass and a fail keep {told[0].guard_band} from the limit"] if told else []
-
-
-def _comparison(verified: Verification) -> list[str]:
-    if verified.before_mm is None or verified.after_mm is None:
-        return []
-    means = f"{verified.before_mm:.2f} -> {verified.after_mm:.3f} mm"
-    worse = ", significantly worse" if verified.is_worse else ""
-    return [f"  mean deviation at held-out poses {means}{worse}"]
-
-
-# JOINED Text for the length scale: whether it was checked, and what was found.
-
-NAMED_SOURCES = 4
-"""So many of the sources of uncertainty are printed, the largest."""
-
-
 def not_checked(scale_of: str = "encoders") -> str:
     """Where the length scale comes from, if nobody checked it."""
     if scale_of == "encoders":
@@ -116,13 +108,19 @@ def not_checked(scale_of: str = "encoders") -> str:
 
 
 def scale_lines(length: LengthResult | None, scale_of: str = "encoders") -> list[str]:
-    """What is known of the length scale; none where a check contradicts itself, which its test says."""
+    """What is known of the length scale; empty where a check contradicts itself, which its test says."""
     if length is None:
         return [not_checked(scale_of)]
     if not length.is_consistent:
         return []
     checked = f"length scale: checked over {length.distance_mm:.3f} mm: {scale_words(length)}"
-    return [checked, remedy(length)] if length.is_significant else [checked]
+    if not length.is_significant:
+        return [checked]
+    remedy = (
+        f"No geometry corrects that: multiply the scale factor of all encoders by {length.factor:.6f}, at "
+        "the drives and in [encoders] measuring_step_nm, and calibrate again."
+    )
+    return [checked, wrapped(f"  {remedy}", indent=2).strip()]
 
 
 def earlier_scale_line(length: LengthResult | None, scale_of: str = "encoders") -> str:
@@ -147,23 +145,8 @@ def length_text(stated: LengthStatement) -> str:
     return "\n".join([*lines, wrapped(f"  uncertainty, um/m, 1 sigma: {named}", indent=2)])
 
 
-def remedy(length: LengthResult) -> str:
-    """What to do about encoders that are not true to scale."""
-    text = (
-        f"No geometry corrects that: multiply the scale factor of all encoders by {length.factor:.6f}, at "
-        "the drives and in [encoders] measuring_step_nm, and calibrate again."
-    )
-    return wrapped(f"  {text}", indent=2).strip()
-
-
-# JOINED Text for what must be taught anew because of a new geometry.
-
-SMALLEST = 0.001
-"""Nothing below is printed, mm or deg: it is that of the numbers in a config."""
-
-
 def teaching_sentence(moved: TaskDisplacement) -> str:
-    """What must be taught anew, and what not; nothing if all that was taught stays within the limits."""
+    """What must be taught anew because of a new geometry, and what not."""
     how_far = f"{_how_far(moved)} at the task poses"
     if moved.is_within_limits:
         return f"Nothing need be taught anew: taught points and frames move by at most {how_far}."
@@ -174,16 +157,15 @@ def teaching_sentence(moved: TaskDisplacement) -> str:
 
 
 def teaching_line(moved: TaskDisplacement) -> str:
-    """The same in a line of at most 80 columns."""
+    """What must be taught anew, in a line of at most 80 columns."""
     if moved.is_within_limits:
         return f"Taught points and frames stay: they move by at most {_how_far(moved)}"
     return f"Teach Cartesian points and frames anew: they move by up to {_how_far(moved)}"
 
 
 def _how_far(moved: TaskDisplacement) -> str:
-    return f"{_figure(moved.position_mm)} mm, {_figure(moved.orientation_deg)} deg"
-
-
-def _figure(value: float) -> str:
-    decimals = 1 if value >= 10.0 else 2 if value >= 1.0 else 3
-    return f"{max(value, SMALLEST):.{decimals}f}"
+    mm, deg = (
+        f"{max(value, SMALLEST_MOVE):.{1 if value >= 10.0 else 2 if value >= 1.0 else 3}f}"
+        for value in (moved.position_mm, moved.orientation_deg)
+    )
+    return f"{mm} mm, {deg} deg"

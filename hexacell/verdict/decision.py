@@ -142,7 +142,12 @@ class VerifiedAccuracy(Frozen):
     length: LengthResult | None = None
     scale_of: Literal["encoders", "drawing"] = "encoders"
 
+    @property
+    def errors(self) -> tuple[tuple[str, str, JudgedError], ...]:
+        """Each error with its name and unit."""
+        return ("position", "mm", self.position), ("orientation", "deg", self.orientation)
+
     @staticmethod
     def scale_with(mechanism: Mechanism) -> Literal["encoders", "drawing"]:
-        """What says so of a mechanism."""
+        """What says how long a millimetre is, for a mechanism."""
         return "encoders" if mechanism.words.joint_unit is JointUnit.MM else "drawing"

@@ -167,12 +167,9 @@ def outcome_of(
 
 
 def _stated(accuracy: VerifiedAccuracy) -> str:
-    """The error that decides, position where both do alike."""
-    position, orientation = accuracy.position, accuracy.orientation
-    if worst_verdict([position.verdict, orientation.verdict]) is position.verdict:
-        name, error, unit = "position", position, "mm"
-    else:
-        name, error, unit = "orientation", orientation, "deg"
+    """The error that decides: that of the position where both do."""
+    worst = worst_verdict(error.verdict for _, _, error in accuracy.errors)
+    name, unit, error = next(one for one in accuracy.errors if one[2].verdict is worst)
     return f"{name} error at the task poses {error.value:.3f} +- {error.expanded:.3f} {unit} ({error.rule})"
 
 

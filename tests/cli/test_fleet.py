@@ -127,6 +127,6 @@ def test_what_is_overdue_is_said() -> None:
     now = datetime.now(UTC)
     late = FleetCell(name="late", host="east", cell="x", seen_at=now, due_at=now - timedelta(days=1))
     fine = FleetCell(name="fine", host="east", cell="x", seen_at=now, due_at=now + timedelta(days=1))
-    assert (late.is_overdue(now), fine.is_overdue(now)) == (True, False)
+    assert (late.is_overdue, fine.is_overdue) == (True, False)
     text = fleet_text([late, fine])
     assert (text.count("OVERDUE"), text.count("due on")) == (1, 1)

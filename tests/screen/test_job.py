@@ -96,7 +96,7 @@ async def test_from_mounting_to_approval(
         run.tell(StatusChanged(status=Status.ENDED))
         await until(lambda: not isinstance(pilot.app.screen, QuestionOverlay))
         await press(pilot, "4")
-        await until_shown(pilot, "PASS: error and uncertainty together are within the limit.")
+        await until_shown(pilot, "PASS: The error and the guard band together are within the limit.")
         assert "S1y       -155.000    -160.751    -5.751    0.095  changed (60." in shown(pilot)
 
 

@@ -1,4 +1,7 @@
-"""A cell at a glance: what its latest runs said, what its controller has, what waits for a person."""
+"""Cells at a glance: what the latest runs said, what the controller has, what waits for a person.
+
+Each cell that shares an archive puts this there, and any computer can read of all.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import ValidationError
 
@@ -22,8 +25,16 @@ from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.run_index import PastRun, RunIndex, RunSummary
 from hexacell.verdict.decision import Verdict
 
+if TYPE_CHECKING:
+    from hexacell.runs.archive import SharedDocument
+
 CLOCKS_DIFFER = timedelta(minutes=5)
-"""By so much the clocks of computers that share a folder may."""
+"""Largest difference of the clocks of computers that share a folder."""
+
+Model = TypeVar("Model", bound=Frozen)
+
+OF_THE_CELL = ""
+"""Stands for a run's name where a document is of the cell itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,20 +110,10 @@ def cell_status(cell: Cell) -> CellStatus:
 
 
 def next_calibration_due(cell: Cell, in_force: PastRun | None) -> datetime | None:
-    """When the geometry that the controller has, from this run, is no longer valid; none if not stated."""
+    """When the geometry that the controller has is no longer valid; None where that is not known."""
     valid_days = cell.settings.acceptance.valid_days
-    if in_force is None or in_force.summary.ended is None or valid_days is None:
-        return None
-    return in_force.summary.ended + timedelta(days=valid_days)
-
-
-# JOINED The cells that share an archive: each puts there how it is, and any computer can read of all.
-
-if TYPE_CHECKING:
-    from hexacell.runs.archive import SharedDocument
-
-OF_THE_CELL = ""
-"""Stands for a run's name where a document is of the cell itself."""
+    ended = in_force and in_force.summary.ended
+    return ended + timedelta(days=valid_days) if ended and valid_days is not None else None
 
 
 class FleetCell(Frozen):
@@ -144,9 +145,10 @@ class FleetCell(Frozen):
     proposal: Text | None = None
     changes: int = 0
 
-    def is_overdue(self, now: datetime) -> bool:
-        """Whether its calibration should have been by now."""
-        return self.due_at is not None and self.due_at <= now
+    @property
+    def is_overdue(self) -> bool:
+        """Whether its calibration is overdue, by this computer's clock."""
+        return self.due_at is not None and self.due_at <= datetime.now(UTC)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +159,11 @@ class FleetRun:
     place: str
     name: str
     summary: RunSummary
+
+    @property
+    def host(self) -> str:
+        """The computer it was run from."""
+        return self.place.partition(":")[0]
 
 
 def publish_status(status: CellStatus) -> None:
@@ -204,7 +211,8 @@ def fleet_cells(url: str) -> tuple[FleetCell, ...]:
     Raises:
         ArchiveUnavailable: it cannot be read.
     """
-    found = map(_cell, _shared_documents(url, DocumentKind.CELL))
+    documents = _shared_documents(url, DocumentKind.CELL)
+    found = (_read(FleetCell, one) for one in documents)
     return tuple(one for one in found if one is not None)
 
 
@@ -214,14 +222,18 @@ def fleet_runs(url: str) -> tuple[FleetRun, ...]:
     Raises:
         ArchiveUnavailable: it cannot be read.
     """
-    found = map(_run, _shared_documents(url, DocumentKind.SUMMARY))
-    ended = [one for one in found if one is not None]
-    return tuple(sorted(ended, key=lambda one: (_moment(one), one.cell, one.name), reverse=True))
+    documents = _shared_documents(url, DocumentKind.SUMMARY)
+    found = [
+        FleetRun(one.cell, one.place, one.run, summary)
+        for one in documents
+        if (summary := _read(RunSummary, one)) is not None
+    ]
+    return tuple(sorted(found, key=_recency, reverse=True))
 
 
-def is_overdue_now(cell: FleetCell) -> bool:
-    """Whether its calibration should have been by now, by this computer's clock."""
-    return cell.is_overdue(datetime.now(UTC))
+def _recency(run: FleetRun) -> tuple[float, str, str]:
+    ended = run.summary.ended
+    return 0.0 if ended is None else ended.timestamp(), run.cell, run.name
 
 
 def _shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]:
@@ -230,20 +242,9 @@ def _shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...
     return shared_documents(url, kind)
 
 
-def _moment(run: FleetRun) -> float:
-    return 0.0 if run.summary.ended is None else run.summary.ended.timestamp()
-
-
-def _cell(document: SharedDocument) -> FleetCell | None:
+def _read(model: type[Model], document: SharedDocument) -> Model | None:
+    """What a document holds; None where a newer program has written it."""
     try:
-        return FleetCell.model_validate_json(document.content)
+        return model.model_validate_json(document.content)
     except ValidationError:
         return None
-
-
-def _run(document: SharedDocument) -> FleetRun | None:
-    try:
-        summary = RunSummary.model_validate_json(document.content)
-    except ValidationError:
-        return None
-    return FleetRun(document.cell, document.place, document.run, summary)

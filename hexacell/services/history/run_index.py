@@ -26,7 +26,7 @@ from hexacell.runs.archived_documents import (
     folder_stamps,
 )
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.verdict.decision import Verdict, VerifiedAccuracy
+from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 
 if TYPE_CHECKING:
     from hexacell.drift.run_evidence import RunEvidence
@@ -71,6 +71,11 @@ class RunSummary(Frozen):
     has_written: bool = False
     has_proposal: bool = False
     has_begun: bool = True
+
+    @property
+    def position(self) -> JudgedError | None:
+        """The largest position error at the task poses, mm; None without one."""
+        return None if self.accuracy is None else self.accuracy.position
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,24 +9,15 @@ from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.text.report.pages import Block, Chapter, Facts, Paragraph, Table, Tone
-from hexacell.text.verdict import not_checked, scale_lines, teaching_sentence
+from hexacell.text.verdict import VERDICT_MEANINGS, not_checked, scale_lines, teaching_sentence
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
-from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
-from hexacell.verdict.model_evidence import ModelTest
+from hexacell.verdict.decision import Verdict, VerifiedAccuracy
 from procedures.run.steps import Phase
 
 NO_VERDICT = "NOT EVALUATED"
 
-MEANINGS = {
-    Verdict.PASS: "The error and the guard band together are within the limit.",
-    Verdict.CONDITIONAL_PASS: "The error is within the limit, but not by the guard band.",
-    Verdict.CONDITIONAL_FAIL: "The error is above the limit, but not by the guard band.",
-    Verdict.FAIL: "The error is above the limit, also with the guard band taken off.",
-    Verdict.NOT_EVALUATED: "The records do not decide it.",
-}
-
 TONES = {Verdict.PASS: Tone.GOOD, Verdict.FAIL: Tone.BAD}
-"""Of all others: open."""
+"""Colours of the verdicts; all others are open."""
 
 MODES = {
     "optimise": "calibration: measured, identified, written to the controller, verified",
@@ -46,7 +37,7 @@ MODELS = {
 
 
 def verdict_of(run: ReportedRun) -> Verdict | None:
-    """The verdict; none where the run ended before there was one."""
+    """The verdict; None where the run ended before there was one."""
     return None if run.state.judged is None else run.state.judged.verdict
 
 
@@ -107,8 +98,8 @@ def _meaning(run: ReportedRun, verdict: Verdict | None) -> str:
     if verdict is None:
         return "The run ended before anything could be said of the robot."
     if run.state.judged is not None and run.state.judged.length is not None:
-        return f"Of the length scale alone: {MEANINGS[verdict]}"
-    return MEANINGS[verdict]
+        return f"Of the length scale alone: {VERDICT_MEANINGS[verdict]}"
+    return VERDICT_MEANINGS[verdict]
 
 
 def _error_table(accuracy: VerifiedAccuracy | None) -> tuple[Block, ...]:
@@ -116,14 +107,10 @@ def _error_table(accuracy: VerifiedAccuracy | None) -> tuple[Block, ...]:
         return ()
     columns = (f"Largest error at {accuracy.poses} task poses", "error", "U (k = 2)", "limit", "verdict")
     rows = (
-        _row("position, mm", accuracy.position),
-        _row("orientation, deg", accuracy.orientation),
+        (f"{name}, {unit}", f"{one.value:.3f}", f"{one.expanded:.3f}", f"{one.limit:g}", one.verdict.value)
+        for name, unit, one in accuracy.errors
     )
-    return (Table(columns, rows),)
-
-
-def _row(name: str, error: JudgedError) -> tuple[str, ...]:
-    return name, f"{error.value:.3f}", f"{error.expanded:.3f}", f"{error.limit:g}", str(error.verdict)
+    return (Table(columns, tuple(rows)),)
 
 
 def _reasons(run: ReportedRun) -> tuple[Block, ...]:
@@ -133,14 +120,12 @@ def _reasons(run: ReportedRun) -> tuple[Block, ...]:
         reason = "it is not over" if run.state.ended is None else run.state.ended.line
         return (Paragraph(f"How it ended: {reason}."),)
     if judged.verification is not None and judged.verification.tests:
-        return (
-            Table(("Test of the model", "result"), tuple(map(_test_row, judged.verification.tests)), None),
+        rows = (
+            (test.name, f"{'holds' if test.passed else 'FAILS'}: {test.sentence}")
+            for test in judged.verification.tests
         )
+        return (Table(("Test of the model", "result"), tuple(rows), None),)
     return (Paragraph(judged.line),)
-
-
-def _test_row(test: ModelTest) -> tuple[str, str]:
-    return test.name, f"{'holds' if test.passed else 'FAILS'}: {test.sentence}"
 
 
 def scope_sentences(accuracy: VerifiedAccuracy | None) -> str:
@@ -189,7 +174,7 @@ def _left(run: ReportedRun) -> str:
     if state.started is not None and state.started.mode not in {"quick", "optimise"}:
         return "Nothing was changed: the robot is left as it was found."
     if state.rolled_back:
-        return "The config of before was put back: the robot is left as it was found."
+        return "The previous config was restored: the robot is left as it was found."
     if state.committed is None:
         return "Nothing was written: the robot is left as it was found."
     kept = f"; kept by {state.accepted.by}" if state.accepted is not None and state.accepted.by else ""

@@ -24,19 +24,12 @@ from hexacell.text.screens.views import (
     Series,
     Urgency,
 )
+from hexacell.text.verdict import VERDICT_MEANINGS
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import DeviationStatistics
 from procedures.run.questions import PendingChange, QuestionKind
 from procedures.run.state import RunState
 from procedures.run.steps import Phase
-
-VERDICT_WORDS = {
-    Verdict.PASS: "PASS: error and uncertainty together are within the limit.",
-    Verdict.CONDITIONAL_PASS: "CONDITIONAL PASS: the error is within the limit, but not by the guard band.",
-    Verdict.NOT_EVALUATED: "NOT EVALUATED: the records do not decide it.",
-    Verdict.CONDITIONAL_FAIL: "CONDITIONAL FAIL: the error is above the limit, but not by the guard band.",
-    Verdict.FAIL: "FAIL: the error is above the limit.",
-}
 
 
 def review_view(picture: RunPicture, settings: CellSettings | None, change: str = "") -> ReviewView:
@@ -65,7 +58,7 @@ def _verdict(state: RunState) -> tuple[str, Urgency]:
     urgency = Urgency.CALM if is_good else Urgency.ATTENTION
     if judged.verdict is Verdict.FAIL:
         urgency = Urgency.ALARM
-    return VERDICT_WORDS[judged.verdict], urgency
+    return f"{judged.verdict.upper()}: {VERDICT_MEANINGS[judged.verdict]}", urgency
 
 
 def _scope(state: RunState) -> tuple[str, ...]:

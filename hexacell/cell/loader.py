@@ -19,8 +19,8 @@ from hexacell.cell.diagnostics import Diagnosis, ModelLookup
 from hexacell.cell.fields import Section
 from hexacell.cell.model import CellSettings
 from hexacell.cell.robot import DEFAULT_MECHANISM
-from hexacell.errors import FileError, UsageError, did_you_mean, joined
-from hexacell.plugins import Group, names
+from hexacell.errors import FileError, HexacellError, UsageError, did_you_mean, joined
+from hexacell.plugins import Group, load, names
 from hexacell.storage.atomic_files import read_text
 from hexacell.storage.secrets import MASK, without_secrets
 from hexacell.storage.toml_document import KeyPath, TomlDocument, is_secret, table_header
@@ -107,6 +107,39 @@ def is_cell_file(path: Path) -> bool:
     except FileError:
         return True
     return any(section in data for section in ("robot", "gauges", "encoders", "identification"))
+
+
+def require_plugins(cell: Cell) -> None:
+    """Import what the cell file names: the mechanism, the format of the config, every device's driver.
+
+    Raises:
+        FileError: one is not installed; the message has its line and names the most similar one.
+        SeveralErrors: more than one.
+    """
+    failures: list[HexacellError] = []
+    for path, group, name in sorted(_plugins(cell.settings), key=lambda one: one[1].value):
+        try:
+            load(group, name)
+        except HexacellError as error:
+            line = cell.document.line_of(path)
+            failures.append(FileError(error.problem, subject=cell.path, line=line, action=error.action))
+    if failures:
+        raise joined(f"{cell.path} has {len(failures)} mistakes", failures)
+
+
+def _plugins(settings: CellSettings) -> Iterator[tuple[KeyPath, Group, str]]:
+    """Every name of a plug-in, and where it is in the cell file."""
+    for n, gauge in enumerate(settings.gauges):
+        yield ("gauges", n, "protocol"), Group.GAUGES, gauge.protocol
+    for n, thermometer in enumerate(settings.thermometers):
+        yield ("thermometers", n, "protocol"), Group.THERMOMETERS, thermometer.protocol
+    yield ("encoders", "protocol"), Group.ENCODERS, settings.encoders.protocol
+    yield ("controller", "protocol"), Group.CONTROLLERS, settings.controller.protocol
+    yield ("controller", "config_format"), Group.CONFIG_FORMATS, settings.controller.config_format
+    for n, file in enumerate(settings.controller.further_files):
+        path = ("controller", "further_files", n, "config_format")
+        yield path, Group.CONFIG_FORMATS, file.config_format
+    yield ("robot", "mechanism"), Group.MECHANISMS, settings.robot.mechanism
 
 
 def describe(cell: Cell) -> str:

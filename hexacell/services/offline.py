@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from hexacell.campaign import feasibility
 from hexacell.campaign.decisions import (
@@ -20,20 +21,19 @@ from hexacell.campaign.pose_list import pose_list_of
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses, require_enough
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
-from hexacell.dry_run.campaign import DryRunResult, dry_run
 from hexacell.errors import FileError, HexacellError, UsageError, joined
-from hexacell.identification.estimator import identify
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, RecordId
-from hexacell.noise.measured_noise import AveragingForecast, with_measured_noise
-from hexacell.noise.noise_assessment import WINDOWS, AveragingForecaster, mean_of_independent
 from hexacell.robot.model import robot_of
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services import search_effort
-from hexacell.services.recorded.recorded_robot import commanding_geometries, noise_of_run
 from hexacell.storage.toml_document import KeyPath
-from hexacell.verdict.assessment import Assessment, assess
+
+if TYPE_CHECKING:
+    from hexacell.dry_run.campaign import DryRunResult
+    from hexacell.noise.measured_noise import AveragingForecast
+    from hexacell.verdict.assessment import Assessment
 
 MOST_RECORDS_BEFORE_NEXT = 500
 """The estimate is made again record by record, as in a run."""
@@ -86,14 +86,23 @@ def fit_measurements(
         IdentifiabilityError: the records cannot determine it.
         FileError: the controller's config cannot be read.
     """
-    robot = robot_of(cell)
-    if folder is not None:
+    from hexacell.identification.estimator import identify  # noqa: PLC0415 - not for a plan
+    from hexacell.verdict.assessment import assess  # noqa: PLC0415 - likewise
+
+    robot, settings, measured = robot_of(cell), cell.settings, None
+    if folder is not None and folder.journal.is_file():
+        from hexacell.noise.measured_noise import with_measured_noise  # noqa: PLC0415 - only for a run
+        from hexacell.services.recorded.recorded_robot import (  # noqa: PLC0415 - likewise
+            commanding_geometries,
+            noise_of_run,
+        )
+
         recorded = commanding_geometries(folder, cell.settings)
         robot = replace(robot, earlier=(*recorded, *robot.earlier))
-    settings, measured = cell.settings, None if folder is None else noise_of_run(folder, cell.settings)
-    if measured is not None:
-        settings = with_measured_noise(settings, measured)
-        robot = robot.with_errors_of(settings)
+        measured = noise_of_run(folder, cell.settings)
+        if measured is not None:
+            settings = with_measured_noise(settings, measured)
+            robot = robot.with_errors_of(settings)
     if identify_only is not None:
         robot = replace(robot, identifies=identify_only)
     found = identify(robot.problem(measurements))
@@ -129,6 +138,13 @@ def try_plan(cell: Cell, removed: RemovedPoses = NOTHING_REMOVED) -> PlanTrial:
         UsageError: without what is removed too little is left.
         FileError: see :func:`plan_of`.
     """
+    from hexacell.dry_run.campaign import dry_run  # noqa: PLC0415 - takes seconds anyway
+    from hexacell.noise.noise_assessment import (  # noqa: PLC0415
+        WINDOWS,
+        AveragingForecaster,
+        mean_of_independent,
+    )
+
     require_enough(removed, len(cell.settings.identification.points))
     plan = plan_of(cell, removed)
     averaging, noise = AveragingForecaster(plan), plan.robot.noise

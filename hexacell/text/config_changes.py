@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hexacell.config.layout import names_of
 from hexacell.config.receipt import BEFORE, ConfigVersions, NumberVersions, kept_paths
 from hexacell.config.write_record import WriteKind, WriteRecord
-from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
-from hexacell.services.write_back.config_rollback import ConfigRollback
-from hexacell.services.write_back.proposals import AppliedProposal
 from hexacell.text.layout import wrapped
-from hexacell.text.verdict import teaching_line
+
+if TYPE_CHECKING:
+    from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
+    from hexacell.services.write_back.config_rollback import ConfigRollback
+    from hexacell.services.write_back.proposals import AppliedProposal
 
 RELOAD = "Restart or reload the controller before it moves: until then it has the geometry of before."
 
 
 def applied_text(applied: AppliedProposal) -> str:
     """What an application of a proposal did, and what is to be done next."""
+    from hexacell.text.verdict import teaching_line  # noqa: PLC0415 - only where something was applied
+
     proposal = applied.proposal
     if not applied.by:
         files = files_named(proposal.change.paths, "has", "have")

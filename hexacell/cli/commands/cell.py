@@ -5,13 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 
-from hexacell.cell.loader import describe, schema, settings_document
+from hexacell.cell.loader import describe, require_plugins, schema, settings_document
 from hexacell.cell.passwords import with_passwords
 from hexacell.cli.cell_argument import cell_at, cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
-from hexacell.services.devices.device_setup import require_drivers
-from hexacell.services.offline import plan_of, require_stated_poses
 from hexacell.text.config_changes import files_named
 
 
@@ -30,7 +28,9 @@ def main(options: argparse.Namespace) -> ExitCode:
         if not options.json:
             console.print(describe(cell).rstrip("\n"))
         return ExitCode.DONE
-    require_drivers(cell)
+    from hexacell.services.offline import plan_of, require_stated_poses  # noqa: PLC0415 - only for this action
+
+    require_plugins(cell)
     with_passwords(cell.settings, cell.path.parent)
     require_stated_poses(cell, plan_of(cell))
     console.document({"valid": True, "name": cell.settings.name})

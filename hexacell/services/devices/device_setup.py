@@ -14,18 +14,15 @@ from drivers.serial.shared_port import SharedSerialPorts
 from drivers.stop_input import stop_input_of
 from drivers.wire_trace import WireTrace
 from hexacell.cell.devices import EncoderSettings, GaugeSettings
-from hexacell.cell.loader import Cell, config_paths
+from hexacell.cell.loader import Cell, config_paths, require_plugins
 from hexacell.cell.measuring import NoiseSettings
 from hexacell.cell.model import CellSettings
 from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
-from hexacell.errors import FileError, HexacellError
 from hexacell.kinematics.mechanism import joint_zeros
 from hexacell.plugins import Group, load
 from hexacell.robot.model import config_layout
-from hexacell.storage.toml_document import KeyPath
-from procedures.calibration.preflight import raise_all
 from procedures.devices.device_set import Devices, MountedGauge, Thermometers
 from procedures.run.cancellation import shielded
 
@@ -37,7 +34,7 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
     Raises:
         HexacellError: a protocol has no driver, a password cannot be read, or the simulation cannot start.
     """
-    require_drivers(cell)
+    require_plugins(cell)
     settings = _with_encoder_files(with_passwords(cell.settings, cell.path.parent), cell.path.parent)
     if settings.simulation is None:
         yield settings
@@ -69,38 +66,6 @@ def _with_encoder_files(settings: CellSettings, folder: Path) -> CellSettings:
     if not changes:
         return settings
     return settings.model_copy(update={"encoders": settings.encoders.model_copy(update=changes)})
-
-
-def require_drivers(cell: Cell) -> None:
-    """Make sure that the mechanism, the format of the config and every device's protocol are known.
-
-    Raises:
-        FileError: one is not; the message has its line and names the most similar one.
-        SeveralErrors: more than one.
-    """
-    failures: list[HexacellError] = []
-    for path, group, name in sorted(_plugins(cell.settings), key=lambda one: one[1].value):
-        try:
-            load(group, name)
-        except HexacellError as error:
-            line = cell.document.line_of(path)
-            failures.append(FileError(error.problem, subject=cell.path, line=line, action=error.action))
-    raise_all(failures)
-
-
-def _plugins(settings: CellSettings) -> Iterator[tuple[KeyPath, Group, str]]:
-    """Every name of a plug-in, and where it is in the cell file."""
-    for n, gauge in enumerate(settings.gauges):
-        yield ("gauges", n, "protocol"), Group.GAUGES, gauge.protocol
-    for n, thermometer in enumerate(settings.thermometers):
-        yield ("thermometers", n, "protocol"), Group.THERMOMETERS, thermometer.protocol
-    yield ("encoders", "protocol"), Group.ENCODERS, settings.encoders.protocol
-    yield ("controller", "protocol"), Group.CONTROLLERS, settings.controller.protocol
-    yield ("controller", "config_format"), Group.CONFIG_FORMATS, settings.controller.config_format
-    for n, file in enumerate(settings.controller.further_files):
-        path = ("controller", "further_files", n, "config_format")
-        yield path, Group.CONFIG_FORMATS, file.config_format
-    yield ("robot", "mechanism"), Group.MECHANISMS, settings.robot.mechanism
 
 
 AGREEMENT_SIGMAS = 5.0

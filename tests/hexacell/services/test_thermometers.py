@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from hexacell.cell.devices import ThermometerSettings
+from hexacell.cell.loader import require_plugins
 from hexacell.errors import FileError
-from hexacell.services.devices.device_setup import require_drivers
 from hexacell.services.run.calibration_run import preflight
 from hexacell.services.run.replay_run import replay
 from procedures.calibration.workflow import Mode
@@ -52,4 +52,4 @@ async def test_preflight_names_the_thermometers_that_answer(make_site, tmp_path)
 def test_a_protocol_without_a_driver_is_refused(make_cell, tmp_path) -> None:
     strange = in_the_room(tmp_path).model_copy(update={"protocol": "sysfz"})
     with pytest.raises(FileError, match=r"no thermometer protocol 'sysfz'. Did you mean 'sysfs'\?"):
-        require_drivers(make_cell(thermometers=(strange,)))
+        require_plugins(make_cell(thermometers=(strange,)))

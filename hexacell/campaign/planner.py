@@ -65,7 +65,6 @@ class Plan:
         estimator: estimates the robot from the records; None for the usual one.
         goal: what the records are for; None to identify the geometry as well as the settings ask for.
         earlier: what the systematic effects did to an earlier result that is the prior, by their names.
-        left_points: points that are not measured, counted from 1.
         most_turned: the largest angle from a point's reference to a selected pose, rad, by the estimate.
     """
 
@@ -77,7 +76,6 @@ class Plan:
     estimator: RecordEstimator | None = None
     goal: Goal | None = None
     earlier: Mapping[str, Array] = field(default_factory=dict)
-    left_points: frozenset[int] = frozenset()
     most_turned: float = np.pi
 
     def decide(self, state: CampaignState) -> Decision:
@@ -212,7 +210,7 @@ class Plan:
     def points(self) -> tuple[int, ...]:
         """The points that are measured, counted from 1 among all of the cell."""
         every = range(1, len(self.settings.identification.points) + 1)
-        return tuple(point for point in every if point not in self.left_points)
+        return tuple(point for point in every if point not in self.settings.excluded_points)
 
     @cached_property
     def chooser(self) -> PoseChooser:

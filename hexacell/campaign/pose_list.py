@@ -35,6 +35,8 @@ class PoseList:
 def pose_list_of(cell: Cell) -> PoseList | None:
     """The list that a cell file names, relative to itself; None if poses are to be selected.
 
+    Poses that the cell file excludes are left out.
+
     Raises:
         FileError: it cannot be read, or its points are not those of the cell file.
     """
@@ -60,7 +62,16 @@ def pose_list_of(cell: Cell) -> PoseList | None:
                 subject=path,
                 action="Add poses, or take the point out of the cell file",
             )
-    return PoseList(path, tuple(map(tuple, at_points)))
+    excluded = cell.settings.excluded_commands
+    for number, poses in enumerate(at_points, start=1):
+        if number not in cell.settings.excluded_points and not excluded.allows(poses[0].as_tuple()):
+            raise FileError(
+                f"an exclusion of {cell.path.name} contains the reference of point {number}",
+                subject=path,
+                action=f"Exclude the whole point: point = {number}",
+            )
+    kept = (tuple(pose for pose in poses if excluded.allows(pose.as_tuple())) for poses in at_points)
+    return PoseList(path, tuple(kept))
 
 
 def without_visited(poses: tuple[Pose, ...], visited: list[Pose]) -> tuple[Pose, ...]:

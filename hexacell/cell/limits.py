@@ -6,9 +6,26 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from hexacell.cell.fields import InRange, NotNegative, PointInRange, Positive, Section, Text, broken_rule
+from hexacell.cell.fields import (
+    InRange,
+    NotNegative,
+    PointInRange,
+    Positive,
+    Section,
+    SixInRange,
+    Text,
+    broken_rule,
+)
+from hexacell.kinematics.refused_commands import RefusedCommand
 
 SHORTEST_AXIS = 1e-6
+
+MOST_EXCLUSIONS = 100
+
+NEAR_MM = 30.0
+"""Default of ``within_mm``: the errors of the geometry put a command some 10 mm from its point at most."""
+
+NEAR_DEG = 5.0
 
 
 def _ordered(limits: tuple[float, float]) -> tuple[float, float]:
@@ -75,6 +92,34 @@ class PassiveJointSettings(Section):
     def platform_cones(self) -> tuple[float, ...]:
         """Those of the six legs at the platform, deg."""
         return self.platform_cones_deg or (self.platform_cone_deg,) * 6
+
+
+class ExclusionSettings(Section):
+    """What the robot must not be sent to: a point as a whole, or a pose with all commands near it."""
+
+    point: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="number of a point of [identification], from 1, that is not measured"
+    )
+    pose: SixInRange | None = Field(
+        None, description="x, y, z, a, b, c in the controller's frames, mm and deg, that is never commanded"
+    )
+    within_mm: NotNegative = Field(
+        NEAR_MM, description="nor is any command that is as near to the pose as this and as within_deg"
+    )
+    within_deg: NotNegative = Field(NEAR_DEG, description="deg; 0: this pose alone is excluded")
+
+    @model_validator(mode="after")
+    def _names_a_point_or_a_pose(self) -> Self:
+        if (self.point is None) == (self.pose is None):
+            raise broken_rule("an exclusion is of a point or of a pose", "State one of point and pose")
+        return self
+
+    @property
+    def refused(self) -> RefusedCommand | None:
+        """The excluded commands; None for a point as a whole."""
+        if self.pose is None:
+            return None
+        return RefusedCommand(self.pose, within_mm=self.within_mm, within_deg=self.within_deg)
 
 
 class LimitSettings(Section):

@@ -93,7 +93,12 @@ def load_cell(path: Path) -> Cell:
         FileError: it cannot be read, is no TOML, or has one mistake.
         SeveralErrors: it has more than one; each of ``errors`` is a FileError with its line.
     """
-    document = TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path)
+    return checked_cell(path, read_text(path, LARGEST_FILE_BYTES))
+
+
+def checked_cell(path: Path, text: str) -> Cell:
+    """The cell of a file's text, whether the file holds it yet or not; raises as ``load_cell`` does."""
+    document = TomlDocument.parse(text, path)
     return Cell(path, _checked(document, path), document)
 
 

@@ -21,7 +21,7 @@ from hexacell.cell.fields import (
     broken_rule,
 )
 from hexacell.cell.length_check import LengthCheckSettings
-from hexacell.cell.limits import LimitSettings, SpeedSettings
+from hexacell.cell.limits import MOST_EXCLUSIONS, ExclusionSettings, LimitSettings, SpeedSettings
 from hexacell.cell.measuring import (
     AcceptanceSettings,
     CheckSettings,
@@ -50,8 +50,12 @@ from hexacell.cell.uncertainty import (
 )
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.kinematics.refused_commands import RefusedCommands
 
 MOST_THERMOMETERS = 100
+
+FEWEST_POINTS = 2
+"""Fewest points to measure: one alone does not identify the geometry."""
 
 SectionType = TypeVar("SectionType", bound=Section)
 
@@ -75,6 +79,7 @@ class CellSettings(Section):
     noise: NoiseSettings = NoiseSettings()
     uncertainty: CommonUncertaintySettings = CommonUncertaintySettings()
     limits: LimitSettings = LimitSettings()
+    exclusions: tuple[ExclusionSettings, ...] = Field((), max_length=MOST_EXCLUSIONS)
     speed: SpeedSettings = SpeedSettings()
     timing: TimingSettings = TimingSettings()
     guards: GuardSettings = GuardSettings()
@@ -97,6 +102,16 @@ class CellSettings(Section):
     def mechanism(self) -> Mechanism:
         """The mechanism that the file names; raises ``UsageError`` if it is not installed."""
         return self.robot.built()
+
+    @property
+    def excluded_points(self) -> frozenset[int]:
+        """Numbers of the points, from 1, that the cell file excludes from measuring."""
+        return frozenset(one.point for one in self.exclusions if one.point is not None)
+
+    @property
+    def excluded_commands(self) -> RefusedCommands:
+        """The commands that the cell file excludes."""
+        return RefusedCommands(tuple(one.refused for one in self.exclusions if one.refused is not None))
 
     @property
     def reference_agreement(self) -> tuple[float, float]:
@@ -173,6 +188,36 @@ class CellSettings(Section):
         if len(set(legs)) != len(legs):
             raise broken_rule("two thermometers are on the same leg", "Name each leg once")
         return thermometers
+
+    @model_validator(mode="after")
+    def _exclusions_leave_enough(self) -> Self:
+        """Points exist, enough of them are left, and no reference of a measured point is excluded."""
+        points, excluded = self.identification.points, self.excluded_points
+        references = [point for n, point in enumerate(points, start=1) if n not in excluded]
+        for n, one in enumerate(self.exclusions):
+            refusal = None
+            if one.point is not None and one.point > len(points):
+                refusal = broken_rule(
+                    f"there is no point {one.point}", f"Name one of the {len(points)} points"
+                )
+            elif one.point is not None and len(references) < FEWEST_POINTS:
+                refusal = broken_rule(
+                    f"{len(references)} of {len(points)} points would be left, and the geometry needs "
+                    f"{FEWEST_POINTS}",
+                    "Remove an exclusion",
+                )
+            elif one.refused is not None and not all(
+                RefusedCommands((one.refused,)).allows((*at, 0.0, 0.0, 0.0))
+                for at in (*references, *self.verification.points)
+            ):
+                refusal = broken_rule(
+                    "this excludes the reference of a point, from which its gauges measure",
+                    "Lower within_deg, or exclude the whole point: point = ...",
+                )
+            if refusal is not None:
+                detail = InitErrorDetails(type=refusal, loc=("exclusions", n), input=None)
+                raise ValidationError.from_exception_data(self.name, [detail])
+        return self
 
     @model_validator(mode="after")
     def _the_thermometer_of_the_fixture_exists(self) -> Self:

@@ -51,7 +51,6 @@ class Check:
             its records do not reduce them.
         earlier: what these did to that result, as errors (p, k) of its free parameters by effect.
         effort: of the search for poses.
-        left_points: points that are not measured, counted from 1.
     """
 
     settings: CellSettings
@@ -63,21 +62,19 @@ class Check:
     effects: tuple[Effect, ...] = ()
     earlier: Mapping[str, Array] = field(default_factory=dict)
     effort: SearchEffort = USUAL_EFFORT
-    left_points: frozenset[int] = frozenset()
 
     @cached_property
     def plan(self) -> Plan:
         """What to measure, until the check is decided or its budget is used."""
         drifting = self._drifting
         return Plan(
-            check_settings(self.settings, self.budget, len(self.left_points)),
+            check_settings(self.settings, self.budget),
             self.robot if drifting is None else drifting.robot,
             self.listed,
             self.effort,
             estimator=self._by_drawing if drifting is None else drifting,
             goal=self,
             earlier=self.earlier,
-            left_points=self.left_points,
         )
 
     def reached(self, measurements: MeasurementSet) -> str | None:
@@ -194,13 +191,10 @@ class Check:
         return {}
 
 
-def check_settings(settings: CellSettings, budget: int, left_points: int = 0) -> CellSettings:
-    """A cell's settings with those of a check, of ``budget`` records, in the place of the calibration's.
-
-    ``left_points`` is the number of points that are not measured.
-    """
+def check_settings(settings: CellSettings, budget: int) -> CellSettings:
+    """A cell's settings with those of a check, of ``budget`` records, in the place of the calibration's."""
     plan = settings.identification
-    points = len(plan.points) - left_points
+    points = len(plan.points) - len(settings.excluded_points)
     identification = plan.model_copy(
         update={
             "criterion": "task",

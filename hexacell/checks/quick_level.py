@@ -81,14 +81,13 @@ class QuickLevel:
         """What to measure, until the robot is known as well as before or the budget is used."""
         check, drifting = self.check, self._drifting
         return Plan(
-            check_settings(check.settings, self.budget, len(check.left_points)),
+            check_settings(check.settings, self.budget),
             drifting.robot,
             check.listed,
             check.effort,
             estimator=drifting,
             goal=self,
             earlier=check.earlier,
-            left_points=check.left_points,
         )
 
     @cached_property

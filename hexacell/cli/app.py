@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with stop_signals_as_sigint():
             _require_usable(typed)
             options = parser.parse_args(typed)
-            require_platform(options.target, is_detachable=getattr(options, "detachable", False))
+            require_platform(options.target)
             module, _, command = options.target.partition(".")
             code = getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options)
             return _unless_output_is_lost(int(code), console)

@@ -8,8 +8,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.passwords import password_warnings
 from hexacell.cli.console import Console
 from hexacell.config.pending_write import settle_config
-from hexacell.services.preflight.certificate_warnings import certificate_warnings
-from hexacell.services.preflight.security_warnings import exposure_warnings, telling_warnings
+from hexacell.services.preflight.warnings import certificate_warnings, exposure_warnings, telling_warnings
 
 
 def cell_at(path: Path, console: Console) -> Cell:

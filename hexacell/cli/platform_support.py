@@ -13,16 +13,15 @@ from hexacell.errors import UsageError
 ANYWHERE = {"completion.main"}
 """Commands that work on any system, by module and function."""
 
-OVER_A_SOCKET = {"tui.main", "attach.main", "host.main"}
+OVER_A_SOCKET = {"tui.main", "host.main"}
 """Commands that run, or reach, a run in another process."""
 
 
-def require_platform(target: str, *, is_detachable: bool = False) -> None:
+def require_platform(target: str) -> None:
     """Refuse a command that this operating system cannot carry out; imports nothing of it.
 
     Args:
         target: the command, by module and function in ``hexacell.cli.commands``.
-        is_detachable: whether its run is to be in another process.
 
     Raises:
         UsageError: it has no POSIX locks and terminals (Windows), or does not tell who is at the other end
@@ -33,7 +32,7 @@ def require_platform(target: str, *, is_detachable: bool = False) -> None:
             "this system has no POSIX file locks, terminals and signals, by which hexacell protects a cell",
             action="Use Linux; on Windows install it there with `wsl --install`",
         )
-    if (is_detachable or target in OVER_A_SOCKET) and not hasattr(socket, "SO_PEERCRED"):
+    if target in OVER_A_SOCKET and not hasattr(socket, "SO_PEERCRED"):
         raise UsageError(
             "this system does not tell as Linux does who is at the other end of a local socket, without "
             "which nobody may reach a run in another process",

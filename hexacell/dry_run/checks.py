@@ -1,4 +1,4 @@
-"""Checks and quick levels carried out on a virtual robot that drifted as stated: before anything moves."""
+"""A quick level carried out on a virtual robot that drifted as stated, before anything moves."""
 
 from __future__ import annotations
 
@@ -10,33 +10,14 @@ import numpy as np
 
 from hexacell.campaign.budget import noise_minutes
 from hexacell.campaign.planner import Plan
-from hexacell.checks.check import Check
 from hexacell.checks.quick_level import QuickAccuracy, QuickLevel
-from hexacell.dry_run.campaign import VirtualCampaign, VisitedPose
+from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import HexacellError
 from hexacell.identification.problem.prior import Prior
 from hexacell.robot.virtual_robot import VirtualRobot
 
 MOST_TRIED = 3
 """Number of robots that are tried, where one cannot be measured."""
-
-
-@dataclass(frozen=True, slots=True)
-class CheckTrial:
-    """What a check takes and gives; no records where no robot could be measured.
-
-    Attributes:
-        points: number of points at which is measured.
-        minutes: time to measure there.
-        error_mm: predicted at the worst task pose afterwards, 1 sigma; None without reachable task poses.
-        visited: the poses in their order.
-    """
-
-    records: int = 0
-    points: int = 0
-    minutes: float = 0.0
-    error_mm: float | None = None
-    visited: tuple[VisitedPose, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,28 +28,11 @@ class QuickTrial:
         accuracy: None where no robot could be measured.
         points: number of points at which is measured.
         minutes: time to measure there, without held-out poses.
-        visited: the poses in their order.
     """
 
     accuracy: QuickAccuracy | None
     points: int = 0
     minutes: float = 0.0
-    visited: tuple[VisitedPose, ...] = ()
-
-
-def try_check(check: Check) -> CheckTrial:
-    """Carry a check out on a robot drawn from what is known; takes a second or two."""
-    expected = check.robot.prior if check.before is None else check.before.prior(1.0)
-    for campaign in _on_expected_robots(check.plan, expected):
-        with suppress(HexacellError):
-            return CheckTrial(
-                len(campaign.measurements),
-                campaign.state.begun_points,
-                _minutes_of(campaign),
-                check.predicted_error(campaign.measurements),
-                campaign.visited,
-            )
-    return CheckTrial()
 
 
 def try_quick_level(quick: QuickLevel) -> QuickTrial:
@@ -79,7 +43,6 @@ def try_quick_level(quick: QuickLevel) -> QuickTrial:
                 quick.accuracy(campaign.measurements),
                 campaign.state.begun_points,
                 _minutes_of(campaign),
-                campaign.visited,
             )
     return QuickTrial(None)
 

@@ -1,8 +1,8 @@
-"""Commands that a controller refused or a person took out, and what that says about others.
+"""Commands that a controller refused or the cell file excludes, and what that says about others.
 
 A command beyond the limit of an axis says that every command at least as far out along it is refused as
-well. One that a person took out may concern all that are near it. Any other refusal concerns that command
-alone.
+well. One that the cell file excludes may concern all that are near it. Any other refusal concerns that
+command alone.
 """
 
 from __future__ import annotations
@@ -53,6 +53,10 @@ class RefusedCommands:
     """All of them; none at first."""
 
     commands: tuple[RefusedCommand, ...] = ()
+
+    def __or__(self, others: RefusedCommands) -> RefusedCommands:
+        """These commands and others, each once."""
+        return RefusedCommands(tuple(dict.fromkeys((*self.commands, *others.commands))))
 
     def allow(self, poses: PoseBatch, frames: FrameTransform | None = None) -> Mask:
         """Which of n commands no refusal concerns.

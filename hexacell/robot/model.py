@@ -68,7 +68,7 @@ class Robot:
             that the controller had before in the same run.
         work_frame: the axes of the controller's base frame about which a work frame can be taught.
         effects: systematic ones, as they are stated of the machine.
-        refused: commands that the controller refused in this run, and those that a person took out.
+        refused: commands that the cell file excludes, and those that the controller refused in this run.
         identifies: which parameters are identified.
     """
 
@@ -376,5 +376,6 @@ def make_robot(
         earlier=(drawn,) if taught is None else (drawn, CommandingGeometry.of(mechanism, taught)),
         work_frame=settings.task.work_frame,
         effects=stated_effects(settings),
+        refused=settings.excluded_commands,
         identifies=(ParameterChoice.ZEROS if settings.identification.only_zeros else ParameterChoice.ALL),
     )

@@ -12,7 +12,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.errors import ExitCode, FileError, HexacellError
 from hexacell.run_process.messages import (
     LONGEST_MESSAGE,
@@ -137,34 +136,24 @@ async def connect_to_run(path: Path) -> HostConnection | None:
     return HostConnection(reader, writer)
 
 
-async def start_host(
-    path: Path, arguments: Sequence[str], removed: RemovedPoses = NOTHING_REMOVED
-) -> HostConnection:
+async def start_host(path: Path, arguments: Sequence[str]) -> HostConnection:
     """Start ``hexacell host`` with these arguments, and connect to it; its socket is ``path``.
-
-    A new run goes without what is ``removed`` from its plan.
 
     Raises:
         HostNotStarted: the reason.
     """
-    await asyncio.to_thread(_spawn, list(arguments), removed)
+    await asyncio.to_thread(_spawn, arguments)
     connection = await connect_to_run(path)
     if connection is None:
         raise HostNotStarted(HostFailed(problem="the run's process ended at once"))
     return connection
 
 
-def _spawn(arguments: list[str], removed: RemovedPoses) -> None:
+def _spawn(arguments: Sequence[str]) -> None:
     """Start the process and wait until it listens; it is no child of this one then."""
     told, telling = os.pipe()
-    with (
-        tempfile.NamedTemporaryFile() as without,
-        tempfile.TemporaryFile() as errors,
-        os.fdopen(told, "rb") as answers,
-    ):
-        without.write(removed.model_dump_json().encode())
-        without.flush()
-        command = [sys.executable, "-m", "hexacell", "host", *arguments, "--removed", without.name]
+    with tempfile.TemporaryFile() as errors, os.fdopen(told, "rb") as answers:
+        command = [sys.executable, "-m", "hexacell", "host", *arguments]
         try:
             process = os.posix_spawn(
                 sys.executable, command, os.environ, file_actions=_streams(telling, errors), setsid=True

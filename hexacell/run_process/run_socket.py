@@ -82,7 +82,7 @@ def peer_of(connection: socket.socket) -> tuple[int, int]:
 
 def _bind(listener: socket.socket, path: Path) -> None:
     if is_served(path):
-        raise CellBusy("another process runs this cell", subject=path, action="Attach to its run")
+        raise CellBusy("another process runs this cell", subject=path, action="See it with `hexacell tui`")
     try:
         path.unlink(missing_ok=True)  # of a process that was killed
         os.fchmod(listener.fileno(), 0o600)

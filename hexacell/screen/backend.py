@@ -40,7 +40,7 @@ class ScreenAction(StrEnum):
     CHECK = "check"
     START = "start"
     PREVIEW = "preview"
-    TAKE_OUT = "take out"
+    EXCLUDE = "exclude"
     COMPARE = "compare"
     ROLL_BACK = "roll back"
     APPLY = "apply"
@@ -94,7 +94,7 @@ class Backend(Protocol):
         ...
 
     def plan(self) -> PlanView:
-        """The poses of the plan, which may be taken out of it."""
+        """The poses of the plan, and what the cell file excludes."""
         ...
 
     def measure(self) -> MeasureView:

@@ -6,11 +6,12 @@ import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.passwords import password_warnings
 from hexacell.config.pending_write import settle_config
+from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import UsageError
+from hexacell.kinematics.pose import Pose
 from hexacell.run_process.client import connect_to_run, start_host
 from hexacell.run_process.connection import RunConnection
 from hexacell.run_process.device_watch import watch_devices
@@ -23,8 +24,8 @@ from hexacell.screen.child_process import run_child
 from hexacell.screen.workplace import Preflight, TriedPlan
 from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
 from hexacell.services.history.run_index import PastRun
-from hexacell.services.preflight.plan_draft import PlanPreview
-from hexacell.services.preflight.security_warnings import exposure_warnings
+from hexacell.services.preflight.exclusions import toggle_exclusion
+from hexacell.services.preflight.warnings import exposure_warnings
 from hexacell.services.recorded.journal_soundness import require_sound
 from hexacell.services.recorded.resumption import LATEST, run_to_resume
 from hexacell.services.write_back.config_rollback import roll_back_config
@@ -87,7 +88,7 @@ class CellWorkplace:
         """See :class:`Workplace`."""
         return await connect_to_run(socket_path(self.cell))
 
-    async def start(self, what: str, removed: RemovedPoses) -> RunConnection:
+    async def start(self, what: str) -> RunConnection:
         """See :class:`Workplace`."""
         if what == RESUME:
             folder = run_to_resume(self.cell, LATEST)
@@ -98,7 +99,7 @@ class CellWorkplace:
             folder, mode = new_run(self.cell), mode_of(what).value
             more = ["--length-check"] if what == WITH_LENGTH else []
         arguments = [str(self.cell.path), "--mode", mode, "--folder", str(folder.path), *more]
-        return await start_host(socket_path(self.cell), arguments, removed)
+        return await start_host(socket_path(self.cell), arguments)
 
     async def check(self, what: str) -> Preflight:
         """See :class:`Workplace`."""
@@ -106,11 +107,15 @@ class CellWorkplace:
         items = tuple(ChecklistItem(**{**one, "mark": Mark(one["mark"])}) for one in found["items"])
         return Preflight(items, bool(found["is_ready"]))
 
-    async def preview(self, removed: RemovedPoses) -> TriedPlan:
+    async def preview(self) -> TriedPlan:
         """See :class:`Workplace`."""
-        found = await run_child("hexacell.screen.plan_child", self.cell.path, removed.model_dump_json())
-        preview = found["preview"]
-        return TriedPlan(tuple(found["lines"]), preview and PlanPreview.model_validate(preview))
+        found = await run_child("hexacell.screen.plan_child", self.cell.path)
+        poses = tuple((point, number, Pose(*pose)) for point, number, pose in found["poses"])
+        return TriedPlan(tuple(found["lines"]), poses)
+
+    async def toggle_exclusion(self, name: str, planned: tuple[VisitedPose, ...]) -> None:
+        """See :class:`Workplace`."""
+        self.cell = await asyncio.to_thread(toggle_exclusion, self.cell, name, planned)
 
     async def runs(self) -> tuple[HistoryEntry, ...]:
         """See :class:`Workplace`."""

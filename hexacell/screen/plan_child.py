@@ -7,24 +7,21 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import load_cell
 from hexacell.errors import HexacellError
 from hexacell.services.offline import try_plan
-from hexacell.services.preflight.plan_draft import preview_of
 from hexacell.text.planning import plan_trial_lines
 
 
-def tried_plan_document(path: Path, removed: RemovedPoses) -> dict[str, Any]:
+def tried_plan_document(path: Path) -> dict[str, Any]:
     """What the plan is expected to give, and its poses; or why it cannot be tried."""
     try:
-        trial = try_plan(load_cell(path), removed)
+        trial = try_plan(load_cell(path))
     except HexacellError as error:
-        return {"lines": [str(error)], "preview": None}
-    preview = preview_of(trial).model_dump(mode="json")
-    return {"lines": list(plan_trial_lines(trial)), "preview": preview if trial.result.robots else None}
+        return {"lines": [str(error)], "poses": []}
+    poses = [(point, number, pose.as_tuple()) for point, number, pose in trial.result.visited]
+    return {"lines": list(plan_trial_lines(trial)), "poses": poses}
 
 
 if __name__ == "__main__":
-    what = RemovedPoses.model_validate_json(sys.argv[2])
-    sys.stdout.write(json.dumps(tried_plan_document(Path(sys.argv[1]), what)))
+    sys.stdout.write(json.dumps(tried_plan_document(Path(sys.argv[1]))))

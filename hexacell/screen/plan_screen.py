@@ -1,4 +1,4 @@
-"""The poses of the plan: each may be taken out before the run begins, and put back."""
+"""The poses of the plan, and what the cell file excludes."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from hexacell.screen.widgets.row_list import RowList
 from hexacell.screen.widgets.text_panel import TextPanel
 
 WHAT_TO_PRESS = (
-    "x takes the chosen pose out, or puts it back; on the line of a point the whole point. "
-    "v tries the plan again, Escape goes back."
+    "x excludes the chosen pose in the cell file, or the whole point on its line; on a line with OUT "
+    "it removes that exclusion. v tries the plan again, Escape goes back."
 )
 
 
 class PlanScreen(Screen[None]):
-    """What is taken out and what that costs above, the poses below."""
+    """Exclusions above, the planned poses below."""
 
     AUTO_FOCUS = "#poses"
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("x,space,delete", "take_out", "Take out or put back", show=False),
+        Binding("x,space,delete", "exclude", "Exclude, or remove the exclusion", show=False),
         Binding("v", "app.perform('preview')", "Try the plan", show=False),
         Binding("escape", "dismiss", "Back", show=False),
     ]
@@ -43,9 +43,9 @@ class PlanScreen(Screen[None]):
 
     async def on_option_list_option_selected(self) -> None:
         """Enter does the same."""
-        await self.action_take_out()
+        await self.action_exclude()
 
-    async def action_take_out(self) -> None:
-        """Take out what is chosen, or put it back."""
+    async def action_exclude(self) -> None:
+        """Exclude what is chosen, or remove that exclusion."""
         if (name := self.query_one(RowList).chosen) is not None:
-            await self.run_action(f"app.perform('take out', {name!r})")
+            await self.run_action(f"app.perform('exclude', {name!r})")

@@ -21,7 +21,7 @@ class PreflightScreen(TabScreen):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("enter", "app.perform('check')", "Look at everything", show=False),
         Binding("v", "app.perform('preview')", "Try the plan", show=False),
-        Binding("x", "app.plan", "Take poses out of the plan", show=False),
+        Binding("x", "app.plan", "Planned poses, and exclusions", show=False),
         Binding("s", "app.perform('start', 'optimise')", "Start a calibration", show=False),
         Binding("k", "app.perform('start', 'check')", "Start a check", show=False),
         Binding("K", "app.perform('start', 'quick')", "Start a quick level", show=False),

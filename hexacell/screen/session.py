@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from hexacell.cell.loader import describe
+from hexacell.cell.loader import Cell, describe
 from hexacell.screen.backend import ScreenAction
 from hexacell.screen.device_watcher import DeviceWatcher
 from hexacell.screen.run_follower import RunFollower
@@ -42,9 +42,9 @@ class ScreenSession:
         self._run = RunFollower(now, self._after_run)
         self._devices = DeviceWatcher(workplace.watch, now)
         self._actions = SessionActions(workplace, self._run, self._devices)
-        self._description = tuple(describe(workplace.cell).splitlines())
         self._run_is_over = asyncio.Event()
         self._reviewed: tuple[object, ReviewView] | None = None
+        self._described: tuple[Cell | None, tuple[str, ...]] = (None, ())
 
     @property
     def question_number(self) -> int:
@@ -87,7 +87,9 @@ class ScreenSession:
         if self._devices.problem and not live.gauges:
             live = LiveView(note=self._devices.problem)
         title = f"What {cell.path.name} says; behind each value its line in the file, or default"
-        return CellView(title, live, self._description, self._workplace.warnings)
+        if self._described[0] is not cell:
+            self._described = (cell, tuple(describe(cell).splitlines()))
+        return CellView(title, live, self._described[1], self._workplace.warnings)
 
     def _live(self) -> LiveView:
         if self._actions.is_running:
@@ -107,9 +109,10 @@ class ScreenSession:
         )
 
     def plan(self) -> PlanView:
-        """The poses of the plan, which may be taken out of it."""
+        """The poses of the plan, and what the cell file excludes."""
         plan = self._actions.plan
-        return plan_view(plan.draft, is_trying=plan.is_trying)
+        poses = () if plan.tried is None else plan.tried.poses
+        return plan_view(self._workplace.cell.settings, poses, is_trying=plan.is_trying)
 
     def measure(self) -> MeasureView:
         """The run that is being measured; its devices are shown even where none has begun."""

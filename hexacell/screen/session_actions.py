@@ -32,7 +32,13 @@ OF_A_RUN = frozenset(
     }
 )
 WITHOUT_A_RUN = frozenset(
-    {ScreenAction.CHECK, ScreenAction.START, ScreenAction.ROLL_BACK, ScreenAction.APPLY}
+    {
+        ScreenAction.CHECK,
+        ScreenAction.START,
+        ScreenAction.EXCLUDE,
+        ScreenAction.ROLL_BACK,
+        ScreenAction.APPLY,
+    }
 )
 OF_A_RECORDING = frozenset({ScreenAction.STEP, ScreenAction.PLAY})
 SPEEDS = (0.0, 1.0, 10.0, 60.0, 600.0)
@@ -73,7 +79,7 @@ class SessionActions:
             ScreenAction.CHECK: self._check,
             ScreenAction.START: self._start,
             ScreenAction.PREVIEW: self._preview,
-            ScreenAction.TAKE_OUT: self._take_out,
+            ScreenAction.EXCLUDE: self._exclude,
             ScreenAction.COMPARE: self._compare,
             ScreenAction.ROLL_BACK: self._roll_back,
             ScreenAction.APPLY: self._apply,
@@ -151,8 +157,7 @@ class SessionActions:
         await self._devices.stop()
         self.findings.is_starting = True
         try:
-            await self._follow(await self._workplace.start(what, self.plan.removed))
-            self.plan.forget()  # the next run has everything again
+            await self._follow(await self._workplace.start(what))
         except BaseException:
             self._devices.start()
             raise
@@ -161,13 +166,15 @@ class SessionActions:
         return ""
 
     async def _preview(self, how_often: str) -> str:
-        is_enough = how_often == ONCE and (self.plan.is_trying or self.plan.draft is not None)
+        is_enough = how_often == ONCE and (self.plan.is_trying or self.plan.tried is not None)
         if not is_enough:
             await self.plan.try_again()
         return ""
 
-    async def _take_out(self, name: str) -> str:
-        await self.plan.take_out(name)
+    async def _exclude(self, name: str) -> str:
+        tried = self.plan.tried
+        await self._workplace.toggle_exclusion(name, () if tried is None else tried.poses)
+        await self.plan.try_again()
         return ""
 
     async def _compare(self, run: str) -> str:

@@ -6,11 +6,10 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell
+from hexacell.dry_run.campaign import VisitedPose
 from hexacell.run_process.connection import RunConnection
 from hexacell.run_process.snapshots import LiveSnapshot
-from hexacell.services.preflight.plan_draft import PlanPreview
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry
 from procedures.run.questions import Question
 
@@ -25,10 +24,10 @@ class Preflight:
 
 @dataclass(frozen=True, slots=True)
 class TriedPlan:
-    """What a plan gives in lines of text, and its poses; none where it could not be tried."""
+    """What a plan gives in lines of text, and its poses; empty where it could not be tried."""
 
-    lines: tuple[str, ...]
-    preview: PlanPreview | None = None
+    lines: tuple[str, ...] = ()
+    poses: tuple[VisitedPose, ...] = ()
 
 
 class Workplace(Protocol):
@@ -52,19 +51,20 @@ class Workplace(Protocol):
         """The run that goes on in this cell, if one does."""
         ...
 
-    async def start(self, what: str, removed: RemovedPoses) -> RunConnection:
-        """Begin a run in a process of its own: the name of a mode; or resume the latest interrupted one.
-
-        A new one goes without what is ``removed`` from the plan.
-        """
+    async def start(self, what: str) -> RunConnection:
+        """Begin a run in a process of its own: the name of a mode; or resume the latest interrupted one."""
         ...
 
     async def check(self, what: str) -> Preflight:
         """Look at everything that must hold before the motion of a mode; needs the devices."""
         ...
 
-    async def preview(self, removed: RemovedPoses) -> TriedPlan:
-        """Carry the plan, without what is ``removed``, out on simulated robots."""
+    async def preview(self) -> TriedPlan:
+        """Carry the plan out on simulated robots."""
+        ...
+
+    async def toggle_exclusion(self, name: str, planned: tuple[VisitedPose, ...]) -> None:
+        """Write an exclusion into the cell file, or remove it."""
         ...
 
     async def runs(self) -> tuple[HistoryEntry, ...]:

@@ -18,7 +18,6 @@ from hexacell.campaign.decisions import (
 from hexacell.campaign.feasibility import unreachable_share
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import pose_list_of
-from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses, require_enough
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.errors import FileError, HexacellError, UsageError, joined
@@ -131,11 +130,10 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
     return NextPose(decision, forecast, tuple(sorted(plan.estimate(state).false_records)))
 
 
-def try_plan(cell: Cell, removed: RemovedPoses = NOTHING_REMOVED) -> PlanTrial:
+def try_plan(cell: Cell) -> PlanTrial:
     """Carry out a cell's plan on robots drawn within its tolerances; takes some seconds.
 
     Raises:
-        UsageError: without what is removed too little is left.
         FileError: see :func:`plan_of`.
     """
     from hexacell.dry_run.campaign import dry_run  # noqa: PLC0415 - takes seconds anyway
@@ -145,8 +143,7 @@ def try_plan(cell: Cell, removed: RemovedPoses = NOTHING_REMOVED) -> PlanTrial:
         mean_of_independent,
     )
 
-    require_enough(removed, len(cell.settings.identification.points))
-    plan = plan_of(cell, removed)
+    plan = plan_of(cell)
     averaging, noise = AveragingForecaster(plan), plan.robot.noise
     return PlanTrial(
         dry_run(plan),
@@ -157,12 +154,9 @@ def try_plan(cell: Cell, removed: RemovedPoses = NOTHING_REMOVED) -> PlanTrial:
     )
 
 
-def plan_of(cell: Cell, removed: RemovedPoses = NOTHING_REMOVED) -> Plan:
+def plan_of(cell: Cell) -> Plan:
     """The plan of a cell; raises ``FileError`` if its config or its list of poses cannot be read."""
-    robot = replace(robot_of(cell), refused=removed.refused)
-    listed = removed.left_of(pose_list_of(cell))
-    left = frozenset(removed.points)
-    return Plan(cell.settings, robot, listed, search_effort.EFFORT, left_points=left)
+    return Plan(cell.settings, robot_of(cell), pose_list_of(cell), search_effort.EFFORT)
 
 
 def _state_of_records(plan: Plan, measurements: MeasurementSet, rejections: int) -> CampaignState:

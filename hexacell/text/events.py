@@ -8,7 +8,6 @@ from hexacell.campaign.decisions import Forecast
 from hexacell.campaign.pilots import pilot_number
 from hexacell.text.layout import wrapped
 from hexacell.text.measured_noise import noise_and_averaging_text
-from hexacell.text.plan_draft import removed_summary
 from hexacell.text.planning import quick_accuracy_text, quick_start_text, run_forecast_line
 from hexacell.text.verdict import check_start_text, check_text, length_text, verification_text
 from procedures.run import events
@@ -134,10 +133,7 @@ def _basis_or_verdict(event: events.RunStarted | events.ResultValidated) -> str 
     """What a check starts from, and the verdict of any run."""
     if isinstance(event, events.RunStarted):
         quick = quick_start_text(event.accepted) if event.mode == "quick" else None
-        basis = quick if event.mode in {"quick", "optimise"} else check_start_text(event.accepted)
-        removed = removed_summary(event.removed)
-        told = f"left out of the plan: {removed}" if removed else None
-        return "\n".join(filter(None, (basis, told))) or None
+        return quick if event.mode in {"quick", "optimise"} else check_start_text(event.accepted)
     if event.verification is not None:
         return verification_text(event.verification)
     if event.length is not None:

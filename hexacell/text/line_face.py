@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import shlex
-
 from hexacell.campaign.decisions import Forecast
-from hexacell.run_process.messages import ControlChanged, RunDescribed
 from hexacell.run_process.snapshots import GaugeSnapshot, LiveSnapshot
 from hexacell.text.events import set_name
 from hexacell.text.layout import duration, wrapped
@@ -18,22 +15,6 @@ LETTERS = (
     "u undo the last record, m measure this point again (m 3: its record 3),\n"
     "g what the gauges show, s where the run is, a abort."
 )
-DETACHABLE_LETTERS = f"{LETTERS}\nq leave, and the run goes on; t take control from another terminal."
-
-
-def attached_resume_hint(run: RunDescribed) -> str:
-    """How to resume a run that ended early in a process of its own."""
-    command = "length" if run.mode == "length" else "run"
-    mode = ["--mode", run.mode] if run.mode in {"check", "quick"} else []
-    words = ["hexacell", command, str(run.cell_file), "--resume", str(run.folder), *mode]
-    return f"What was measured is kept. To continue:\n  {shlex.join(words)}"
-
-
-def control_text(changed: ControlChanged) -> str:
-    """Who gives the commands to a run now."""
-    if changed.is_in_control:
-        return "You are in control of this run."
-    return f"{changed.who or 'Nobody'} is in control of this run; type t to take over."
 
 
 def run_status_text(

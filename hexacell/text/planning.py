@@ -9,7 +9,7 @@ from pathlib import Path
 from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.checks.quick_level import QuickAccuracy
-from hexacell.dry_run.checks import CheckTrial, QuickTrial
+from hexacell.dry_run.checks import QuickTrial
 from hexacell.dry_run.verdict_forecast import NOISE, WANTED, VerdictForecast
 from hexacell.measurements.records import RecordId
 from hexacell.results.result import AcceptedResult
@@ -219,19 +219,4 @@ def quick_trial_text(trial: QuickTrial) -> str:
         f"{trial.accuracy.records} records at {trial.points} points, in about {duration(trial.minutes)}, "
         "and then the held-out poses as after a calibration. Expected of a robot that drifted as "
         f"drift_per_parameter_mm in [check] states: {quick_accuracy_sentences(trial.accuracy)}"
-    )
-
-
-def check_trial_text(trial: CheckTrial) -> str:
-    """The time and the outcome expected of a check."""
-    if not trial.records:
-        return "No simulated robot that drifted as stated could be measured: a check may fail."
-    error = (
-        "" if trial.error_mm is None else f"; {trial.error_mm:.3f} mm at the worst task pose (one sigma)"
-    )
-    measured = f"{trial.records} records at {trial.points} points"
-    return (
-        f"A check: {measured}, in about {duration(trial.minutes)}{error}. That is of a robot "
-        "that drifted as drift_per_parameter_mm in [check] states; it takes more where the error is "
-        "near the limit."
     )

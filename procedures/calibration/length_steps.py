@@ -82,7 +82,7 @@ class LengthSteps:
             )
         pose = self._pose(key, orientation, self._off(state, key)).as_tuple()
         move = Move(at=key, orientation=orientation, pose=pose)
-        if not state.refused.allows(pose):
+        if not self.sets.robot.refused.allows(pose):
             raise NoSafePath(
                 f"{key}: the controller refuses {move.target} in seat {seat_of(key)} of the fixture",
                 action="Lower tilt_deg in [length_check], or put the fixture elsewhere",

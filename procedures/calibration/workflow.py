@@ -20,7 +20,6 @@ import numpy as np
 
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
-from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.cell.model import CellSettings
 from hexacell.checks.check import Check, identified_before
 from hexacell.checks.quick_level import QuickLevel
@@ -64,7 +63,6 @@ class Calibration:
             drawing. A length check and the quick level have one.
         measured_noise: what settings and robot contain of it; none before it is measured.
         length_check: whether the length scale of a calibration is checked.
-        removed: what a person took out of the plan; see :meth:`without`.
         effort: of the search for poses.
     """
 
@@ -75,18 +73,12 @@ class Calibration:
     accepted: AcceptedResult | None = None
     measured_noise: MeasuredNoise | None = None
     length_check: bool = False
-    removed: RemovedPoses = NOTHING_REMOVED
     effort: SearchEffort = USUAL_EFFORT
 
     def __post_init__(self) -> None:
         # Checks, and the quick level that carries one on, have to do with all that may have drifted.
         if self.mode is not Mode.OPTIMISE and self.robot.identifies is not ParameterChoice.ALL:
             object.__setattr__(self, "robot", replace(self.robot, identifies=ParameterChoice.ALL))
-
-    def without(self, removed: RemovedPoses) -> Calibration:
-        """The same without what a person took out of its plan."""
-        robot = replace(self.robot, refused=removed.refused)
-        return replace(self, robot=robot, listed=removed.left_of(self.listed), removed=removed)
 
     @property
     def length_poses(self) -> tuple[tuple[str, Pose], ...]:
@@ -126,7 +118,6 @@ class Calibration:
             robot.effects,
             {} if accepted is None else accepted.parameter_columns,
             self.effort,
-            frozenset(self.removed.points),
         )
 
     @cached_property
@@ -137,7 +128,8 @@ class Calibration:
     def informed(self, state: RunState) -> Calibration:
         """The same with what the run has learnt: its noise, and poses that are not commanded."""
         known = self._with_measured_noise(state)
-        return known if known.robot.refused == state.refused else known._without(state.refused)
+        refused = known.robot.refused | state.refused
+        return known if known.robot.refused == refused else known._without(refused)
 
     def _without(self, refused: RefusedCommands) -> Calibration:
         """The same where some poses are not commanded."""
@@ -341,8 +333,7 @@ class Calibration:
         return Measuring(self._calibrating(self.robot_checked if self.mode is Mode.LENGTH else self.robot))
 
     def _calibrating(self, robot: Robot) -> Plan:
-        left_points = frozenset(self.removed.points)
-        return Plan(self.settings, robot, self.listed, self.effort, left_points=left_points)
+        return Plan(self.settings, robot, self.listed, self.effort)
 
     @cached_property
     def _with_noise(self) -> dict[MeasuredNoise, Calibration]:

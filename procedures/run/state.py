@@ -117,10 +117,10 @@ class RunState:
 
     @property
     def refused(self) -> RefusedCommands:
-        """What a person took out and the controller refused, as the limits of motion know it."""
-        removed = () if self.started is None else self.started.removed.refused.commands
-        excluded = (RefusedCommand(one.pose, one.axis, one.is_highest) for one in self.excluded)
-        return RefusedCommands((*removed, *excluded))
+        """The commands that the controller refused in this run."""
+        return RefusedCommands(
+            tuple(RefusedCommand(one.pose, one.axis, one.is_highest) for one in self.excluded)
+        )
 
     def is_left(self, key: SetKey) -> bool:
         """Whether a set cannot be measured, because its reference was refused."""

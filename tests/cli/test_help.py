@@ -18,7 +18,6 @@ COMMANDS = (
     "demo",
     "run",
     "tui",
-    "attach",
     "length",
     "preflight",
     "simulate",

@@ -52,11 +52,8 @@ def test_without_posix_there_are_help_and_completion(tmp_path, command):
     assert (ended.returncode, ended.stderr) == (0, "")
 
 
-@pytest.mark.parametrize(
-    "command", [["tui", "cell.toml"], ["attach", "cell.toml"], ["run", "cell.toml", "--detachable"]]
-)
-def test_a_run_in_another_process_needs_a_socket_that_tells_its_peer(tmp_path, command):
-    ended = typed(LIKE_MACOS, tmp_path, *command)
+def test_a_run_in_another_process_needs_a_socket_that_tells_its_peer(tmp_path):
+    ended = typed(LIKE_MACOS, tmp_path, "tui", "cell.toml")
     assert ended.returncode == 2
     assert ended.stderr.startswith(
         "hexacell: this system does not tell as Linux does who is at the other end"

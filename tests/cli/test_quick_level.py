@@ -2,18 +2,9 @@
 
 from __future__ import annotations
 
-import io
-import re
-from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
-
-from hexacell.cell.loader import load_cell
-from hexacell.cli.console import Console
-from hexacell.cli.plan_dialog import PlanDialog
-from hexacell.errors import AnswerNeeded
-from procedures.calibration.workflow import Mode
 
 pytestmark = pytest.mark.usefixtures("few_candidates")
 
@@ -34,31 +25,14 @@ def test_without_a_result_it_says_what_to_do(typed_here, cell_folder, command) -
     assert cell_folder.runs() == []
 
 
-def plan_shown(cell: Path, mode: Mode, monkeypatch: pytest.MonkeyPatch) -> str:
-    """What is shown of the plan of a run before it is begun, which it is not."""
-    shown = io.StringIO()
-    monkeypatch.setattr("sys.stdin", io.StringIO("q\n"))
-    with redirect_stdout(shown), pytest.raises(AnswerNeeded):
-        PlanDialog(load_cell(cell), mode, Console()).choose()
-    return " ".join(shown.getvalue().split())
-
-
 @pytest.mark.slow
-def test_from_a_calibration_on(typed_here, cell_folder, monkeypatch) -> None:
+def test_from_a_calibration_on(typed_here, cell_folder) -> None:
     """What is told before, at the end, in the history, in the report, and to programs."""
     assert typed_here("run", cell_folder.cell, "--unattended", "--mode", "optimise").code == 0
     before = typed_here("preflight", cell_folder.cell, "--mode", "quick", "--json").document["expected"]
     assert 12 <= before["quick"]["records"] <= 20
     shown = typed_here("preflight", cell_folder.cell, "--mode", "quick")
     assert "and then the held-out poses as after a calibration" in " ".join(shown.out.split())
-
-    planned = plan_shown(cell_folder.cell, Mode.QUICK, monkeypatch)
-    assert f"{before['quick']['records']} records at 5 points" in planned
-    assert len(re.findall(r" \d\.\d+ a +-?\d", planned)) == before["quick"]["records"]
-    assert "will give about" not in planned
-    checked = plan_shown(cell_folder.cell, Mode.CHECK, monkeypatch)
-    [records] = map(int, re.findall(r"A check: (\d+) records", checked))
-    assert len(re.findall(r" \d\.\d+ a +-?\d", checked)) == records < before["quick"]["records"]
 
     done = typed_here("run", cell_folder.cell, "--unattended", "--mode", "quick", "--json")
     assert done.code == 0, done.err

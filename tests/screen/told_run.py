@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell
+from hexacell.dry_run.campaign import VisitedPose
 from hexacell.run_process.connection import RunConnection
 from hexacell.run_process.messages import (
     ControlChanged,
@@ -150,7 +150,8 @@ class ToldWorkplace:
     opened: RunConnection | None = None
     begun: list[str] = field(default_factory=list)
     checked: list[str] = field(default_factory=list)
-    removed: list[RemovedPoses] = field(default_factory=list)
+    toggled: list[str] = field(default_factory=list)
+    tried: int = 0
     rolled_back: list[tuple[str, str]] = field(default_factory=list)
 
     async def watch(self) -> AsyncIterator[LiveSnapshot]:
@@ -161,19 +162,21 @@ class ToldWorkplace:
     async def attach(self) -> RunConnection | None:
         return self.run
 
-    async def start(self, what: str, removed: RemovedPoses) -> RunConnection:
+    async def start(self, what: str) -> RunConnection:
         assert self.started is not None, what
         self.begun.append(what)
-        self.removed.append(removed)
         return self.started
 
     async def check(self, what: str) -> Preflight:
         self.checked.append(what)
         return self.preflight
 
-    async def preview(self, removed: RemovedPoses) -> TriedPlan:
-        self.removed.append(removed)
+    async def preview(self) -> TriedPlan:
+        self.tried += 1
         return self.plan
+
+    async def toggle_exclusion(self, name: str, planned: tuple[VisitedPose, ...]) -> None:
+        self.toggled.append(name)
 
     async def runs(self) -> tuple[HistoryEntry, ...]:
         return self.entries

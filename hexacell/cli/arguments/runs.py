@@ -13,7 +13,6 @@ def add_run_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own ty
     _demo(commands)
     _run(commands)
     _tui(commands)
-    _attach(commands)
     _length(commands)
     _preflight(commands)
     _simulate(commands)
@@ -53,32 +52,17 @@ def _run(commands: Any) -> None:  # noqa: ANN401
         "optimise: calibrate and write back (default otherwise)",
     )
     parser.add_argument(
-        "--plan",
-        action="store_true",
-        help="show the poses of the plan first, each of which may be taken out",
-    )
-    parser.add_argument(
         "--length-check",
         action="store_true",
         help="check the length scale before the verdict, with the fixture of [length_check]; a resumed run "
         "has it if it was begun with it",
     )
     add_file(parser, "--events", "write each event there, as a line of JSON, as it happens")
-    parser.add_argument(
-        "--detachable",
-        action="store_true",
-        help="in a process of its own, which goes on when this terminal is left (see attach)",
-    )
     add_json(parser)
 
 
 def _tui(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "tui", "the technician's screen: measure, review, approve, roll back")
-    add_cell(parser)
-
-
-def _attach(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(commands, "attach", "come back to a run that goes on without a terminal")
     add_cell(parser)
 
 
@@ -131,4 +115,3 @@ def _host(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument("--mode", choices=("check", "quick", "optimise", "length"), required=True)
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--length-check", action="store_true")
-    parser.add_argument("--removed", type=Path, required=True)

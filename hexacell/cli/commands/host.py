@@ -13,7 +13,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from socket import socket
 
-from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
 from hexacell.cli.signal_commands import SignalCommands
@@ -80,7 +79,6 @@ def _request(options: argparse.Namespace) -> RunRequest:
         operator=RemoteOperator(),
         resume=options.resume,
         length_check=options.length_check,
-        removed=RemovedPoses.model_validate_json(options.removed.read_bytes()),
     )
 
 

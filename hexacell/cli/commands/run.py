@@ -9,12 +9,9 @@ from contextlib import closing
 from dataclasses import replace
 
 from hexacell.campaign.pose_list import pose_list_of
-from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell
 from hexacell.cli.cell_argument import cell_with_devices_at
-from hexacell.cli.commands.attach import run_detachable
 from hexacell.cli.console import Console
-from hexacell.cli.plan_dialog import PlanDialog
 from hexacell.cli.progress import RunProgress
 from hexacell.cli.run_status import RunStatus
 from hexacell.cli.signal_commands import SignalCommands
@@ -68,30 +65,10 @@ def main(options: argparse.Namespace) -> ExitCode:
         )
     console = Console(options.json)
     request = replace(_request(options, console, mode), length_check=options.length_check)
-    if options.plan:
-        request = replace(request, removed=_removed(request, console))
-    if options.detachable:
-        if request.unattended or options.json:
-            raise UsageError(
-                "a run that terminals attach to needs somebody at a terminal, and prints no document",
-                action="Leave --detachable away",
-            )
-        if options.events is not None:
-            raise UsageError("a run that terminals attach to writes no events", action="Read its journal")
-        return run_detachable(request, console)
     if options.events is None:
         return _run_to_end(request, console)
     with closing(EventStream(options.events, console.warn)) as stream:
         return _run_to_end(request, console, stream)
-
-
-def _removed(request: RunRequest, console: Console) -> RemovedPoses:
-    """What a person takes out of the plan; raises ``UsageError`` where nobody can, or too late."""
-    if request.resume:
-        raise UsageError("the plan of a run that is resumed stays as it was", action="Leave --plan away")
-    if request.unattended:
-        raise UsageError("--plan needs somebody at a terminal", action="Leave it away")
-    return PlanDialog(request.cell, request.mode, console).choose()
 
 
 def length(options: argparse.Namespace) -> ExitCode:

@@ -1,1 +1,1 @@
-"""What must hold before a run: stated poses, certificates, security."""
+"""Before a run: warnings about the cell, and the exclusions in its file."""

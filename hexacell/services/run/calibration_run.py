@@ -11,7 +11,6 @@ from pathlib import Path
 from drivers.interfaces import DeviceIdentity
 from hexacell import __version__
 from hexacell.campaign.pose_list import pose_list_of
-from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses, require_enough
 from hexacell.cell.loader import Cell
 from hexacell.config.layout import CurrentConfig, fingerprint
 from hexacell.config.pending_write import held_config
@@ -60,7 +59,6 @@ def _watch_nothing(_engine: Engine, _devices: Devices) -> None:
 class RunRequest:
     """One run of a cell, new or resumed, and the folder that keeps it.
 
-    ``removed`` is what a person took out of the plan of a new one; a resumed one keeps its own.
     ``keeps_hours`` is whether the cell's quiet hours, window and longest duration hold for it.
     """
 
@@ -71,7 +69,6 @@ class RunRequest:
     unattended: bool = False
     resume: bool = False
     length_check: bool = False
-    removed: RemovedPoses = NOTHING_REMOVED
     keeps_hours: bool = False
 
 
@@ -115,9 +112,7 @@ async def calibrate(
         started = _resumed_start(request) if request.resume else None
         if started is None:
             _require_own_geometry(cell)
-            require_enough(request.removed, len(cell.settings.identification.points))
-            whole = new_calibration(cell, request.mode, length_check=request.length_check)
-            calibration = whole.without(request.removed)
+            calibration = new_calibration(cell, request.mode, length_check=request.length_check)
         else:
             calibration = calibration_of_run(cell, started)
         async with _checked_devices(cell, calibration, folder.path, request.unattended) as connected:
@@ -245,7 +240,6 @@ def run_started(
         joint_ranges=robot.limits.joint_ranges,
         limits=controller_geometry(cell).limits,
         length_check=calibration.length_check,
-        removed=calibration.removed,
         expired=cell.settings.expired_on(datetime.now(UTC).date()),
     )
 
@@ -299,7 +293,7 @@ def calibration_of_run(cell: Cell, started: events.RunStarted) -> Calibration:
         started.accepted,
         length_check=started.length_check,
         effort=search_effort.EFFORT,
-    ).without(started.removed)
+    )
 
 
 def new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Calibration:

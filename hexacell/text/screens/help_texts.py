@@ -14,8 +14,8 @@ Everything that must hold before the robot moves, one line each:
   ok  it holds      NO  it does not, with what to do
   ..  being looked at      --  not looked at yet
 Enter looks at all of it; nothing moves. v tries the plan on simulated robots and says how many records and
-minutes it takes and how accurate the robot will be. x shows its poses: take out what the robot must not be
-sent to, for the next run. s starts a calibration, k a check that changes nothing,
+minutes it takes and how accurate the robot will be. x shows its poses: x there excludes, in the cell file,
+what the robot must not be sent to. s starts a calibration, k a check that changes nothing,
 K the quick level, which corrects with fewer records what has drifted since the last result, r goes on with
 the latest run that was interrupted. In a cell with a fixture of known length, l checks the length scale,
 and L calibrates and checks it before the verdict. Everything is looked at again before the first move.""",

@@ -1,9 +1,12 @@
-"""Text for the screen on which poses are taken out of a plan."""
+"""Text for the list of planned poses, in which a key excludes what the robot must not be sent to."""
 
 from __future__ import annotations
 
-from hexacell.services.preflight.plan_draft import PlanDraft
-from hexacell.text.plan_draft import plan_rows, removed_text
+from collections.abc import Iterator, Sequence
+
+from hexacell.cell.limits import ExclusionSettings
+from hexacell.cell.model import CellSettings
+from hexacell.dry_run.campaign import VisitedPose
 from hexacell.text.screens.live import TRYING
 from hexacell.text.screens.views import PlanView
 
@@ -11,9 +14,52 @@ NOT_TRIED = "v in 2 Preflight tries the plan; then its poses are here."
 EVERYTHING = "These poses were measured on a simulated robot; a real one is sent to others near them."
 
 
-def plan_view(draft: PlanDraft | None, *, is_trying: bool = False) -> PlanView:
-    """The poses; none before the plan was tried."""
-    trying = f" {TRYING}" if is_trying else ""
-    if draft is None:
-        return PlanView(TRYING if is_trying else NOT_TRIED)
-    return PlanView(f"{removed_text(draft) or EVERYTHING}{trying}", plan_rows(draft))
+def plan_view(
+    settings: CellSettings, planned: Sequence[VisitedPose], *, is_trying: bool = False
+) -> PlanView:
+    """The exclusions of the cell file, and the planned poses, once the plan was tried."""
+    notes = [EVERYTHING] if planned else [] if is_trying else [NOT_TRIED]
+    rows = [*_exclusions(settings), *(_poses(settings, planned) if planned else ())]
+    return PlanView(" ".join([*notes, *([TRYING] if is_trying else [])]), tuple(rows))
+
+
+def exclusions_text(settings: CellSettings) -> str:
+    """How much the cell file excludes; empty if nothing."""
+    points = [f"point {point}" for point in sorted(settings.excluded_points)]
+    poses = len(settings.excluded_commands.commands)
+    parts = [*([f"{poses} pose{'s' * (poses > 1)}"] if poses else []), *points]
+    return f"Excluded by the cell file: {', '.join(parts)}." if parts else ""
+
+
+def _exclusions(settings: CellSettings) -> Iterator[tuple[str, str]]:
+    for number, one in enumerate(settings.exclusions, start=1):
+        yield f"e{number}", f"OUT  {f'e{number}':>7}  {_excluded(settings, one)}"
+
+
+def _excluded(settings: CellSettings, one: ExclusionSettings) -> str:
+    if one.pose is None:
+        return f"point {one.point}, {_place(settings.identification.points[(one.point or 1) - 1])}"
+    near = f", and within {one.within_mm:g} mm and {one.within_deg:.1f} deg" if one.within_deg else ""
+    return f"{_place(one.pose)}  {_angles(one.pose)}{near}"
+
+
+def _poses(settings: CellSettings, planned: Sequence[VisitedPose]) -> Iterator[tuple[str, str]]:
+    """A row for each point that is measured, and below it one for each of its poses."""
+    excluded = settings.excluded_commands
+    for number, position in enumerate(settings.identification.points, start=1):
+        if number in settings.excluded_points:
+            continue
+        here = [one for one in planned if one[0] == number and excluded.allows(one[2].as_tuple())]
+        yield str(number), f"     point {number}, {_place(position)}: {len(here)} records"
+        for _, orientation, pose in here:
+            name = f"{number}.{orientation}"
+            reference = "  reference" if orientation == 1 else ""
+            yield name, f"     {name:>7}  {_angles(pose.as_tuple())}{reference}"
+
+
+def _place(pose: Sequence[float]) -> str:
+    return "  ".join(f"{axis} {value:.1f}" for axis, value in zip("xyz", pose[:3], strict=True))
+
+
+def _angles(pose: Sequence[float]) -> str:
+    return "  ".join(f"{axis} {value:6.1f}" for axis, value in zip("abc", pose[3:], strict=True)) + " deg"

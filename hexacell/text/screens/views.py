@@ -235,9 +235,9 @@ class ChecklistView:
 
 @dataclass(frozen=True, slots=True)
 class PlanView:
-    """The poses of a plan; ``note`` says what is left out and what that costs, or why there are none.
+    """Exclusions and the poses of a plan; ``note`` says where they come from, or why there are none.
 
-    Each row is the name of a point or a pose, and a line of text.
+    Each row is the name of a point, a pose or an exclusion, and a line of text.
     """
 
     note: str

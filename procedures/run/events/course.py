@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Literal, Self
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.config.interface import ControllerLimits
@@ -25,7 +24,6 @@ class RunStarted(Frozen):
     has one.
     ``joint_ranges`` are those of cell file and config together, mm; none in runs of older versions.
     ``limits`` are what the controller's config and its INI file state; none in runs of older versions, too.
-    ``removed`` is what a person took out of the plan: it is neither measured nor commanded.
     ``expired`` are the instruments whose certificate had expired on the day it began.
     ``config`` is the controller's config or its first file, ``further_configs`` are the others, and
     ``config_sha256`` is the fingerprint of all.
@@ -47,7 +45,6 @@ class RunStarted(Frozen):
     length_check: bool = False
     joint_ranges: tuple[tuple[float, float], ...] | None = None
     limits: ControllerLimits | None = None
-    removed: RemovedPoses = RemovedPoses()
     expired: tuple[str, ...] = ()
     further_configs: tuple[str, ...] = ()
 

@@ -1,8 +1,9 @@
-"""What makes it easy for others to move the robot or to read its passwords; a run goes on all the same."""
+"""Warnings before a run: expired certificates, and what lets others move the robot or read passwords."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from urllib.parse import urlsplit
 
 from drivers.listening_ports import accepts_from_network, is_loopback
@@ -12,14 +13,23 @@ from hexacell.cell.operation import scheme_of
 IN_CLEAR = ("http", "mqtt")
 
 
+def certificate_warnings(cell: Cell) -> Iterator[str]:
+    """One for each instrument whose certificate has expired today."""
+    for name in cell.settings.expired_on(datetime.now(UTC).date()):
+        due = cell.settings.certificates[name].due
+        yield (
+            f"the certificate of {name} expired on {due}: a person must approve what is found with it. "
+            "Have it calibrated, and state its new certificate"
+        )
+
+
 def telling_warnings(cell: Cell) -> Iterator[str]:
     """Notifications whose password crosses a network in clear."""
     for one in cell.settings.notifications:
-        host = None if one.url is None else urlsplit(one.url).hostname
-        if host is None or one.url is None or scheme_of(one.url) not in IN_CLEAR or is_loopback(host):
+        if one.url is None or one.password_file is None:
             continue
-        if one.password_file is not None:
-            scheme = scheme_of(one.url)
+        host, scheme = urlsplit(one.url).hostname, scheme_of(one.url)
+        if host is not None and scheme in IN_CLEAR and not is_loopback(host):
             yield (
                 f"notification {one.name}: its password goes over the network in clear. Write {scheme}s:// "
                 f"instead of {scheme}://"

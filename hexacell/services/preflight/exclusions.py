@@ -1,0 +1,98 @@
+"""Exclusions in the cell file: one written or removed at a time, everything else there stays as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hexacell.cell.limits import NEAR_DEG, NEAR_MM
+from hexacell.cell.loader import Cell, checked_cell
+from hexacell.dry_run.campaign import VisitedPose
+from hexacell.errors import FileError, UsageError
+from hexacell.kinematics.pose import Pose
+from hexacell.storage.atomic_files import BYTE_ORDER_MARK, read_bytes, write_atomically
+
+
+def toggle_exclusion(cell: Cell, name: str, planned: Sequence[VisitedPose]) -> Cell:
+    """Exclude a point (``3``) or a planned pose (``3.2``), or remove the first exclusion (``e1``).
+
+    Returns:
+        The cell as its file states it now.
+
+    Raises:
+        UsageError: nothing has this name, or it is the reference of a point.
+        FileError: too little would be left, or the file has changed or cannot be edited.
+    """
+    stated = [(one.point, one.pose) for one in cell.settings.exclusions]
+    if name.startswith("e") and name[1:].isdecimal() and 0 < int(name[1:]) <= len(stated):
+        number = int(name[1:]) - 1
+        del stated[number]
+        return _rewritten(cell, _text_without(cell, number), stated)
+    new = _exclusion_of(cell, name, planned)
+    newline = "\r\n" if "\r\n" in cell.text else "\n"
+    lines = ["", "[[exclusions]]", *(f"{key} = {value}" for key, value in new.items()), ""]
+    text = cell.text if cell.text.endswith("\n") else cell.text + newline
+    pose = tuple(new["pose"]) if "pose" in new else None
+    return _rewritten(cell, text + newline.join(lines), [*stated, (new.get("point"), pose)])
+
+
+def _exclusion_of(cell: Cell, name: str, planned: Sequence[VisitedPose]) -> Mapping[str, Any]:
+    """The keys and values of an exclusion."""
+    points = cell.settings.identification.points
+    if name.isdecimal() and 0 < int(name) <= len(points):
+        return {"point": int(name)}
+    poses = {f"{point}.{orientation}": (orientation, pose) for point, orientation, pose in planned}
+    if name not in poses:
+        raise UsageError(
+            f"there is no {name} in the plan", action="Name a point like 3, or a pose like 3.2"
+        )
+    orientation, pose = poses[name]
+    if orientation == 1:
+        raise UsageError(
+            f"{name} is the reference of its point, from which the gauges measure",
+            action=f"Exclude the whole point: {name.partition('.')[0]}",
+        )
+    if cell.settings.identification.poses is not None:  # a list has this pose, and perhaps others near it
+        return {"pose": list(pose.as_tuple()), "within_mm": 0.0, "within_deg": 0.0}
+    # Poses are selected as a run goes, so it never commands exactly what was planned: those near count.
+    references = [one for _, number, one in planned if number == 1]
+    references += [Pose(*point) for point in (*points, *cell.settings.verification.points)]
+    angles = [
+        float(np.degrees(pose.angle_to(one)))
+        for one in references
+        if np.linalg.norm(one.position - pose.position) <= NEAR_MM
+    ]
+    nearest = min(angles, default=2.0 * NEAR_DEG)
+    within_deg = min(NEAR_DEG, round(0.5 * nearest, 3))
+    return {"pose": list(pose.as_tuple()), "within_mm": NEAR_MM, "within_deg": within_deg}
+
+
+def _text_without(cell: Cell, number: int) -> str:
+    """The cell file without one of its exclusions; comments stay, one blank line before it goes."""
+    text, place = cell.text, ("exclusions", number)
+    spans = [span for path, span in cell.document.spans.items() if path[:2] == place]
+    first = text.count("\n", 0, min(span.start for span in spans))
+    last = text.count("\n", 0, max(span.stop for span in spans))
+    lines = [f"{line}\n" for line in text.split("\n")]
+    comments = [line for line in lines[first : last + 1] if line.lstrip().startswith("#")]
+    before = lines[: first - 1] if first and not lines[first - 1].strip() else lines[:first]
+    return "".join([*before, *comments, *lines[last + 1 :]]).removesuffix("\n")
+
+
+def _rewritten(cell: Cell, text: str, exclusions: Sequence[tuple[int | None, object]]) -> Cell:
+    """Write the text, if it states these exclusions and nothing else has changed."""
+    changed = checked_cell(cell.path, text)
+    wanted = cell.settings.model_copy(update={"exclusions": changed.settings.exclusions})
+    stated = [(one.point, one.pose) for one in changed.settings.exclusions]
+    if changed.settings != wanted or stated != exclusions:
+        raise FileError(
+            "the exclusions in this file cannot be changed by the program",
+            subject=cell.path,
+            line=cell.document.line_of(("exclusions",)),
+            action="Edit [[exclusions]] yourself",
+        )
+    mark = BYTE_ORDER_MARK if read_bytes(cell.path).startswith(BYTE_ORDER_MARK.encode()) else ""
+    write_atomically(cell.path, (mark + text).encode(), expected=(mark + cell.text).encode())
+    return changed

@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 
 from hexacell.cell.fields import Frozen
 from hexacell.checks.check import Check
-from hexacell.drift.causes import Causes
-from hexacell.drift.leg_evidence import likeliest_leg
-from hexacell.drift.run_evidence import WhitenedRecords, whiten_records
-from hexacell.drift.single_cause import SingleCauseTest, single_cause_test
+from hexacell.drift.run_evidence import Causes, WhitenedRecords, whiten_records
+from hexacell.drift.single_cause import SingleCauseTest, possible_legs, single_cause_test
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import MachinePart
@@ -93,7 +91,7 @@ def change_alarm(
         return None
     first, _ = _single_causes(check, before, measurements, sound[:FIRST_RECORDS], expansion)
     every, legs = _single_causes(check, before, measurements, sound, expansion)
-    leg = likeliest_leg(every.scores, every.sigmas, legs)
+    leg = possible_legs(every.scores, every.sigmas, legs)[0]
     cause = int(np.where(legs == leg, np.abs(every.scores), -1.0).argmax())
     parameter = check.robot.mechanism.parameters.parameters[cause]
     return ChangeAlarm(

@@ -1,46 +1,123 @@
-"""The watch over a series of runs: cumulative sums of the innovations, and where a step was if one alarms.
+"""The watch over a series of runs: cumulative sums of the innovations, and which leg changed if one alarms.
 
-The sums are limited so that all of them together raise one false alarm in ten years of nights. After an
-alarm the step is located, what was known of the legs that it may be of is forgotten from then on, and the
-sums begin anew. Those legs may move on steadily: that is then expected, and no further alarm.
+The one-sided sum ``C = max(0, C + z - k)`` of independent normal values z alarms when it exceeds h (Page,
+Biometrika 41, 1954, 100). It is a Markov process; with its range in ``STATES`` cells of equal width, the
+mean number of values until the alarm solves linear equations (Brook and Evans, An approach to the
+probability distribution of CUSUM run length, Biometrika 59, 1972, 539-549). The two sides of a two-sided
+sum never alarm together, so that the inverses of their run lengths add (Kemp, Journal of the Royal
+Statistical Society B 23, 1961, 149-153). The limit is such that the sums of all parameters together raise
+one false alarm in ten years of nights.
+
+After an alarm the step is located, what was known of the legs that it may be of is forgotten from then on,
+and the sums begin anew. A leg that moves on alarms again, by what it has moved since.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
-from hexacell.drift.causes import Causes
-from hexacell.drift.change_attribution import AttributedChange, attributed_change
-from hexacell.drift.cumulative_sums import REFERENCE, CumulativeSums
-from hexacell.drift.leg_evidence import possible_legs
-from hexacell.drift.moving_posterior import MovingPosterior
-from hexacell.drift.run_evidence import RunEvidence
-from hexacell.drift.run_length import limit_for_run_length
-from hexacell.drift.step_location import StepGains, step_gains
+from hexacell.distributions import normal_probability
+from hexacell.drift.carried_posterior import CarriedPosterior, StepGains, step_gains
+from hexacell.drift.run_evidence import Causes, RunEvidence
+from hexacell.drift.single_cause import possible_legs
 from hexacell.kinematics.rotations import Array
 
 QUIET_RUNS = 3650.0
-"""Between two false alarms of an unchanged robot: ten years of nights."""
+"""Runs between two false alarms of an unchanged robot: ten years of nights."""
 
 OTHER_LEG_GAIN = 20.0
-"""Of twice the log-likelihood, above which another leg changed as well: 4.5 standard deviations."""
+"""Gain of twice the log-likelihood above which another leg changed too: 4.5 standard deviations."""
+
+REFERENCE = 0.5
+"""Half the shift that is found soonest, in standard deviations of a value."""
+
+STATES = 250
+HIGHEST = 20.0
+"""Largest limit considered, in standard deviations of a value."""
+
+
+def one_sided_run_length(limit: float, reference: float, shift: float = 0.0) -> float:
+    """The mean number of values until a sum from 0 exceeds ``limit``.
+
+    Args:
+        limit: h, in standard deviations of a value.
+        reference: k, what is subtracted from each value: half the shift that is looked for.
+        shift: mean of the values.
+    """
+    width = 2.0 * limit / (2 * STATES - 1)
+    centres = width * np.arange(STATES)
+    steps = centres[None, :] - centres[:, None] + reference - shift
+    stays = normal_probability(steps + 0.5 * width) - normal_probability(steps - 0.5 * width)
+    stays[:, 0] = normal_probability(steps[:, 0] + 0.5 * width)
+    return float(np.linalg.solve(np.eye(STATES) - stays, np.ones(STATES))[0])
+
+
+def two_sided_run_length(limit: float, reference: float, shift: float = 0.0) -> float:
+    """The mean number of values until one of the sums upwards and downwards exceeds ``limit``."""
+    up, down = (one_sided_run_length(limit, reference, one) for one in (shift, -shift))
+    return 1.0 / (1.0 / up + 1.0 / down)
+
+
+def limit_for_run_length(run_length: float, reference: float, streams: int = 1) -> float:
+    """The limit h of two-sided sums over some streams, for one false alarm in ``run_length`` of them all.
+
+    Streams may depend on each other: the rates of their alarms add all the same, or less.
+    """
+
+    def excess(limit: float) -> float:
+        return float(np.log(two_sided_run_length(limit, reference) / (streams * run_length)))
+
+    from scipy.optimize import brentq  # noqa: PLC0415 - a fifth of a second that only a watch needs
+
+    return float(brentq(excess, 0.1, HIGHEST, xtol=1e-6))
+
+
+@cache
+def alarm_limit(streams: int) -> float:
+    """The limit of the watch over so many streams."""
+    return limit_for_run_length(QUIET_RUNS, REFERENCE, streams)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CumulativeSums:
+    """The sums (m,) of m streams of standard normal values upwards and downwards; never negative."""
+
+    up: Array
+    down: Array
+
+    @classmethod
+    def at_rest(cls, streams: int) -> CumulativeSums:
+        """The sums before the first value."""
+        return cls(np.zeros(streams), np.zeros(streams))
+
+    def after(self, values: Array) -> CumulativeSums:
+        """The sums with one more value of each stream (m,); NaN where a stream has no value this time."""
+        is_known = ~np.isnan(values)
+        up = np.where(is_known, np.maximum(0.0, self.up + values - REFERENCE), self.up)
+        down = np.where(is_known, np.maximum(0.0, self.down - values - REFERENCE), self.down)
+        return CumulativeSums(up, down)
+
+    @property
+    def largest(self) -> Array:
+        """The larger sum (m,) of each stream."""
+        return np.maximum(self.up, self.down)
 
 
 @dataclass(frozen=True, slots=True)
 class StepAlarm:
-    """A change that the sums found, by the runs until then.
+    """A change that the sums found.
 
     Attributes:
         run: index of the run that alarmed.
         first, last: indices of the runs before the first and the last of which the step may have been.
-        possible_legs: of which one changed, the likeliest first; only one where that is certain.
-        cause: index of its likeliest cause.
-        change, sigma: of that, in its unit.
-        other_legs: that changed as well, within the runs since.
+        possible_legs: legs of which one changed, the likeliest first; only one where that is certain.
+        cause: index of the likeliest cause of the likeliest leg.
+        change, sigma: estimate of the step by that cause, in its unit, and its standard deviation.
+        other_legs: legs that changed as well.
     """
 
     run: int
@@ -58,63 +135,27 @@ class StepAlarm:
         return self.possible_legs[0]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class QuietPeriod:
-    """The runs between two changes: index of the first, and what was known of the robot before it."""
-
-    first: int
-    before: MovingPosterior
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class WatchResult:
-    """What the watch found.
-
-    Attributes:
-        alarms: oldest first.
-        attributed: what each of these changes is of, by all runs until the one after it.
-        share_of_limit: (m,) the sums in the end, as shares of the limit.
-        since: the runs after the last change.
-    """
-
-    alarms: tuple[StepAlarm, ...]
-    attributed: tuple[AttributedChange, ...]
-    share_of_limit: Array
-    since: QuietPeriod
-
-
-@cache
-def alarm_limit(streams: int) -> float:
-    """The limit of the sums of so many streams."""
-    return limit_for_run_length(QUIET_RUNS, REFERENCE, streams)
-
-
 class DriftWatch:
     """Takes the runs of a robot one after the other.
 
     Attributes:
-        alarms: so far.
+        alarms: raised so far, by the runs until each.
     """
 
     def __init__(self, causes: Causes) -> None:
         self.alarms: list[StepAlarm] = []
         self._causes = causes
-        self._periods = [QuietPeriod(0, MovingPosterior.of_unmoved(causes, 0.0))]
-        self._known = self._periods[0].before
         self._runs: list[RunEvidence] = []
-        self._days: list[float] = []
+        self._known = CarriedPosterior.diffuse(causes.free, causes.by_state.shape[1] - causes.free)
+        self._periods = [(0, self._known)]  # first run after each change, and what was known before it
         self._sums = CumulativeSums.at_rest(len(causes.legs))
 
-    def add(self, run: RunEvidence, day: float | None = None) -> StepAlarm | None:
-        """Take one more run; the alarm that it raises, if any. Without a ``day``, runs are a day apart."""
-        day = float(len(self._runs)) if day is None else day
-        known = self._known
-        self._sums = self._sums.after(known.posterior.scores(known.seen(run, day), known.by_state))
-        self._known = known.after(run, day)
+    def add(self, run: RunEvidence) -> StepAlarm | None:
+        """Take one more run; the alarm that it raises, if any."""
+        self._sums = self._sums.after(self._known.scores(run, self._causes.by_state))
+        self._known = self._known.after(run)
         self._runs.append(run)
-        self._days.append(day)
         if self._sums.largest.max() <= alarm_limit(len(self._causes.legs)):
-            self._settle()
             return None
         self.alarms.append(self._located())
         return self.alarms[-1]
@@ -125,40 +166,38 @@ class DriftWatch:
         shares: Array = self._sums.largest / alarm_limit(len(self._causes.legs))
         return shares
 
-    @property
-    def since(self) -> QuietPeriod:
-        """The runs after the last change."""
-        return self._periods[-1]
-
-    def attributed(self, change: int) -> AttributedChange:
-        """What a change is of, by the runs since the one before it and until the one after it."""
-        period, place = self._periods[change], self._periods[change + 1].first
+    def attributed(self, change: int) -> StepAlarm:
+        """An alarm with the legs and the size by the runs from the change before it to the one after it."""
+        (first, before), (place, _) = self._periods[change : change + 2]
         later = self._periods[change + 2 :]
-        end = max(later[0].first, place + 1) if later else len(self._runs)
-        rows = range(period.first, end)
-        causes = Causes(period.before.by_state, self._causes.legs, self._causes.free)
-        return attributed_change(
-            period.before.posterior,
-            self._seen(period, rows),
-            np.array([self._days[row] for row in rows]),
-            place - period.first,
-            causes,
+        end = max(later[0][0], place + 1) if later else len(self._runs)
+        gains = step_gains(before, self._runs[first:end], self._causes.by_state)
+        alarm = self.alarms[change]
+        legs, cause = self._likeliest(gains, place - first)
+        return replace(
+            alarm,
+            possible_legs=legs,
+            cause=cause,
+            change=float(gains.changes[place - first, cause]),
+            sigma=float(gains.sigmas[place - first, cause]),
+            other_legs=tuple(leg for leg in alarm.other_legs if leg not in legs),
         )
 
-    def _seen(self, period: QuietPeriod, rows: Iterable[int]) -> list[RunEvidence]:
-        return [period.before.seen(self._runs[row], self._days[row]) for row in rows]
-
-    def _gains(self) -> StepGains:
-        """Of steps since the last change."""
-        before, runs = self.since.before, self._seen(self.since, range(self.since.first, len(self._runs)))
-        return step_gains(before.posterior, runs, before.by_state)
-
     def _located(self) -> StepAlarm:
-        """Where the step was; the watch goes on from there."""
-        gains, offset = self._gains(), self.since.first
-        place, legs, cause = self._likeliest(gains)
+        """The step before one of the latest runs; the watch goes on from there."""
+        offset, before = self._periods[-1]
+        gains = self._gains()
+        legs, _ = self._likeliest(gains, gains.likeliest[0])
+        of_leg = np.where(self._causes.legs == legs[0], gains.gains, -1.0)
+        place, cause = (int(one) for one in np.unravel_index(of_leg.argmax(), of_leg.shape))
+        start = offset + place
+        forgotten = self._causes.by_state[np.isin(self._causes.legs, legs)]
+        known = before.after(*self._runs[offset:start]).forgetting(forgotten)
+        self._periods.append((start, known))
+        self._known = known.after(*self._runs[start:])
+        self._sums = CumulativeSums.at_rest(len(self._causes.legs))
+        moved = self._causes.legs[self._gains().gains.max(axis=0) > OTHER_LEG_GAIN]
         first, last = gains.likely_runs(cause)
-        self._begin_anew(offset + place, legs)
         return StepAlarm(
             run=len(self._runs) - 1,
             first=offset + first,
@@ -167,52 +206,29 @@ class DriftWatch:
             cause=cause,
             change=float(gains.changes[place, cause]),
             sigma=float(gains.sigmas[place, cause]),
-            other_legs=self._other_legs(legs),
+            other_legs=tuple(sorted(set(moved.tolist()) - set(legs))),
         )
 
-    def _likeliest(self, gains: StepGains) -> tuple[int, tuple[int, ...], int]:
-        """The run, the possible legs, and the cause of the likeliest of them."""
-        legs, place = self._causes.legs, gains.likeliest[0]
-        possible = possible_legs(np.sqrt(gains.gains[place]), gains.sigmas[place], legs)
-        of_leg = np.where(legs == possible[0], gains.gains, -1.0)
-        at, cause = np.unravel_index(of_leg.argmax(), of_leg.shape)
-        return int(at), possible, int(cause)
+    def _gains(self) -> StepGains:
+        """The gains of steps since the last change."""
+        first, before = self._periods[-1]
+        return step_gains(before, self._runs[first:], self._causes.by_state)
 
-    def _begin_anew(self, first: int, legs: tuple[int, ...]) -> None:
-        """From the first run after a step of one of some legs."""
-        known = self.since.before
-        for row in range(self.since.first, first):
-            known = known.after(self._runs[row], self._days[row])
-        known = known.on(self._days[first]).forgetting_legs(legs)
-        self._periods.append(QuietPeriod(first, known))
-        self._know_anew()
-        self._sums = CumulativeSums.at_rest(len(self._causes.legs))
-
-    def _settle(self) -> None:
-        """Legs that most probably stand still again do."""
-        if still := self._known.still_legs:
-            since = self._periods.pop()
-            self._periods.append(QuietPeriod(since.first, since.before.standing_still(still)))
-            self._know_anew()
-
-    def _know_anew(self) -> None:
-        """From all runs since the last change."""
-        self._known = self.since.before
-        for row in range(self.since.first, len(self._runs)):
-            self._known = self._known.after(self._runs[row], self._days[row])
-
-    def _other_legs(self, possible: tuple[int, ...]) -> tuple[int, ...]:
-        """Those for which there is evidence of a step beside the one that was found."""
-        others = self._causes.legs[self._gains().gains.max(axis=0) > OTHER_LEG_GAIN]
-        return tuple(sorted({int(one) for one in others} - set(possible)))
+    def _likeliest(self, gains: StepGains, place: int) -> tuple[tuple[int, ...], int]:
+        """The possible legs of a step at a place, and the likeliest cause of the likeliest leg."""
+        legs = possible_legs(np.sqrt(gains.gains[place]), gains.sigmas[place], self._causes.legs)
+        of_leg = np.where(self._causes.legs == legs[0], gains.gains[place], -1.0)
+        return legs, int(of_leg.argmax())
 
 
-def watch_runs(
-    runs: Iterable[RunEvidence], causes: Causes, days: Sequence[float] | None = None
-) -> WatchResult:
-    """The alarms of a series of runs, oldest first, on some ``days``; without them each a day later."""
+def watch_runs(runs: Iterable[RunEvidence], causes: Causes) -> tuple[tuple[StepAlarm, ...], Array]:
+    """What a series of runs says of changes.
+
+    Returns:
+        The changes, oldest first, each by all runs until the next one, and the sums (m,) in the end, as
+        shares of their limit.
+    """
     watch = DriftWatch(causes)
-    for number, run in enumerate(runs):
-        watch.add(run, None if days is None else days[number])
-    attributed = tuple(watch.attributed(change) for change in range(len(watch.alarms)))
-    return WatchResult(tuple(watch.alarms), attributed, watch.share_of_limit, watch.since)
+    for run in runs:
+        watch.add(run)
+    return tuple(map(watch.attributed, range(len(watch.alarms)))), watch.share_of_limit

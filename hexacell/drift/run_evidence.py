@@ -13,13 +13,29 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexacell.identification.problem.prior import SystematicModel, no_systematic_errors
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.linear_model import systematic_errors
-from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction, predict
+from hexacell.identification.solver.measurement_model import NuisanceElimination, predict
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import position_sensitivity
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Causes:
+    """Single causes of a change of a robot: its parameters, each taken alone.
+
+    Attributes:
+        by_state: (m, s) change of the state by one unit of each.
+        legs: (m,) the leg of each, from 1.
+        free: how many numbers of the state are free parameters; the others are shared causes.
+    """
+
+    by_state: Array
+    legs: NDArray[np.int_]
+    free: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,16 +51,12 @@ class RunEvidence:
     weighted: Array
 
     def gradient(self, state: Array) -> Array:
-        """(s,) of the log-likelihood at a state (s,)."""
+        """Gradient (s,) of the log-likelihood at a state (s,)."""
         return self.weighted - self.information @ state
 
     def __add__(self, other: RunEvidence) -> RunEvidence:
-        """Both together."""
+        """The evidence of both together."""
         return RunEvidence(self.information + other.information, self.weighted + other.weighted)
-
-    def in_terms_of(self, matrix: Array) -> RunEvidence:
-        """The same evidence on numbers (u,) from which the state is made by a ``matrix`` (s, u)."""
-        return RunEvidence(matrix.T @ self.information @ matrix, matrix.T @ self.weighted)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +75,7 @@ class WhitenedRecords:
 
     @property
     def evidence(self) -> RunEvidence:
-        """What they say of the state."""
+        """The evidence of the records on the state."""
         return RunEvidence(self.rows.T @ self.rows, self.rows.T @ (self.rows @ self.state - self.residuals))
 
 
@@ -88,7 +100,9 @@ def whiten_records(
     prediction = predict(kept, free, solved.poses[np.flatnonzero(solved.found)])
     residuals = prediction.residuals
     if expansion is not None:
-        residuals = residuals + _moved_by(kept, prediction, expansion[solved.found])
+        at = problem.mechanism, problem.geometry(prediction.free), prediction.poses, kept.joints
+        by_parameters, _ = position_sensitivity(*at)
+        residuals = residuals + np.einsum("nip,np->ni", by_parameters, expansion[solved.found])
     shared = systematic_errors(kept, prediction)
     own = systematic_errors(replace(kept, systematic=of_this_run), prediction)
     weights = np.linalg.inv(np.linalg.inv(prediction.weights) + shared.own + own.own)
@@ -98,14 +112,6 @@ def whiten_records(
     whitened = _whitened(causes, np.column_stack([rows, system.values]))
     state = np.concatenate([free, np.zeros(shared.common.shape[-1])])
     return WhitenedRecords(state, whitened[:, :-1], whitened[:, -1])
-
-
-def _moved_by(problem: Problem, prediction: Prediction, expansion: Array) -> Array:
-    """How far (n, 3), mm, the ball is moved by changes (n, P) of the parameters."""
-    geometry = problem.geometry(prediction.free)
-    at = problem.mechanism, geometry, prediction.poses, problem.joints
-    moved: Array = np.einsum("nip,np->ni", position_sensitivity(*at)[0], expansion)
-    return moved
 
 
 def _whitened(causes: Array, values: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Whether a few records contradict an unchanged robot, each cause taken alone.
+"""Whether a few records contradict an unchanged robot, each cause taken alone, and which leg changed.
 
 A robot that was identified is known with a covariance C. If it has not changed, whitened residuals r of
 new records have the covariance ``S = 1 + H C H^T``. A change of one parameter of the machine by b adds
@@ -11,7 +11,10 @@ which is standard normal without a change (Cox and Hinkley, Theoretical Statisti
 largest of all ``|z|`` is compared with what it exceeds by chance with a given probability. The scores are
 correlated, in a way that is known; the limit is found by drawing them.
 
-A leg is named, not a parameter: some parameters of one leg do nearly the same to a few records.
+A leg is named, not a parameter: several parameters of a leg do nearly the same to some records, and
+neighbouring legs similar things. The evidence for a leg is therefore the sum of the marginal likelihoods of
+its parameters, each of which may have changed by an amount with the standard deviation ``USUAL_CHANGE``
+(Kass and Raftery, Bayes factors, Journal of the American Statistical Association 90, 1995, 773-795).
 """
 
 from __future__ import annotations
@@ -19,13 +22,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hexacell.drift.largest_score import largest_by_chance
 from hexacell.drift.run_evidence import WhitenedRecords
 from hexacell.kinematics.rotations import Array
 
 SEEN_SHARE = 1e-9
-"""Of the largest information on a parameter: one with less is not seen at all."""
+"""Share of the largest information on a parameter: one with less is not seen at all."""
+
+FALSE_ALARMS = 0.01
+"""Probability of an alarm for an unchanged robot."""
+
+DRAWS = 40_000
+"""Draws of the scores: the probability of a false alarm is then known to 5 % of itself."""
+
+USUAL_CHANGE = 0.1
+"""Standard deviation of a change, mm; 0.05 and 0.5 name the same legs in nearly all cases."""
+
+CERTAIN = 0.99
+"""Probability that the leg which changed is among those that are named."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,8 +74,8 @@ def single_cause_test(records: WhitenedRecords, covariance: Array, causes: Array
     """Test each of m causes.
 
     Args:
-        records: linearized at the estimate of before.
-        covariance: (s, s) of the state then; of shared causes 1 where nothing is known of them.
+        records: linearized at the previous estimate.
+        covariance: (s, s) of the state then; 1 for shared causes of which nothing is known.
         causes: (m, s) change of the state by one unit of each cause.
     """
     rows, residuals = records.rows, records.residuals
@@ -75,5 +90,34 @@ def single_cause_test(records: WhitenedRecords, covariance: Array, causes: Array
         scores=np.where(is_seen, found / root, 0.0),
         changes=np.where(is_seen, found / root**2, 0.0),
         sigmas=np.where(is_seen, 1.0 / root, np.inf),
-        limit=largest_by_chance(unit),
+        limit=_largest_by_chance(unit),
     )
+
+
+def _largest_by_chance(unit: Array) -> float:
+    """The limit of the largest of m scores, exceeded with probability ``FALSE_ALARMS``.
+
+    The scores are standard normal; the products of the columns of ``unit`` (r, m) are their correlations.
+    """
+    draws = np.random.default_rng(0).standard_normal((DRAWS, min(unit.shape)))
+    factor = np.linalg.qr(unit)[1] if len(unit) > unit.shape[1] else unit
+    largest = np.concatenate([np.abs(part @ factor).max(axis=1) for part in np.array_split(draws, 10)])
+    return float(np.quantile(largest, 1.0 - FALSE_ALARMS))
+
+
+def possible_legs(scores: Array, sigmas: Array, legs: NDArray[np.int_]) -> tuple[int, ...]:
+    """The legs of which one changed, the likeliest first: as few as have ``CERTAIN`` together.
+
+    Args:
+        scores: (m,) of single causes.
+        sigmas: (m,) standard deviations of the estimates of each change.
+        legs: (m,) the leg of each cause.
+    """
+    with np.errstate(divide="ignore"):
+        ratio = (USUAL_CHANGE / sigmas) ** 2
+    evidence = 0.5 * (scores**2 * ratio / (1.0 + ratio) - np.log1p(ratio))
+    of_leg = {int(leg): float(np.logaddexp.reduce(evidence[legs == leg])) for leg in np.unique(legs)}
+    ordered = sorted(of_leg, key=of_leg.__getitem__, reverse=True)
+    total = np.logaddexp.reduce(list(of_leg.values()))
+    together = np.cumsum([np.exp(of_leg[leg] - total) for leg in ordered])
+    return tuple(ordered[: 1 + int(np.searchsorted(together, CERTAIN))])

@@ -16,7 +16,7 @@ from hexacell.services.history.cell_status import (
     UnreadableCell,
 )
 from hexacell.services.history.run_index import PastRun, RunSummary
-from hexacell.text.changes import legs_text
+from hexacell.text.history import legs_text
 from hexacell.text.layout import error_with_u, figure_with_u, iso, minute, verdict_word
 from hexacell.verdict.decision import Verdict
 
@@ -38,7 +38,6 @@ HELP = {
     "hexacell_position_limit_mm": "Its limit.",
     "hexacell_open_proposal": "Whether a proposal waits for a person.",
     "hexacell_changes_found": "Changes of the robot that the watch over all runs found.",
-    "hexacell_largest_drift_sigmas": "Largest rate of a parameter since the last change, over its sigma.",
     "hexacell_largest_sum_ratio": "Largest cumulative sum of a parameter, over the limit of an alarm.",
 }
 
@@ -134,13 +133,8 @@ def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
         "hexacell_calibration_due_timestamp_seconds": one.due_at,
     }
     yield from ((name, {}, repr(at.timestamp())) for name, at in times.items() if at is not None)
-    worst = {
-        "hexacell_largest_drift_sigmas": one.surest_drift,
-        "hexacell_largest_sum_ratio": one.worst_share,
-    }
-    for name, found in worst.items():
-        if found is not None:
-            yield name, {"parameter": found[0]}, repr(found[1])
+    if (worst := one.worst_share) is not None:
+        yield "hexacell_largest_sum_ratio", {"parameter": worst[0]}, repr(worst[1])
     if one.judged is None:
         return
     verdict, position = one.judged.summary.verdict, one.judged.summary.position

@@ -265,7 +265,6 @@ def drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> di
         "temperatures_c": list(watched.celsius),
         "changes": [_change_document(one) for one in watched.changes],
         "shares_of_limit": dict(watched.shares),
-        "rates": [asdict(one) for one in watched.rates],
     }
 
 
@@ -280,10 +279,9 @@ def _change_document(found: FoundChange) -> dict[str, Any]:
         "unit": found.parameter.kind.unit.value,
         "change": found.change,
         "sigma": found.sigma,
-        "per_day": found.per_day,
-        "sigma_per_day": found.sigma_per_day,
-        "moves_on": found.moves_on,
         "other_legs": list(found.other_legs),
+        "moved_again": found.moved_again,
+        "last_noticed": found.last_noticed.isoformat(),
     }
 
 

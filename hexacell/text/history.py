@@ -10,6 +10,7 @@ from hexacell.text.layout import error_with_u, verdict_word, wrapped
 
 if TYPE_CHECKING:
     from hexacell.results.run_comparison import ParameterTrend, RunComparison
+    from hexacell.services.history.drift_history import DriftHistory, FoundChange
     from hexacell.services.history.retention import Retention
 
 NO_RUNS = "This cell has no runs yet."
@@ -111,3 +112,40 @@ def retention_text(found: Retention, *, is_deleted: bool) -> str:
     if found.leaving and not is_deleted:
         lines.append("Add --delete to delete them; what they say of drift goes with them.")
     return "\n".join(lines)
+
+
+def watch_text(found: DriftHistory) -> str:
+    """What changed and when, and how near the largest sum is to an alarm; empty without runs."""
+    if not found.runs:
+        return ""
+    lines = [wrapped(change_sentence(one), indent=2) for one in found.changes]
+    name, share = max(found.shares, key=lambda one: one[1])
+    since = "since then " if found.changes else ""
+    first, last = (f"{at:%Y-%m-%d}" for at in (found.runs[0], found.runs[-1]))
+    runs = f"{len(found.runs)} runs from {first} to {last}" if len(found.runs) > 1 else f"1 run of {first}"
+    quiet = "" if found.changes else "no leg has moved: "
+    rest = f"{runs}: {quiet}{since}the largest sum of innovations is {share:.0%} of its limit ({name})."
+    shown = [one for one in found.celsius if one is not None]
+    warmth = [f"Their thermometers showed {min(shown):.1f} to {max(shown):.1f} deg C."] if shown else []
+    return "\n".join([*lines, wrapped(rest, indent=2), *warmth])
+
+
+def legs_text(found: FoundChange) -> str:
+    """The leg that changed, or those of which one did."""
+    return " or ".join(map(str, found.possible_legs))
+
+
+def change_sentence(found: FoundChange) -> str:
+    """A change that was found: which leg, by how much, when, and whether others changed as well."""
+    unit = found.parameter.kind.unit.value
+    others = " and ".join(str(leg) for leg in found.other_legs)
+    size = f"{abs(found.change):.3f} +- {found.sigma:.3f} {unit}"
+    rest = f"legs {others} moved as well" if len(found.other_legs) > 1 else f"leg {others} moved as well"
+    last = f"noticed {found.moved_again} more times, last {found.last_noticed:%Y-%m-%d}"
+    again = f" It has moved on since; {last}." if found.moved_again else ""
+    return (
+        f"leg {legs_text(found)} moved {size} (as {found.parameter.name} by {found.change:+.3f}) "
+        f"between {found.after:%Y-%m-%d %H:%M} and {found.before:%Y-%m-%d %H:%M}"
+        f"; {rest if others else 'the others did not'}. "
+        f"Noticed {found.noticed:%Y-%m-%d}.{again}"
+    )

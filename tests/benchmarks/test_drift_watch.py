@@ -21,9 +21,8 @@ import pytest
 
 from hexacell.checks.change_alarm import machine_causes, machine_records
 from hexacell.drift.carried_posterior import CarriedPosterior
-from hexacell.drift.causes import Causes
 from hexacell.drift.drift_watch import DriftWatch, StepAlarm, watch_runs
-from hexacell.drift.run_evidence import RunEvidence
+from hexacell.drift.run_evidence import Causes, RunEvidence
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.virtual_robot import VirtualRobot
@@ -86,7 +85,7 @@ def machine() -> Machine:
 
 def false_alarms(seed: int) -> int:
     one, random = machine(), np.random.default_rng([9, seed])
-    return len(watch_runs(one.runs(random, NIGHTS, np.zeros(one.causes.free), 0), one.causes).alarms)
+    return len(watch_runs(one.runs(random, NIGHTS, np.zeros(one.causes.free), 0), one.causes)[0])
 
 
 def one_sigma(before: int, cause: int) -> Array:
@@ -120,7 +119,7 @@ def crash(seed: int) -> tuple[int, StepAlarm | None]:
     leg = seed % 6 + 1
     lengths = len(one.causes.legs) - 6
     step = CRASH_MM * one.causes.by_state[lengths + leg - 1]
-    alarms = watch_runs(one.runs(random, 95, step, 90), one.causes).alarms
+    alarms = watch_runs(one.runs(random, 95, step, 90), one.causes)[0]
     return leg, alarms[0] if alarms else None
 
 

@@ -105,11 +105,11 @@ def test_a_leg_that_moved_is_told_with_the_night(cell, typed_here) -> None:
     told = typed_here("history", cell.path, "--drift")
     assert (told.code, told.out.startswith("leg 4 moved 0.3")) == (0, True)
     document = typed_here("history", cell.path, "--drift", "--json").document
-    assert set(document) == {"parameters", "runs", "temperatures_c", "changes", "shares_of_limit", "rates"}
+    assert set(document) == {"parameters", "runs", "temperatures_c", "changes", "shares_of_limit"}
     (change,) = document["changes"]
     assert set(change) == {
         "leg", "possible_legs", "after", "before", "noticed",
-        "parameter", "unit", "change", "sigma", "per_day", "sigma_per_day", "moves_on", "other_legs",
+        "parameter", "unit", "change", "sigma", "other_legs", "moved_again", "last_noticed",
     }  # fmt: skip
     assert (change["leg"], change["before"]) == (4, "2026-03-06T02:30:00+00:00")
     json.dumps(document, allow_nan=False)

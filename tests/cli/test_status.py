@@ -69,17 +69,16 @@ def test_metrics_are_those_of_the_latest_verdict(typed_here, demo, calibrated, t
     assert ("calibration_due_timestamp_seconds",) not in found
 
 
-def test_the_parameter_that_drifts_most_surely_is_collected(typed_here, cell_folder, tmp_path) -> None:
+def test_the_parameter_whose_sum_is_largest_is_collected(typed_here, cell_folder, tmp_path) -> None:
     nights = Nights(load_cell(cell_folder.cell))
     nights.calibrate()
     for _ in range(4):
         nights.check()
     target = tmp_path / "hexacell.prom"
     assert typed_here("status", cell_folder.cell, "--metrics", target).code == 0
-    rates = typed_here("history", cell_folder.cell, "--drift", "--json").document["rates"]
-    scores = {one["name"]: abs(one["per_day"]) / one["sigma_per_day"] for one in rates}
-    name = max(scores, key=scores.__getitem__)
-    assert samples(target)[("largest_drift_sigmas", name)] == pytest.approx(scores[name])
+    shares = typed_here("history", cell_folder.cell, "--drift", "--json").document["shares_of_limit"]
+    name = max(shares, key=shares.__getitem__)
+    assert samples(target)[("largest_sum_ratio", name)] == pytest.approx(shares[name])
 
 
 def test_when_the_next_calibration_is_due(typed_here, calibrated, tmp_path) -> None:

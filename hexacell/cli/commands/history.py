@@ -17,7 +17,6 @@ from hexacell.services.history.retention import delete_runs, retention
 from hexacell.services.history.run_index import RunIndex
 from hexacell.services.write_back.config_history import config_history
 from hexacell.text.cells import fleet_history_document, fleet_history_text
-from hexacell.text.changes import watch_text
 from hexacell.text.config_changes import config_history_text
 from hexacell.text.documents import (
     comparison_document,
@@ -27,7 +26,7 @@ from hexacell.text.documents import (
     retention_document,
     story_document,
 )
-from hexacell.text.history import comparison_text, drift_text, history_text, retention_text
+from hexacell.text.history import comparison_text, drift_text, history_text, retention_text, watch_text
 from hexacell.text.run_story import story_text
 from procedures.journal.journal import read_entries
 

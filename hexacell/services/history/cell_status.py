@@ -72,12 +72,6 @@ class CellStatus:
         """The parameter whose cumulative sum is nearest to its limit, and how near; none without runs."""
         return max(self.drift.shares, key=lambda one: one[1], default=None)
 
-    @property
-    def surest_drift(self) -> tuple[str, float] | None:
-        """The parameter that drifts most surely, and by how many standard deviations; none without runs."""
-        scores = [(one.name, abs(one.per_day) / one.sigma_per_day) for one in self.drift.rates]
-        return max(scores, key=lambda one: one[1], default=None)
-
 
 @dataclass(frozen=True, slots=True)
 class UnreadableCell:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from hexacell.cell.loader import Cell
 from hexacell.kinematics.parameters import GeometricParameter
@@ -16,13 +15,10 @@ from hexacell.services.history.run_index import EvidenceDocument, RunIndex
 from hexacell.storage.atomic_files import sha256
 
 if TYPE_CHECKING:
-    from hexacell.drift.change_attribution import AttributedChange
-    from hexacell.drift.drift_watch import StepAlarm, WatchResult
+    from hexacell.drift.drift_watch import StepAlarm
 
-DAY_S = 86_400.0
-
-LEAST_DAYS = 3.0
-"""Between the first and the last of some runs: what they say of shorter times is not said of a month."""
+MOVING_ON_RUNS = 30
+"""Runs within which a leg that alarms again is said to have moved on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +28,12 @@ class FoundChange:
     Attributes:
         noticed: when the run ended that alarmed.
         after, before: when the runs ended between which it happened.
+        possible_legs: legs of which one changed, by all runs until the next change, the likeliest first;
+            only one where that is certain.
         parameter: the likeliest one of its leg, with its ``change`` and one standard deviation of that.
-        per_day, sigma_per_day: by how much it has moved on since, until the next change; ``moves_on``:
-            surely.
-        possible_legs: of which one changed by all runs until the next change, the likeliest first; only
-            one where that is certain.
-        other_legs: that changed as well.
+        other_legs: legs that changed as well.
+        moved_again: how often the leg alarmed again, each time within ``MOVING_ON_RUNS`` of the last time.
+        last_noticed: when the run ended that alarmed last.
     """
 
     noticed: datetime
@@ -47,10 +43,9 @@ class FoundChange:
     parameter: GeometricParameter
     change: float
     sigma: float
-    per_day: float
-    sigma_per_day: float
-    moves_on: bool
     other_legs: tuple[int, ...]
+    moved_again: int
+    last_noticed: datetime
 
     @property
     def leg(self) -> int:
@@ -59,25 +54,13 @@ class FoundChange:
 
 
 @dataclass(frozen=True, slots=True)
-class ParameterRate:
-    """How fast a parameter changes steadily, if it alone does, in its unit a day; ``is_steady``: surely."""
-
-    name: str
-    unit: str
-    per_day: float
-    sigma_per_day: float
-    is_steady: bool
-
-
-@dataclass(frozen=True, slots=True)
 class DriftHistory:
     """What all runs of a cell say of changes.
 
     Attributes:
         runs: when each run ended that counts, oldest first.
-        celsius: the mean of the thermometers in each of them; none without.
+        celsius: the mean of the thermometers in each of them; None without thermometers.
         changes: oldest first.
-        rates: since the last change, of the parameters that the runs see.
         shares: the cumulative sum of each parameter of the machine, as a share of its limit.
     """
 
@@ -85,7 +68,6 @@ class DriftHistory:
     celsius: tuple[float | None, ...]
     changes: tuple[FoundChange, ...]
     shares: tuple[tuple[str, float], ...]
-    rates: tuple[ParameterRate, ...] = ()
 
 
 def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
@@ -103,44 +85,43 @@ def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
     from hexacell.robot.model import robot_of  # noqa: PLC0415
 
     causes = machine_causes(robot_of(cell), len(runs[-1].evidence.weighted))
-    days = [(run.at - runs[0].at).total_seconds() / DAY_S for run in runs]
-    watched = watch_runs([run.evidence for run in runs], causes, days)
+    alarms, shares = watch_runs((run.evidence for run in runs), causes)
     parameters = cell.settings.mechanism.parameters
     ended = tuple(run.at for run in runs)
-    changes = (
-        _change(alarm, found, ended, parameters.parameters)
-        for alarm, found in zip(watched.alarms, watched.attributed, strict=True)
-    )
-    shares = zip(parameters.names, watched.share_of_limit.tolist(), strict=True)
+
+    def change(first: StepAlarm, *again: StepAlarm) -> FoundChange:
+        others = {leg for alarm in (first, *again) for leg in alarm.other_legs}
+        return FoundChange(
+            noticed=ended[first.run],
+            after=ended[max(first.first - 1, 0)],
+            before=ended[first.last],
+            possible_legs=first.possible_legs,
+            parameter=parameters.parameters[first.cause],
+            change=first.change,
+            sigma=first.sigma,
+            other_legs=tuple(sorted(others - set(first.possible_legs))),
+            moved_again=len(again),
+            last_noticed=ended[(first, *again)[-1].run],
+        )
+
     return DriftHistory(
         ended,
         tuple(run.celsius for run in runs),
-        tuple(changes),
-        tuple(shares),
-        _rates(parameters.parameters, runs, days, watched),
+        tuple(change(*steps) for steps in _motions(alarms)),
+        tuple(zip(parameters.names, shares.tolist(), strict=True)),
     )
 
 
-def _rates(
-    parameters: tuple[GeometricParameter, ...],
-    runs: list[EvidenceDocument],
-    days: list[float],
-    watched: WatchResult,
-) -> tuple[ParameterRate, ...]:
-    """The rates that the runs since the last change see, if these span some days."""
-    first = watched.since.first
-    if days[-1] - days[first] < LEAST_DAYS:
-        return ()
-    from hexacell.drift.steady_drift import steady_drift_of_each  # noqa: PLC0415 - likewise
-
-    found = steady_drift_of_each(watched.since.before, [run.evidence for run in runs[first:]], days[first:])
-    is_steady = np.abs(found.scores) > found.limit
-    numbers = zip(found.rates.tolist(), found.sigmas.tolist(), is_steady.tolist(), strict=True)
-    return tuple(
-        ParameterRate(one.name, one.kind.unit.value, *each)
-        for one, each in zip(parameters, numbers, strict=True)
-        if np.isfinite(each[1])
-    )
+def _motions(alarms: Iterable[StepAlarm]) -> list[list[StepAlarm]]:
+    """Alarms, each with those by which its leg moved on."""
+    motions: list[list[StepAlarm]] = []
+    for alarm in alarms:
+        moving = next((one for one in reversed(motions) if one[0].leg == alarm.leg), None)
+        if moving is not None and alarm.run - moving[-1].run <= MOVING_ON_RUNS:
+            moving.append(alarm)
+        else:
+            motions.append([alarm])
+    return motions
 
 
 def _counted_runs(cell: Cell, index: RunIndex) -> list[EvidenceDocument]:
@@ -158,24 +139,3 @@ def _counted_runs(cell: Cell, index: RunIndex) -> list[EvidenceDocument]:
     found = index.documents(DocumentKind.EVIDENCE, EvidenceDocument, read, context=stated[:16])
     runs = sorted(found.values(), key=lambda run: run.at)
     return [run for run in runs if len(run.weighted) == len(runs[-1].weighted)]
-
-
-def _change(
-    alarm: StepAlarm,
-    found: AttributedChange,
-    ended: tuple[datetime, ...],
-    parameters: tuple[GeometricParameter, ...],
-) -> FoundChange:
-    return FoundChange(
-        noticed=ended[alarm.run],
-        after=ended[max(alarm.first - 1, 0)],
-        before=ended[alarm.last],
-        possible_legs=found.possible_legs,
-        parameter=parameters[found.cause],
-        change=found.change,
-        sigma=found.sigma,
-        per_day=found.rate,
-        sigma_per_day=found.rate_sigma,
-        moves_on=found.moves_on,
-        other_legs=tuple(leg for leg in alarm.other_legs if leg not in found.possible_legs),
-    )

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.drift.causes import Causes
-from hexacell.drift.run_evidence import RunEvidence, WhitenedRecords
+from hexacell.drift.run_evidence import Causes, RunEvidence, WhitenedRecords
 from hexacell.kinematics.rotations import Array
 
 LEGS = np.array([1, 1, 2, 2, 3, 3])

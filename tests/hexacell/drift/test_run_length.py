@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.drift.cumulative_sums import REFERENCE, CumulativeSums
-from hexacell.drift.run_length import (
+from hexacell.drift.drift_watch import (
+    REFERENCE,
+    CumulativeSums,
     limit_for_run_length,
     one_sided_run_length,
     two_sided_run_length,

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.drift.largest_score import FALSE_ALARMS
 from hexacell.drift.run_evidence import WhitenedRecords
-from hexacell.drift.single_cause import SingleCauseTest, single_cause_test
+from hexacell.drift.single_cause import FALSE_ALARMS, SingleCauseTest, single_cause_test
 from tests.hexacell.drift.synthetic_runs import CAUSES, LinearRobot
 
 COVARIANCE = 0.3 * np.eye(6)

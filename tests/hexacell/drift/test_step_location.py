@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import ruptures
 
-from hexacell.drift.carried_posterior import CarriedPosterior
+from hexacell.drift.carried_posterior import CarriedPosterior, step_gains
 from hexacell.drift.run_evidence import RunEvidence
-from hexacell.drift.step_location import step_gains
 from tests.hexacell.drift.synthetic_runs import CAUSES, LinearRobot
 
 DIFFUSE = CarriedPosterior.diffuse(6, 0)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,7 @@ class Forecaster:
     task: Task
     planned_sets: Callable[[], Sequence[PoseBatch]]
     from_commands: Callable[[Iterable[Pose]], PoseBatch]
-    systematic_mm: Callable[[], float | None] = lambda: None
+    systematic_mm: Callable[[], float | None]
 
     def worst_error(self, state: CampaignState, belief: RobotBelief) -> float | None:
         """The error at the worst task pose now, 1 sigma, mm; None without task poses."""
@@ -128,7 +128,7 @@ class Forecaster:
         if error is None:
             return PointRanking(dict.fromkeys(points, math.inf), points[0])
         error = error.of_estimate
-        information = PlannedInformation.of(self._sets_at(points), belief)
+        information = PlannedInformation.of(self.sets_at(points), belief)
         gains: dict[int, float] = {}
         rates: dict[int, float] = {}
         for point in points:
@@ -152,22 +152,11 @@ class Forecaster:
     ) -> Array:
         if not any(planned.values()):
             return belief.covariance
-        information = self._information(belief, frozenset(planned))
+        information = _planned_information(self, belief, frozenset(planned))
         added = [information.added(state, point, more) for point, more in planned.items()]
         return add_information(belief.covariance, np.sum(added, axis=0))
 
-    def _information(self, belief: RobotBelief, points: frozenset[int]) -> PlannedInformation:
-        """The information of some points' planned sets; the last is kept, as decisions ask twice for it."""
-        last = self._last_information
-        if not last or last[0][0] is not belief or last[0][1] != points:
-            last[:] = [(belief, points, PlannedInformation.of(self._sets_at(points), belief))]
-        return last[0][2]
-
-    @cached_property
-    def _last_information(self) -> list[tuple[RobotBelief, frozenset[int], PlannedInformation]]:
-        return []
-
-    def _sets_at(self, points: Container[int]) -> list[PoseBatch]:
+    def sets_at(self, points: Container[int]) -> list[PoseBatch]:
         """The planned sets of some points, and empty ones of the others, which would only take time."""
         every = enumerate(self.planned_sets(), start=1)
         return [poses if point in points else poses[:0] for point, poses in every]
@@ -245,6 +234,14 @@ class PlannedInformation:
         before = state.records_at(point)
         added = self.information(point, before + records)
         return added - self.information(point, before) if before else added
+
+
+@lru_cache(maxsize=1)
+def _planned_information(
+    forecaster: Forecaster, belief: RobotBelief, points: frozenset[int]
+) -> PlannedInformation:
+    """The information of some points' planned sets; the last is kept, as a decision asks twice for it."""
+    return PlannedInformation.of(forecaster.sets_at(points), belief)
 
 
 def select_sets(

@@ -7,7 +7,7 @@ or nothing is left that is worth measuring.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -41,7 +41,7 @@ from hexacell.errors import IdentifiabilityError, LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import Record, deviation_of, joints_of
+from hexacell.measurements.records import deviation_of, joints_of
 from hexacell.motion.paths import find_route
 from hexacell.motion.standing import stands_within_limits
 from hexacell.robot.model import Robot
@@ -49,9 +49,6 @@ from hexacell.robot.model import Robot
 PROVISIONAL_SIGMA = float(np.radians(2.0))
 """Standard deviation of the platform's orientation, rad, beyond which the controller does not command
 with the estimate: after a whole point it is below one degree, after two records seven."""
-
-_Progress = tuple[Sequence[Record], frozenset[int], int | None]
-"""Records, points that are done, and the present one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,8 +271,8 @@ class Plan:
         return planned_systematic_mm(self.robot, self.task, sets, self.earlier)
 
     @cached_property
-    def _last_out_of_reach(self) -> list[tuple[_Progress, frozenset[int]]]:
-        """Points that are not to be begun, with what that depends on: the last answer, if there was one."""
+    def _last_out_of_reach(self) -> list[tuple[object, frozenset[int]]]:
+        """The last answer, if there was one, after what it depends on."""
         return []
 
     @cached_property

@@ -66,7 +66,7 @@ class Check:
     @cached_property
     def plan(self) -> Plan:
         """What to measure, until the check is decided or its budget is used."""
-        drifting = self._drifting
+        drifting = self.drifting
         return Plan(
             check_settings(self.settings, self.budget),
             self.robot if drifting is None else drifting.robot,
@@ -159,9 +159,9 @@ class Check:
 
     def _estimates(self, measurements: MeasurementSet) -> tuple[ScaledEstimate, ScaledEstimate]:
         """Under the likeliest scale of the drift, and under the guarded one; by the drawing the same."""
-        if self._drifting is not None:
-            guarded = self._drifting.at_least(GUARDED_SCALE, measurements)
-            return self._drifting.likeliest(measurements), guarded
+        if self.drifting is not None:
+            guarded = self.drifting.at_least(GUARDED_SCALE, measurements)
+            return self.drifting.likeliest(measurements), guarded
         estimate = ScaledEstimate(1.0, self._by_drawing.estimate(measurements), 0.0)
         return estimate, estimate
 
@@ -179,7 +179,8 @@ class Check:
         return records_to_decide(first, second, self.limits, each)
 
     @cached_property
-    def _drifting(self) -> DriftEstimator | None:
+    def drifting(self) -> DriftEstimator | None:
+        """Estimates the robot from the result before on; None without one."""
         return None if self.before is None else DriftEstimator(self.robot, self.before)
 
     @cached_property

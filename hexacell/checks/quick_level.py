@@ -79,16 +79,8 @@ class QuickLevel:
     @cached_property
     def plan(self) -> Plan:
         """What to measure, until the robot is known as well as before or the budget is used."""
-        check, drifting = self.check, self._drifting
-        return Plan(
-            check_settings(check.settings, self.budget),
-            drifting.robot,
-            check.listed,
-            check.effort,
-            estimator=drifting,
-            goal=self,
-            earlier=check.earlier,
-        )
+        settings = check_settings(self.check.settings, self.budget)
+        return replace(self.check.plan, settings=settings, goal=self)
 
     @cached_property
     def calibrated_mm(self) -> float | None:
@@ -174,13 +166,14 @@ class QuickLevel:
         error = self.plan.task.error(belief)
         return None if error is None else error.worst(belief.covariance)
 
-    @cached_property
+    @property
     def _drifting(self) -> DriftEstimator:
-        return DriftEstimator(self.check.robot, self._before)
+        assert self.check.drifting is not None  # noqa: S101 - without a result no quick level is begun
+        return self.check.drifting
 
     @property
     def _before(self) -> IdentifiedBefore:
-        assert self.check.before is not None  # noqa: S101 - without a result no quick level is begun
+        assert self.check.before is not None  # noqa: S101 - likewise
         return self.check.before
 
 

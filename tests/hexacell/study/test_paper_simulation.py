@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from math import inf, isnan
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hexacell.study.paper_simulation import Angles, Trial, run_trial
+from hexacell.study.paper_simulation import (
+    Angles,
+    Errors,
+    MedianErrors,
+    Outcome,
+    Trial,
+    run_trial,
+    summary,
+    trials_of,
+)
 
 MOST = Trial(5, 11, 0)
 
@@ -52,3 +63,48 @@ def test_angles_are_rotations(angles: Angles) -> None:
         Angles.VECTOR: Rotation.from_rotvec(three),
     }[angles]
     np.testing.assert_allclose(angles.turns(three), expected.as_matrix(), atol=1e-12)
+
+
+def errors(paper: float | None, ours: float | None, *steps: float) -> Errors:
+    return Errors(
+        steps,
+        paper is not None,
+        {} if paper is None else {"S": paper, "B": 0.1, "l": 0.1},
+        {} if ours is None else {"S": ours, "B": 0.1, "l": 0.1},
+    )
+
+
+def test_medians_are_of_the_draws_that_each_estimator_ends() -> None:
+    found = MedianErrors.of(
+        [errors(1.0, 0.5, 3.0, 2.0, 1.0), errors(3.0, 0.7), errors(None, 0.3), errors(2.0, None)]
+    )
+    assert (found.trials, found.settled, found.refused) == (4, 3, 1)
+    assert (found.paper_mm, found.ours_there_mm, found.ours_mm) == (2.0, 0.6, 0.5)
+
+
+def test_after_some_steps_a_draw_that_came_to_its_end_before_counts_with_that() -> None:
+    steps = [9.0, 5.0, 1.0, 0.5]
+    found = MedianErrors.of([errors(0.5, 0.1, *steps), errors(0.5, 0.1, *steps), errors(None, 0.1, 7.0)])
+    assert found.after_steps_mm == (1.0, 0.5, 0.5)
+    assert MedianErrors.of([errors(None, 0.1, 7.0)]).after_steps_mm == (inf, inf, inf)
+
+
+def test_nothing_has_no_median() -> None:
+    assert isnan(MedianErrors.of([errors(None, None)]).paper_mm)
+
+
+def test_all_of_it_is_of_its_own_trials() -> None:
+    trials = trials_of(2)
+    outcomes = {
+        key: Outcome(
+            errors(one.points, one.amplitude_deg), errors(one.orientations, 0.1), 10.0 * one.points
+        )
+        for key, one in trials.items()
+    }
+    study = summary(trials, outcomes)
+    assert [one.exact.paper_mm for one in study.figures[4]] == [1, 2, 3, 4, 5]
+    assert {one.noisy.paper_mm for one in study.figures[5]} == {5}
+    assert [one.deviation_mm for one in study.figures[5]] == [10, 20, 30, 40, 50]
+    assert [one.exact.ours_mm for one in study.sweep] == [10] * 3 + [20] * 3 + [30] * 3 + [40] * 3
+    assert [one.angles for one in study.sweep[:3]] == list(Angles)
+    assert study.table_2 == {"S": (11.0, 0.1), "B": (0.1, 0.1), "l": (0.1, 0.1)}

@@ -1,4 +1,4 @@
-"""What a cell file and a measurement file tell without a run: the geometry, the next pose, a dry run."""
+"""Geometry, next pose, dry run and reach of the stated poses, by cell file and measurements alone."""
 
 from __future__ import annotations
 
@@ -36,6 +36,10 @@ if TYPE_CHECKING:
 
 MOST_RECORDS_BEFORE_NEXT = 500
 """The estimate is made again record by record, as in a run."""
+
+
+StatedPose = tuple[KeyPath, str, Pose]
+"""Where a pose is in the cell file, what it is for, and the pose itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +127,7 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
             action="Use `hexacell fit`; some 60 records identify a robot",
         )
     plan = plan_of(cell)
-    require_points(cell, plan)
+    _require(cell, plan, _points(cell.settings, plan))
     state = _state_of_records(plan, measurements, rejections)
     decision = _decide(plan, state)
     forecast = decision.forecast if isinstance(decision, MeasurePose) else plan.forecast(state)
@@ -185,12 +189,6 @@ def _decide(plan: Plan, state: CampaignState) -> StartPoint | MeasurePose | Fini
     return decision
 
 
-# JOINED The poses that a cell file states, checked against what its controller's config can take.
-
-StatedPose = tuple[KeyPath, str, Pose]
-"""Where a pose is in the cell file, what it is for, and the pose itself."""
-
-
 def require_stated_poses(cell: Cell, plan: Plan) -> None:
     """Check that the controller can take every pose that a cell file states, within the limits.
 
@@ -198,16 +196,22 @@ def require_stated_poses(cell: Cell, plan: Plan) -> None:
         FileError: one is out of reach; with its line.
         SeveralErrors: more than one is.
     """
-    stated = [*_points(cell.settings, plan), *_other_poses(cell.settings)]
-    _require(cell, [*_failures(cell, plan, stated), *_list_failures(plan)])
+    _require(cell, plan, [*_points(cell.settings, plan), *_other_poses(cell.settings)])
 
 
-def require_points(cell: Cell, plan: Plan) -> None:
-    """The same for the poses at which the geometry is measured, alone."""
-    _require(cell, [*_failures(cell, plan, _points(cell.settings, plan)), *_list_failures(plan)])
-
-
-def _require(cell: Cell, failures: list[HexacellError]) -> None:
+def _require(cell: Cell, plan: Plan, stated: Iterable[StatedPose]) -> None:
+    failures: list[HexacellError] = [
+        FileError(
+            f"{name}: {failure.problem}",
+            subject=cell.path,
+            line=cell.document.line_of(path),
+            action=failure.action or "Move it into the reach of the robot, or correct the limits",
+        )
+        for path, name, pose in stated
+        for failure in feasibility.pose_failures(plan, name, pose)
+    ]
+    if plan.pose_list is not None:  # a file of its own
+        failures += feasibility.reach_failures(plan)
     if failures:
         raise joined(f"{cell.path} has {len(failures)} mistakes", failures)
 
@@ -226,20 +230,3 @@ def _other_poses(settings: CellSettings) -> Iterator[StatedPose]:
     if (fixture := settings.length_check) is not None:
         yield ("length_check", "first_seat"), "the first seat", Pose(*fixture.first_seat)
         yield ("length_check", "distance_mm"), "the second seat", Pose(*fixture.second_seat)
-
-
-def _failures(cell: Cell, plan: Plan, stated: Iterable[StatedPose]) -> Iterator[HexacellError]:
-    for path, name, pose in stated:
-        for failure in feasibility.pose_failures(plan, name, pose):
-            yield FileError(
-                f"{name}: {failure.problem}",
-                subject=cell.path,
-                line=cell.document.line_of(path),
-                action=failure.action or "Move it into the reach of the robot, or correct the limits",
-            )
-
-
-def _list_failures(plan: Plan) -> Iterator[HexacellError]:
-    """Poses of a list, which is a file of its own."""
-    if plan.pose_list is not None:
-        yield from feasibility.reach_failures(plan)

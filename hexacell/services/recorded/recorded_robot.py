@@ -1,4 +1,4 @@
-"""What the journal of a run tells of its measurement file: the geometries in command, and the noise."""
+"""The robot of a recorded run: as it was when the run began, which geometries it had, its noise."""
 
 from __future__ import annotations
 
@@ -16,16 +16,28 @@ from procedures.run.events import RunStarted
 from procedures.run.state import RunState
 
 
+def started_robot(settings: CellSettings, started: RunStarted) -> Robot:
+    """The robot by a cell's settings, which may be newer, and its controller when a run began."""
+    limits = started.limits or ControllerLimits(joints=started.joint_ranges)
+    return robot_of_start(settings, started.controller, started.branch, started.taught, limits)
+
+
+def geometry_before(settings: CellSettings, started: RunStarted) -> Geometry:
+    """The controller's geometry when the run began, in the mechanism's frame convention."""
+    mechanism = settings.mechanism
+    return mechanism.normalize_frames(Geometry.of(mechanism.parameters, started.controller))[0]
+
+
 def noise_of_run(folder: RunFolder, settings: CellSettings) -> MeasuredNoise | None:
-    """The noise that a run measured; none if it did not, or the folder is not that of a run."""
+    """The noise that a run measured; None if it did not, or the folder is not that of a run."""
     measured = _state_of(folder, settings).noise
     return None if measured is None else measured.noise
 
 
 def commanding_geometries(folder: RunFolder, settings: CellSettings) -> tuple[CommandingGeometry, ...]:
-    """By the journal of a run: that of its controller, and a provisional one in the same frames.
+    """The geometries that commanded a run: its controller's, and a provisional one in the same frames.
 
-    None if the folder is not that of a run of such a mechanism.
+    Empty if the folder is not that of a run of such a mechanism.
     """
     state, mechanism = _state_of(folder, settings), settings.mechanism
     started, parameters = state.started, mechanism.parameters
@@ -39,24 +51,9 @@ def commanding_geometries(folder: RunFolder, settings: CellSettings) -> tuple[Co
 
 
 def _state_of(folder: RunFolder, settings: CellSettings) -> RunState:
-    """A run as far as it got; empty if its journal cannot be read, or be of such a machine."""
+    """State of a run; empty if its journal cannot be read, or is of another kind of machine."""
     try:
         history = read_journal(folder.journal)
         return require_sound(history, settings, folder.journal, follows_plan=False)
     except HexacellError:
         return RunState()
-
-
-# JOINED The robot of a run, as the run knew it when it began.
-
-
-def started_robot(settings: CellSettings, started: RunStarted) -> Robot:
-    """From a cell's settings, which may be newer, and what its controller had then."""
-    limits = started.limits or ControllerLimits(joints=started.joint_ranges)
-    return robot_of_start(settings, started.controller, started.branch, started.taught, limits)
-
-
-def geometry_before(settings: CellSettings, started: RunStarted) -> Geometry:
-    """That of the controller when the run began, in the mechanism's frame convention."""
-    mechanism = settings.mechanism
-    return mechanism.normalize_frames(Geometry.of(mechanism.parameters, started.controller))[0]

@@ -1,4 +1,4 @@
-"""Whether the folder of an interrupted run belongs to the cell that resumes it.
+"""Which interrupted run is resumed, and whether its folder belongs to the cell that resumes it.
 
 A run folder may come from anywhere. What it names is therefore compared with the cell before anything moves
 or is written: the config, the geometry that commanded the records, and the poses that the robot may be sent
@@ -7,7 +7,8 @@ to again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -27,14 +28,47 @@ from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
 from hexacell.services.recorded.recorded_robot import started_robot
 from procedures.engine.config_edits import PROVISIONAL_FOLDER
 from procedures.journal.journal import read_entries
-from procedures.journal.line_format import RESTORE, Entry
+from procedures.journal.line_format import RESTORE
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import SixNumbers
 
+LATEST = "latest"
+"""Stands for the name of the run that was interrupted last."""
+
+
+def run_to_resume(cell: Cell, named: str) -> RunFolder:
+    """A run by its folder or name, or the interrupted one in which something happened last.
+
+    Raises:
+        UsageError: there is no such run.
+    """
+    if named != LATEST:
+        return find_run(cell, named)
+    folder = runs_folder(cell)
+    runs = [RunFolder(path) for path in folder.iterdir()] if folder.is_dir() else []
+    last_events = {run: at for run in runs if (at := _interrupted_at(run)) is not None}
+    if not last_events:
+        raise UsageError(
+            "no run of this cell was interrupted", action=f"Name one; the cell's runs are in {folder}"
+        )
+    return max(last_events, key=last_events.__getitem__)
+
+
+def _interrupted_at(run: RunFolder) -> datetime | None:
+    """When something happened last in a run that is not over; None where it is, or cannot be read."""
+    if not run.journal.is_file():
+        return None
+    try:
+        entries = read_entries(run.journal)
+    except HexacellError:
+        return None
+    is_over = any(isinstance(entry.event, events.Ended) for entry in entries)
+    return entries[-1].at if entries and not is_over else None
+
 
 def require_own_run(cell: Cell, folder: RunFolder, state: RunState) -> None:
-    """Check a run folder before its run is resumed; ``state`` is what its journal tells.
+    """Check a run folder before its run is resumed; ``state`` is by its journal.
 
     Raises:
         FileError: a file in it is a link, names another config, or has a geometry or a pose that is not of
@@ -53,7 +87,7 @@ def require_own_run(cell: Cell, folder: RunFolder, state: RunState) -> None:
 
 
 def _require_no_links(folder: Path) -> None:
-    """What is written to a link is written elsewhere."""
+    """Refuse links: what is written to one is written elsewhere."""
     entries = sorted(folder.iterdir()) if folder.is_dir() else []
     for path in (folder, *entries) if folder.name == PROVISIONAL_FOLDER else entries:
         if path.is_symlink():
@@ -81,7 +115,7 @@ def _require_own_geometry(
     if paths is None:
         if state.committed or state.provisional or state.rolling_back or state.config_write_pending:
             raise FileError(
-                "the config of before the run is not in it", subject=folder.path, action=RESTORE
+                "the config as it was before the run is missing", subject=folder.path, action=RESTORE
             )
         return
     found = controller_geometry(cell, *paths)
@@ -156,41 +190,3 @@ def _commanding(robot: Robot, state: RunState) -> Iterator[Geometry]:
         yield Geometry.of(parameters, state.proposed.written)
     if state.identified is not None:
         yield robot.for_controller(state.identified.result.identified(parameters))
-
-
-# JOINED The runs of a cell that were interrupted and can be resumed.
-
-LATEST = "latest"
-"""In the place of a run's name."""
-
-
-def run_to_resume(cell: Cell, named: str) -> RunFolder:
-    """A run by its folder or name, or the interrupted one in which something happened last.
-
-    Raises:
-        UsageError: there is none.
-    """
-    return _latest(cell) if named == LATEST else find_run(cell, named)
-
-
-def _latest(cell: Cell) -> RunFolder:
-    folder = runs_folder(cell)
-    runs = [RunFolder(path) for path in folder.iterdir()] if folder.is_dir() else []
-    interrupted = {run: entries[-1].at for run in runs if (entries := _entries_if_interrupted(run))}
-    if not interrupted:
-        raise UsageError(
-            "no run of this cell was interrupted", action=f"Name one; the cell's runs are in {folder}"
-        )
-    return max(interrupted, key=interrupted.__getitem__)
-
-
-def _entries_if_interrupted(run: RunFolder) -> Sequence[Entry]:
-    """The journal of a run that is not over; nothing where it cannot be read."""
-    if not run.journal.is_file():
-        return []
-    try:
-        entries = read_entries(run.journal)
-    except HexacellError:
-        return []
-    is_over = any(isinstance(entry.event, events.Ended) for entry in entries)
-    return [] if is_over else entries

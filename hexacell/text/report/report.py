@@ -1,4 +1,4 @@
-"""The report of one run, put together."""
+"""The report of one run, put together; its last chapters: conditions, instruments, files, who answers."""
 
 from __future__ import annotations
 
@@ -33,9 +33,11 @@ TITLES = {
     "length": "Report of a length check",
 }
 
+NOT_STATED = "not stated"
+
 
 def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
-    """What is said of a run, the verdict first; and what has changed since an ``earlier`` one, if named.
+    """The report of a run, the verdict first; with what has changed since an ``earlier`` run, if named.
 
     Raises:
         UsageError: the two cannot be compared.
@@ -65,13 +67,8 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
     )
 
 
-# JOINED Where the figures come from: conditions, instruments and their certificates, files, who answers.
-
-NOT_STATED = "not stated"
-
-
 def conditions_chapter(run: ReportedRun) -> Chapter:
-    """Temperatures, records, noise: under what the figures were taken."""
+    """Temperatures, records and noise."""
     state = run.state
     pairs = [("Records", str(sum(len(measured.samples) for measured in state.sets.values())))]
     pairs += [
@@ -81,18 +78,13 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
     if len(pairs) == 1:
         pairs.append(("Temperature", "not measured"))
     pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
-    noise = () if state.noise is None else measured_noise_lines(state.noise.noise)
-    return Chapter("Conditions", (Facts(tuple(pairs)), *map(_sentence, noise), *_sets_table(run)))
-
-
-def _sentence(line: str) -> Paragraph:
-    """A line of a run's output as a sentence of a page."""
-    text = line[:1].upper() + line[1:]
-    return Paragraph(text if text.endswith(".") else f"{text}.")
+    lines = () if state.noise is None else measured_noise_lines(state.noise.noise)
+    noise = (Paragraph(f"{line[:1].upper()}{line[1:].removesuffix('.')}.") for line in lines)
+    return Chapter("Conditions", (Facts(tuple(pairs)), *noise, *_sets_table(run)))
 
 
 def _sets_table(run: ReportedRun) -> tuple[Table, ...]:
-    """Each set whose reference was read again, with how far the gauges had drifted by then."""
+    """Sets whose reference was read again, with how far the gauges had drifted by then."""
     columns = ("Set of records", "records", "largest deviation, mm", "drift of the gauges, mm")
     rows = tuple(
         (
@@ -112,11 +104,10 @@ def traceability_chapter(run: ReportedRun) -> Chapter:
     day = run.began.date()
     rows = tuple(_instrument_row(run, device, day) for device in run.started.devices)
     expired = run.settings.expired_on(day)
-    text = f"Expired on the day of the run: {', '.join(expired)}." if expired else ""
+    text = f"Expired on the day of the run: {', '.join(expired)}."
+    note = (Paragraph(text, is_strong=True),) if expired else ()
     table = Table(("Instrument", "kind", "serial number", "certificate", "due"), rows, None)
-    return Chapter(
-        "Instruments and traceability", (table, *([Paragraph(text, is_strong=True)] if text else []))
-    )
+    return Chapter("Instruments and traceability", (table, *note))
 
 
 def integrity_chapter(run: ReportedRun) -> Chapter:
@@ -164,7 +155,7 @@ def _instrument_row(run: ReportedRun, device: DeviceIdentity, day: date) -> tupl
 
 
 def certificate_of(run: ReportedRun, device: DeviceIdentity) -> CertificateSettings | None:
-    """A gauge has its own; the encoders have one together."""
+    """Certificate of an instrument: a gauge has its own, the encoders have one together."""
     certificates = run.settings.certificates
     if device.name.startswith("encoder"):
         return certificates.get("encoders")
@@ -172,7 +163,7 @@ def certificate_of(run: ReportedRun, device: DeviceIdentity) -> CertificateSetti
 
 
 def serial_number_of(run: ReportedRun, device: DeviceIdentity) -> str:
-    """As it says itself, or else as the cell file does; empty if neither does."""
+    """Serial number that an instrument reports, or else that of the cell file; empty without either."""
     return device.serial_number or next(
         (gauge.serial_number for gauge in run.settings.gauges if gauge.name == device.name), ""
     )

@@ -1,4 +1,4 @@
-"""Text for what the devices show now: reading, unit, age and noise, and the plunger in its travel."""
+"""Views of the devices: what they show now, and what must hold before motion."""
 
 from __future__ import annotations
 
@@ -24,12 +24,27 @@ from hexacell.text.screens.views import (
 from procedures.run.steps import ThreeNumbers
 
 BAR_COLUMNS = 17
-"""Of the picture of a plunger in its travel; odd, so that the middle has a place."""
+"""Columns of the picture of a plunger in its travel; odd, so that the middle has a place."""
 
 OLD_S = 2.0
-"""A device that is silent for longer is said to be."""
+"""Silence of a device from which it is shown, s."""
 
 NOT_CONNECTED = "No device is connected."
+PRESS_CHECK = (
+    "Enter looks at everything, v tries the plan, x takes poses out of it. "
+    "s starts a calibration, k a check, K the quick level, r resumes the latest run."
+)
+PRESS_LENGTH = "l checks the length scale with the fixture, L calibrates and checks it."
+CHECKING = "Looking at everything: this takes some seconds, and nothing moves."
+RUNNING = "A run goes on: see 3 Measure. Its checks are made again before each step that depends on them."
+STARTING = "The run is being started: a process of its own connects to the devices."
+NOT_CHECKED_YET = (
+    "points and poses within reach",
+    "devices answer with the right settings",
+    "stop line, disk, and the robot's position",
+)
+PLAN_UNKNOWN = "v carries the plan out on simulated robots: records, minutes, and predicted accuracy."
+TRYING = "Trying the plan on simulated robots, some seconds ..."
 
 
 def live_view(
@@ -41,7 +56,7 @@ def live_view(
     """The devices as they show now.
 
     Args:
-        snapshot: their latest values; none where there are none.
+        snapshot: their latest values; None without any.
         later_s: how long ago these came.
         zero_mm: what the gauges showed along base x, y, z when they were zeroed.
         mounting_mm: how far from its middle a plunger may stand when gauges are placed.
@@ -66,7 +81,9 @@ def gauge_readout(
         axis=gauge.axis,
         reading="-" if shown is None else f"{shown:+.4f}",
         unit=gauge.unit,
-        deviation=_deviation(gauge, zero_mm),
+        deviation=""
+        if shown is None or zero_mm is None
+        else f"{gauge.sign * shown - zero_mm['xyz'.index(gauge.axis)]:+.3f}",
         age=age_text(gauge.age_s, later_s),
         noise=noise,
         bar=travel_bar(place, half),
@@ -77,17 +94,10 @@ def gauge_readout(
 
 
 def plunger_place(gauge: GaugeSnapshot) -> float | None:
-    """How far the plunger is pushed in beyond the middle of its travel, mm; none where nobody knows."""
+    """How far the plunger is pushed in beyond the middle of its travel, mm; None if not known."""
     if gauge.shown_mm is None or gauge.middle_mm is None:
         return None
     return gauge.shown_mm - gauge.middle_mm
-
-
-def _deviation(gauge: GaugeSnapshot, zero_mm: ThreeNumbers | None) -> str:
-    """Along the base axis, from the zero of the set."""
-    if gauge.shown_mm is None or zero_mm is None:
-        return ""
-    return f"{gauge.sign * gauge.shown_mm - zero_mm['xyz'.index(gauge.axis)]:+.3f}"
 
 
 def mounting_advice(gauge: GaugeSnapshot, mounting_mm: float) -> str:
@@ -124,10 +134,6 @@ def age_text(age_s: float | None, later_s: float) -> str:
     return f"{age:.1f} s" if age < 99.95 else "> 99 s"
 
 
-def _is_silent(age_s: float | None, later_s: float) -> bool:
-    return age_s is None or age_s + later_s > OLD_S
-
-
 def encoder_line(encoders: EncoderSnapshot, later_s: float) -> DeviceLine:
     """The six joint variables."""
     if encoders.problem:
@@ -135,8 +141,8 @@ def encoder_line(encoders: EncoderSnapshot, later_s: float) -> DeviceLine:
     if encoders.positions is None:
         return DeviceLine("encoders", "no reading yet")
     positions = " ".join(f"{one:+9.3f}" for one in encoders.positions)
-    silent = _is_silent(encoders.age_s, later_s)
-    age = f", {age_text(encoders.age_s, later_s)} ago" if silent else ""
+    is_silent = encoders.age_s is None or encoders.age_s + later_s > OLD_S
+    age = f", {age_text(encoders.age_s, later_s)} ago" if is_silent else ""
     return DeviceLine("encoders", f"{positions} {encoders.unit}{age}")
 
 
@@ -152,25 +158,6 @@ def controller_line(controller: ControllerSnapshot, later_s: float) -> DeviceLin
         return DeviceLine("controller", f"EMERGENCY STOP{messages}", Urgency.ALARM)
     state = "on, may move" if controller.enabled else "off"
     return DeviceLine("controller", f"{state}, {age_text(controller.age_s, later_s)} ago{messages}")
-
-
-# JOINED Text for what must hold before motion: devices from their live values, the rest from a preflight.
-
-PRESS_CHECK = (
-    "Enter looks at everything, v tries the plan, x takes poses out of it. "
-    "s starts a calibration, k a check, K the quick level, r resumes the latest run."
-)
-PRESS_LENGTH = "l checks the length scale with the fixture, L calibrates and checks it."
-CHECKING = "Looking at everything: this takes some seconds, and nothing moves."
-RUNNING = "A run goes on: see 3 Measure. Its checks are made again before each step that depends on them."
-STARTING = "The run is being started: a process of its own connects to the devices."
-NOT_CHECKED_YET = (
-    "points and poses within reach",
-    "devices answer with the right settings",
-    "stop line, disk, and the robot's position",
-)
-PLAN_UNKNOWN = "v carries the plan out on simulated robots: records, minutes, and predicted accuracy."
-TRYING = "Trying the plan on simulated robots, some seconds ..."
 
 
 def live_items(live: LiveSnapshot | None) -> tuple[ChecklistItem, ...]:
@@ -231,7 +218,7 @@ def checklist_view(
     refusal: str = "",
     has_fixture: bool = False,
 ) -> ChecklistView:
-    """The whole list; ``checked`` is what the preflight found, none before it.
+    """The whole list; ``checked`` is what the preflight found, None before it.
 
     ``has_fixture`` is whether the cell can check its length scale.
     """

@@ -29,6 +29,7 @@ RECORDS_HEADER = f"{'point/pose':12}{'x':>8}{'y':>8}{'z':>8}{'residual':>9}{'sig
 
 PACE_RECORDS = 8
 """The time that is left follows from the pace of so many records."""
+RESUMABLE = "What was measured is kept. Mend it, then press r in 2 Preflight, which resumes the run."
 
 
 def measure_view(picture: RunPicture, settings: CellSettings | None, now_s: float) -> MeasureView:
@@ -263,11 +264,6 @@ def _accuracy_title(picture: RunPicture) -> str:
 
 def _columns(pairs: list[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return tuple(x for x, _ in pairs), tuple(y for _, y in pairs)
-
-
-# JOINED Text for what went wrong: the fact, its cause, and the next action.
-
-RESUMABLE = "What was measured is kept. Mend it, then press r in 2 Preflight, which resumes the run."
 
 
 def fault_view(setback: Setback) -> FaultView:

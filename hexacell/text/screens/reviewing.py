@@ -1,4 +1,4 @@
-"""Text for a result: verdict and scope first, then everything behind them."""
+"""Views of results: the review of a run, verdict and scope first, and the list of past runs."""
 
 from __future__ import annotations
 
@@ -31,10 +31,22 @@ from procedures.run.questions import PendingChange, QuestionKind
 from procedures.run.state import RunState
 from procedures.run.steps import Phase
 
+PROPOSAL_WAITS = "Its proposal can still be written: w asks for it, with the change."
+READING = "Reading the runs of this cell ..."
+WHAT_TO_PRESS = (
+    "Enter  watch the chosen run again      v  compare it with the one before it",
+    "b      go back to the config that it wrote; if the controller has it: undo it",
+    "w      write its proposal, where it has one, into the controller's config",
+    "o      the drift of each parameter over all runs",
+)
+
+URGENCIES = {Verdict.PASS: Urgency.CALM, Verdict.FAIL: Urgency.ALARM}
+
 
 def review_view(picture: RunPicture, settings: CellSettings | None, change: str = "") -> ReviewView:
     """The screen of a result; ``change`` is the text change of the config, if it is known."""
-    state = picture.state
+    state, subject = picture.state, picture.question and picture.question.subject
+    diff = subject.diff if isinstance(subject, PendingChange) else ""
     verdict, urgency = _verdict(state)
     header, *lines = parameter_table(rows_of_run(state, settings))
     return ReviewView(
@@ -45,7 +57,7 @@ def review_view(picture: RunPicture, settings: CellSettings | None, change: str 
         parameters=tuple(lines) or ("The geometry is not identified yet.",),
         comparison=_comparison(state),
         plots=(deviation_plot(state), residual_plot(picture), accuracy_plot(picture, None)),
-        change=tuple((_diff(picture) or change or "There is no change yet.").splitlines()),
+        change=tuple((diff or change or "There is no change yet.").splitlines()),
         urgency=urgency,
     )
 
@@ -54,15 +66,12 @@ def _verdict(state: RunState) -> tuple[str, Urgency]:
     judged = state.judged
     if judged is None:
         return "No verdict yet: it is given once the held-out poses are measured.", Urgency.CALM
-    is_good = judged.verdict is Verdict.PASS
-    urgency = Urgency.CALM if is_good else Urgency.ATTENTION
-    if judged.verdict is Verdict.FAIL:
-        urgency = Urgency.ALARM
+    urgency = URGENCIES.get(judged.verdict, Urgency.ATTENTION)
     return f"{judged.verdict.upper()}: {VERDICT_MEANINGS[judged.verdict]}", urgency
 
 
 def _scope(state: RunState) -> tuple[str, ...]:
-    """What the verdict holds for; the verdict itself is said above."""
+    """Scope of the verdict, without the verdict itself, which stands above it."""
     if state.judged is None:
         return ("The length scale was not checked.",) if state.identified else ()
     lines = (event_text(state.judged, state) or "").splitlines()
@@ -78,7 +87,7 @@ def _approval(picture: RunPicture) -> str:
     if question is not None and question.kind is QuestionKind.KEEP_RESULT:
         return "Waiting for you: w asks whether the result is kept."
     if state.rolled_back:
-        return "The old config was put back."
+        return "The old config was restored."
     if state.committed is not None:
         return f"Written to the controller, approved by {state.committed.approved_by}."
     if state.proposed is not None:
@@ -93,13 +102,6 @@ def _missing(state: RunState) -> str:
     if state.identified is None:
         return "the geometry is not identified"
     return "the held-out poses with the old geometry are still to be measured"
-
-
-def _diff(picture: RunPicture) -> str:
-    question = picture.question
-    if question is not None and isinstance(question.subject, PendingChange):
-        return question.subject.diff
-    return ""
 
 
 def _comparison(state: RunState) -> tuple[str, ...]:
@@ -154,25 +156,13 @@ def residual_plot(picture: RunPicture) -> PlotView:
     )
 
 
-# JOINED Text for the screen of a cell's runs.
-
-PROPOSAL_WAITS = "Its proposal can still be written: w asks for it, with the change."
-READING = "Reading the runs of this cell ..."
-WHAT_TO_PRESS = (
-    "Enter  watch the chosen run again      v  compare it with the one before it",
-    "b      go back to the config that it wrote; if the controller has it: undo it",
-    "w      write its proposal, where it has one, into the controller's config",
-    "o      the drift of each parameter over all runs",
-)
-
-
 def history_entries(runs: Sequence[PastRun]) -> tuple[HistoryEntry, ...]:
     """A line for each run, in their order."""
     return tuple(HistoryEntry(run.name, history_line(run), run.summary.has_proposal) for run in runs)
 
 
 def history_view(entries: tuple[HistoryEntry, ...] | None, compared: tuple[str, ...]) -> HistoryView:
-    """The list; ``entries`` are none before they were read."""
+    """The list; ``entries`` are None until they are read."""
     if entries is None:
         return HistoryView(history_head(), (), note=READING)
     note = "" if entries else NO_RUNS
@@ -183,6 +173,6 @@ def rollback_question(run: str, *, is_in_controller: bool) -> QuestionView:
     """What a person confirms before the controller's config is changed."""
     title = f"Go back to the controller's config that {run} wrote?"
     if is_in_controller:
-        title = f"Undo {run}: put back the controller's config of before it?"
+        title = f"Undo {run}: restore the previous config of the controller?"
     consent = Choice("y", "yes, replace the config, bit for bit", PERSON, is_consent=True)
     return QuestionView(title, (), "Press y or n.", (consent, Choice("n", "no, leave it as it is", None)))

@@ -252,7 +252,7 @@ def test_every_verdict_is_said_in_words_with_its_scope(verdict: Verdict) -> None
         ((), "Approving is not possible yet: the geometry is not identified."),
         (
             (events.ResultValidated(verdict=Verdict.FAIL, line=""), events.RolledBack()),
-            "The old config was put back.",
+            "The old config was restored.",
         ),
         ((events.Committed(approved_by="ada"),), "Written to the controller, approved by ada."),
     ],

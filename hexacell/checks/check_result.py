@@ -17,8 +17,8 @@ from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.results.result import AcceptedResult, LengthResult
 from hexacell.uncertainty.effects import Effect
 from hexacell.verdict.check_statement import CheckStatement
-from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
-from hexacell.verdict.verification import outcome_of
+from hexacell.verdict.decision import Verdict, VerifiedAccuracy
+from hexacell.verdict.outcome import outcome_of
 
 
 class ParameterChange(Frozen):
@@ -125,15 +125,9 @@ def _reason(result: CheckResult) -> str:
 
 def _accuracy(check: Check, stated: CheckStatement, length: LengthResult | None) -> VerifiedAccuracy:
     task = check.plan.task.reachable(stated.estimate.belief)
-    limits, factor = check.limits, check.limits.guard_band_factor
-    return VerifiedAccuracy(
-        position=JudgedError.of(stated.position, limits.position_mm, factor),
-        orientation=JudgedError.of(stated.orientation, limits.orientation_deg, factor),
-        poses=len(task.poses),
-        task_named=bool(check.settings.task.poses),
-        worst=check.robot.to_command(task.poses.pose(stated.errors.worst)).as_tuple(),
-        length=length,
-        scale_of=VerifiedAccuracy.scale_with(check.robot.mechanism),
+    is_named = bool(check.settings.task.poses)
+    return VerifiedAccuracy.of(
+        stated.errors, check.limits, check.robot, task, task_named=is_named, length=length
     )
 
 

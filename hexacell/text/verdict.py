@@ -11,7 +11,8 @@ from hexacell.results.result import AcceptedResult, LengthResult
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.layout import wrapped
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy
-from hexacell.verdict.length_check import LengthStatement, scale_words
+from hexacell.verdict.length_check import LengthStatement
+from hexacell.verdict.outcome import scale_words
 from hexacell.verdict.verification import Verification
 
 VERDICT_MEANINGS = {

@@ -1,7 +1,4 @@
-"""Acceptance of a result: gates before its geometry is written to a controller, validation afterwards.
-
-The deviations of the ball at held-out points are compared before and after the calibration.
-"""
+"""Gates that an identified geometry must pass before it is written to a controller."""
 
 from __future__ import annotations
 
@@ -19,7 +16,7 @@ from hexacell.kinematics.geometry import Geometry
 
 
 class AcceptanceGate(Frozen):
-    """One condition for writing back, whether it is met, and that as a sentence for people.
+    """A condition for writing back, whether it is met, and that as a sentence for people.
 
     ``needs_person``: where it is not met, a person may accept the geometry nevertheless, with
     ``needs_cell_name`` by typing the name of the cell.
@@ -41,12 +38,15 @@ def gates(
     before: Geometry,
     expired: Sequence[str] | None = None,
 ) -> tuple[AcceptanceGate, ...]:
-    """All conditions on an identification.
+    """All gates of an identification.
 
-    ``violations`` are those of the drawing's tolerances. ``before`` is the controller's geometry, as the
-    identified one in the mechanism's frame convention: other frames change numbers, and no robot.
-    ``expired`` are the instruments whose certificate had expired when the run began; none where no
-    instrument has one.
+    Args:
+        identified: the geometry, in the mechanism's frame convention.
+        violations: of the drawing's tolerances.
+        residuals: the chi-square test of the residuals.
+        largest_change_mm: what may change without a person.
+        before: the controller's geometry, in the same convention: other frames are no other robot.
+        expired: instruments whose certificate had expired when the run began; None where none has one.
     """
     certified = () if expired is None else (_certified(expired),)
     return (
@@ -94,7 +94,7 @@ def _agrees(residuals: ChiSquareTest) -> AcceptanceGate:
 
 
 def _within_tolerance(violations: Sequence[ToleranceViolation]) -> AcceptanceGate:
-    """The drawing may be of another machine; who knows better takes the responsibility by its name."""
+    """The drawing may be of another machine; who knows better types the cell's name."""
     names = ", ".join(
         f"{violation.name} ({violation.change:+.2f} {violation.unit})" for violation in violations
     )
@@ -128,7 +128,7 @@ def _small_change(after: Geometry, before: Geometry, largest_change_mm: float) -
 
 
 def _certified(expired: Sequence[str]) -> AcceptanceGate:
-    """What rests on an instrument out of its term is no calibration to others; here a person decides."""
+    """A result by an instrument with an expired certificate needs a person: others do not accept it."""
     sentence = (
         f"The certificate has expired: {', '.join(expired)}."
         if expired

@@ -29,7 +29,7 @@ from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.possible_causes import PossibleCause, possible_causes
 
 SEPARATED_PAIRS = 5
-"""How many of the strongest correlations a measurement is searched for."""
+"""Number of the strongest correlations for which a separating measurement is searched."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,20 +37,20 @@ class Assessment:
     """An identification beside the drawing, its checks against the data, and the accuracy they predict.
 
     Attributes:
-        noise: noise levels estimated from the residuals; none without redundancy.
-        repeatability: none where no pose was visited twice.
+        noise: noise levels estimated from the residuals; None without redundancy.
+        repeatability: None where no pose was visited twice.
         record_noise_mm: scatter of a deviation by the stated noise (root mean square distance), to
             compare the repeatability with.
         correlated: strongly correlated pairs of parameters, the strongest first; with the first
             ``SEPARATED_PAIRS`` the record that would separate them, commanded in the controller's frames.
         task: poses at which the accuracy is predicted, in the controller's frames.
-        task_named: whether the cell file names them; else they span the workspace.
-        budget: what is not known of the errors at the reachable ones of these poses; none as above.
-        accuracy: at these poses; none where the robot can reach none of them. Where the residuals
+        task_named: whether the cell file names these poses; else they span the workspace.
+        budget: uncertainty of the errors at the reachable task poses; None where there are none.
+        accuracy: at the task poses; None where the robot can reach none of them. Where the residuals
             are larger than the stated noise, the predicted error is as well.
         points: each point's records predicted by the others, where those determine the geometry.
-        measured_noise: at the start of the run that took the records; none where that is not known.
-        possible_causes: of residuals that are too large, the largest share first.
+        measured_noise: at the start of the run that took the records; None where that is not known.
+        possible_causes: causes of residuals that are too large, the largest share first.
         zeros: where these alone are identified; ``found`` is the estimate of all, which tests the data.
     """
 
@@ -72,7 +72,7 @@ class Assessment:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Of the identified parameters those that the data hardly determine."""
+        """Identified parameters that the data hardly determine."""
         return (self.zeros or self.found).undetermined
 
     @property
@@ -96,7 +96,7 @@ class Assessment:
 
     @property
     def improvement(self) -> ExpectedImprovement | None:
-        """What the identified geometry is good for; none where the robot can reach no task pose."""
+        """What the identified geometry is good for; None where the robot can reach no task pose."""
         if self.accuracy is None or self.budget is None:
             return None
         return ExpectedImprovement(

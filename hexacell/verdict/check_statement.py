@@ -25,13 +25,13 @@ class CheckStatement:
     """What is said of the robot by the records so far.
 
     Attributes:
-        estimate: that it is made from.
+        estimate: the estimate that it is made from.
         errors: of the controller's geometry at the task poses that the estimated robot reaches.
-        verdict: on their position and orientation.
-        drift_scale: the likeliest one; none where the robot was not identified before.
+        verdict: the verdict on these errors.
+        drift_scale: the likeliest scale of the drift; None where the robot was not identified before.
         is_consistent: whether the residuals agree with the stated noise.
-        records: that it is made from.
-        further_records: about how many more would decide; none where none would, or nothing is open.
+        records: number of records that it is made from.
+        further_records: about how many more would decide; None where no number would, or nothing is open.
     """
 
     estimate: OnlineEstimate
@@ -84,7 +84,7 @@ class ErrorEstimate:
         effects: Iterable[Effect] = (),
         earlier: Mapping[str, Array] | None = None,
     ) -> ErrorEstimate | None:
-        """By an estimate while measuring; none if the estimated robot can take no task pose.
+        """The errors by an estimate while measuring; None if the estimated robot reaches no task pose.
 
         ``effects`` are the systematic ones. Where the prior is an earlier estimate, ``earlier`` says what
         they did to that one (:attr:`~hexacell.uncertainty.budget.UncertaintyBudget.parameter_columns`).
@@ -109,7 +109,7 @@ class ErrorEstimate:
         return replace(unknown, estimated=unknown.estimated + self.known)
 
     def after(self, information: Array) -> ErrorEstimate:
-        """The same after records that add information (p, p) and confirm the estimate."""
+        """The errors after records that add information (p, p) and confirm the estimate."""
         return replace(self, covariance=add_information(self.covariance, information))
 
 

@@ -18,14 +18,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from hexacell.cell.fields import Frozen, SixNumbers
 from hexacell.cell.measuring import AcceptanceSettings
-from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.results.result import LengthResult
 from hexacell.uncertainty.statement import LargestError, TaskErrors
+
+if TYPE_CHECKING:
+    from hexacell.campaign.task_accuracy import Task
+    from hexacell.robot.model import Robot
 
 
 class Verdict(StrEnum):
@@ -80,13 +83,13 @@ class JudgedError(Frozen):
 
     @property
     def guard_band(self) -> str:
-        """As a multiple of U, for people; empty where it is U, or the limit is passed."""
+        """The guard band as a multiple of U, in words; empty where it is U, or the verdict is a pass."""
         factor = self.guard_band_factor
         return "" if factor == 1.0 or self.verdict is Verdict.PASS else f"{factor:g} U"
 
     @property
     def rule(self) -> str:
-        """The limit, and the guard band where it is told."""
+        """The limit, and the guard band where it is named, in words."""
         guard_band = f", guard band {self.guard_band}" if self.guard_band else ""
         return f"limit {self.limit:g}{guard_band}"
 
@@ -110,7 +113,7 @@ class ErrorLimits:
 
     @classmethod
     def of(cls, settings: AcceptanceSettings) -> ErrorLimits:
-        """Those of a cell."""
+        """The limits of a cell."""
         return cls(settings.position_mm, settings.orientation_deg, settings.guard_band_factor)
 
     def decide(self, errors: TaskErrors) -> Verdict:
@@ -130,7 +133,7 @@ class VerifiedAccuracy(Frozen):
     Attributes:
         poses: their number, and whether the cell file names them; else they span the workspace.
         worst: the pose with the largest position error, in the controller's frames.
-        length: what a length check found; none if there was none.
+        length: what a length check found; None without one.
         scale_of: what says how long a millimetre is: the encoders, or the drawing where these read angles.
     """
 
@@ -142,12 +145,30 @@ class VerifiedAccuracy(Frozen):
     length: LengthResult | None = None
     scale_of: Literal["encoders", "drawing"] = "encoders"
 
+    @classmethod
+    def of(
+        cls,
+        errors: TaskErrors,
+        limits: ErrorLimits,
+        robot: Robot,
+        task: Task,
+        *,
+        task_named: bool,
+        length: LengthResult | None = None,
+    ) -> VerifiedAccuracy:
+        """The decision on errors at the poses of a ``task`` that the ``robot`` reaches."""
+        factor, joint_unit = limits.guard_band_factor, robot.mechanism.words.joint_unit
+        return cls(
+            position=JudgedError.of(errors.position, limits.position_mm, factor),
+            orientation=JudgedError.of(errors.orientation, limits.orientation_deg, factor),
+            poses=len(task.poses),
+            task_named=task_named,
+            worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
+            length=length,
+            scale_of="encoders" if joint_unit is JointUnit.MM else "drawing",
+        )
+
     @property
     def errors(self) -> tuple[tuple[str, str, JudgedError], ...]:
         """Each error with its name and unit."""
         return ("position", "mm", self.position), ("orientation", "deg", self.orientation)
-
-    @staticmethod
-    def scale_with(mechanism: Mechanism) -> Literal["encoders", "drawing"]:
-        """What says how long a millimetre is, for a mechanism."""
-        return "encoders" if mechanism.words.joint_unit is JointUnit.MM else "drawing"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hexacell.identification.diagnostics.model_tests import PointPrediction, contradicted_points
+from hexacell.identification.diagnostics.model_tests import contradicted_points
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.kinematics.mechanism import FrameConvention
@@ -13,17 +13,17 @@ from hexacell.noise.record_noise import NoiseLevel, NoiseLevels
 from hexacell.verdict.assessment import SEPARATED_PAIRS, Assessment
 
 POOR_REPEATABILITY = 2.0
-"""Scatter of repeated poses over that of the stated noise from which it is a finding."""
+"""Ratio of the scatter of repeated poses to the stated noise from which it is a finding."""
 
 NEGLIGIBLE_MM = 0.001
-"""No smaller error is printed: it is that of the numbers in a config."""
+"""Smallest error that is printed, mm: that of the numbers in a config."""
 
 NAMED_PARAMETERS = 4
-"""More undetermined parameters than these are counted, not named."""
+"""Largest number of undetermined parameters that are named; more are counted."""
 
 
 def findings(assessed: Assessment) -> tuple[str, ...]:
-    """The verdict, the accuracy, and everything else to know before the result is used."""
+    """Verdict, accuracy, and everything else to know before the result is used, one sentence each."""
     sentences = (
         _verdict(assessed),
         _possible_causes(assessed),
@@ -103,7 +103,14 @@ def _verdict(assessed: Assessment) -> str:
 
 
 def _incomplete(assessed: Assessment) -> str:
-    what = f"{_undetermined(assessed)} not determined by these data"
+    convention = assessed.found.problem.mechanism.convention
+    free = convention.free_names()
+    names = [convention.display_name(name) for name in assessed.undetermined if name in free]
+    if len(names) > NAMED_PARAMETERS:
+        subject = f"{len(names)} of {len(free)} parameters are"
+    else:
+        subject = f"{', '.join(names)} {'is' if len(names) == 1 else 'are'}"
+    what = f"{subject} not determined by these data"
     if not assessed.determines_too_little:
         return f"Incomplete: {what}."
     return f"Not usable: {what}. Measure at more points, and in more orientations with larger tilts."
@@ -114,14 +121,10 @@ def _point_verdict(assessed: Assessment) -> str:
     contradicted = contradicted_points(assessed.points)
     if not contradicted or assessed.found.goodness.agreement is ChiSquareVerdict.TOO_LARGE:
         return ""
-    return f"Doubtful: {_contradicted_by_others(contradicted)}"
-
-
-def _contradicted_by_others(points: Sequence[PointPrediction]) -> str:
-    worst = max(points, key=lambda one: one.test.ratio)
+    worst = max(contradicted, key=lambda one: one.test.ratio)
     return (
-        f"the records of point {worst.point} are {worst.test.ratio:.1f} times as far as the stated noise "
-        "explains from what the other points predict, so the model does not hold."
+        f"Doubtful: the records of point {worst.point} are {worst.test.ratio:.1f} times as far as the "
+        "stated noise explains from what the other points predict, so the model does not hold."
     )
 
 
@@ -148,20 +151,22 @@ def _contradicted(goodness: ChiSquareTest) -> str:
 
 
 def _residual_verdict(goodness: ChiSquareTest) -> str:
+    sentence = residual_sentence(goodness)
+    lower = f"{sentence[0].lower()}{sentence[1:]}"
     match goodness.agreement:
         case ChiSquareVerdict.TOO_LARGE:
             scale = f"Every parameter's sigma is in fact {goodness.ratio:.1f} times as large."
-            return f"Doubtful: {_lower(residual_sentence(goodness))} {scale}"
+            return f"Doubtful: {lower} {scale}"
         case ChiSquareVerdict.NOT_EVALUATED:
-            return f"Not proven: {_lower(residual_sentence(goodness))}"
+            return f"Not proven: {lower}"
         case ChiSquareVerdict.TOO_SMALL:
-            return f"Good: the records determine every parameter. {residual_sentence(goodness)}"
+            return f"Good: the records determine every parameter. {sentence}"
         case ChiSquareVerdict.AGREES:
             return "Good: the records determine every parameter, and agree with the stated noise."
 
 
 def _possible_causes(assessed: Assessment) -> str:
-    """What may be, where the residuals are too large and nothing that was left out explains it."""
+    """Possible causes, where the residuals are too large and nothing that was left out explains it."""
     if causes := ", ".join(f"{cause.name} {100 * cause.share:.0f} %" for cause in assessed.possible_causes):
         return (
             "The model does not fit, and no cause is proven. What may be, by the share of the excess that "
@@ -173,15 +178,6 @@ def _possible_causes(assessed: Assessment) -> str:
         "The model does not fit, and no cause is proven: neither encoders, guides, load, temperature "
         "nor gauges would explain a tenth of the excess."
     )
-
-
-def _undetermined(assessed: Assessment) -> str:
-    convention = assessed.found.problem.mechanism.convention
-    free = convention.free_names()
-    names = [convention.display_name(name) for name in assessed.undetermined if name in free]
-    if len(names) > NAMED_PARAMETERS:
-        return f"{len(names)} of {len(free)} parameters are"
-    return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'}"
 
 
 def _accuracy(assessed: Assessment) -> str:
@@ -234,7 +230,3 @@ def _unreachable(assessed: Assessment) -> str:
     numbered = enumerate(assessed.accuracy.reachable, start=1)
     unreachable = ", ".join(str(number) for number, is_reachable in numbered if not is_reachable)
     return f"Task poses that the robot cannot reach are left out: {unreachable}."
-
-
-def _lower(sentence: str) -> str:
-    return sentence[0].lower() + sentence[1:]

@@ -179,20 +179,3 @@ def with_measured_scale(effects: Iterable[Effect], length: LengthResult | None) 
         replace(one, size=sigma, value=value, source="length check") if one.name == COMMON_SCALE else one
         for one in effects
     )
-
-
-def scale_words(result: LengthResult) -> str:
-    """The scale of the encoders with U, in words."""
-    wrong_way = "long" if result.long_um_m >= 0.0 else "short"
-    return f"encoders read {abs(result.long_um_m):.0f} +- {result.expanded_um_m:.0f} um/m {wrong_way}"
-
-
-def length_line(stated: LengthStatement) -> str:
-    """The outcome of a length check in one line."""
-    result, error = stated.result, stated.error
-    if not result.is_consistent:
-        return f"length check: {stated.verdict} ({result.reason})"
-    parts = [f"length check over {result.distance_mm:.3f} mm: {scale_words(result)}"]
-    if error is not None:
-        parts.append(f"position error by that {error.value:.3f} +- {error.expanded:.3f} mm ({error.rule})")
-    return f"{'; '.join(parts)}: {stated.verdict}"

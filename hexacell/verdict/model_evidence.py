@@ -19,24 +19,23 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.rotations import Mask
 
 BEYOND_CHANCE = 1e-6
-"""Probability below which a failure is none that confirming records are asked about."""
+"""Probability below which a failure is beyond chance, and no confirming records are taken."""
 
 CONFIRMING_PROBABILITY = 1e-2
-"""Of confirming records that are so far off by chance: with the first test at most one in 100,000."""
-
+"""Probability of confirming records so far off by chance: with the first test at most 1 in 100,000."""
 
 HELD_OUT = "held-out records"
-"""The name of the test of them."""
+"""Name of the test of the held-out records."""
 
 ZEROS_DOUBTED = "perhaps the controller ran other zeros than its config had; restart it and run again."
-"""A cause that nothing shows before a result is written, where the controller reads the encoders: what it
-tells of a joint, less a zero that it does not run, is a wrong joint variable that no report contradicts."""
+"""A cause that nothing shows before a result is written, where the controller reads the encoders: what
+it reports of a joint, less a zero that it does not run, is wrong, and nothing contradicts it."""
 
 
 class ModelTest(Frozen):
     """One test of the model, whether it holds, and that as a sentence for people.
 
-    ``probability`` is that of such records by chance; none in runs of before it was noted.
+    ``probability`` is that of such records by chance; None where the test has none.
     """
 
     name: str
@@ -72,7 +71,10 @@ def model_tests(found: Identification, updated: Identification) -> tuple[ModelTe
 
 def with_zeros_doubted(tests: Sequence[ModelTest]) -> tuple[ModelTest, ...]:
     """The tests where held-out records may fail because the controller ran other zeros than its config."""
-    return tuple(_with_zeros_doubted(one) if _is_of_held_out(one) else one for one in tests)
+    return tuple(
+        _with_sentence(one, ZEROS_DOUBTED) if one.name == HELD_OUT and not one.passed else one
+        for one in tests
+    )
 
 
 def doubts_zeros(tests: Sequence[ModelTest]) -> bool:
@@ -96,22 +98,17 @@ def confirmed(tests: Sequence[ModelTest], updated: Identification, rows: Mask) -
     confirming = _prediction_test("confirming records", test, what, CONFIRMING_PROBABILITY)
     if not confirming.passed:
         return (*tests, confirming)
-    return (*(_taken_for_chance(one) for one in tests), confirming)
+    by_chance = (
+        _with_sentence(one, "new records do not confirm that.").model_copy(update={"passed": True})
+        if one.failed_narrowly
+        else one
+        for one in tests
+    )
+    return (*by_chance, confirming)
 
 
-def _taken_for_chance(test: ModelTest) -> ModelTest:
-    if not test.failed_narrowly:
-        return test
-    sentence = f"{test.sentence.rstrip('.')}; new records do not confirm that."
-    return test.model_copy(update={"passed": True, "sentence": sentence})
-
-
-def _is_of_held_out(test: ModelTest) -> bool:
-    return test.name == HELD_OUT and not test.passed
-
-
-def _with_zeros_doubted(test: ModelTest) -> ModelTest:
-    return test.model_copy(update={"sentence": f"{test.sentence.rstrip('.')}; {ZEROS_DOUBTED}"})
+def _with_sentence(test: ModelTest, further: str) -> ModelTest:
+    return test.model_copy(update={"sentence": f"{test.sentence.rstrip('.')}; {further}"})
 
 
 def _residual_test(test: ChiSquareTest) -> ModelTest:

@@ -25,18 +25,13 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
-from hexacell.results.result import IdentificationResult
 from hexacell.robot.model import Robot
-from hexacell.uncertainty.budget import UncertaintyBudget
-from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_records import JudgedGeometry
-from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy, worst_verdict
+from hexacell.verdict.decision import ErrorLimits, Verdict, VerifiedAccuracy, worst_verdict
 from hexacell.verdict.length_check import LengthMeasurements, length_check, length_result
 from hexacell.verdict.model_evidence import (
-    ZEROS_DOUBTED,
     ModelTest,
     confirmed,
-    doubts_zeros,
     fails_narrowly,
     model_tests,
     with_zeros_doubted,
@@ -52,18 +47,32 @@ class DeviationStatistics:
 
     @classmethod
     def of(cls, deviations: ArrayLike) -> DeviationStatistics | None:
-        """Of deviations (n, 3), mm, without the references; none without any, or if one is not finite."""
+        """Statistics of deviations (n, 3), mm, without the references.
+
+        None without any, or if one is not finite.
+        """
         distances: Array = np.linalg.norm(np.reshape(np.asarray(deviations, dtype=float), (-1, 3)), axis=-1)
         if not len(distances) or not np.isfinite(distances).all():
             return None
         return cls(float(distances.mean()), len(distances))
 
 
+def is_worse(before: DeviationStatistics, after: DeviationStatistics, noise: Noise) -> bool:
+    """Whether the mean distance is significantly larger than before, at the same poses.
+
+    A mean of n distances to one noisy reference has at most the variance of a record, once for the
+    reference and 1/n for the poses.
+    """
+    record_mm = float(np.hypot(noise.gauge_mm, noise.encoder))
+    standard_error = record_mm * float(np.sqrt(2.0 + 1.0 / before.poses + 1.0 / after.poses))
+    return after.mean_mm - before.mean_mm > SIGNIFICANT_SIGMAS * standard_error
+
+
 class Verification(Frozen):
     """Evidence, accuracy and decision.
 
     Attributes:
-        accuracy: none where the robot can take none of the task poses, or no estimate was found.
+        accuracy: None where the robot can reach no task pose, or no estimate was found.
         before_mm, after_mm: mean deviation at the held-out poses that were measured before and after.
         is_worse: whether the deviations after are significantly larger.
     """
@@ -95,9 +104,8 @@ class HeldOut:
         before: deviations (n, 3), mm, with the old geometry.
         after: with the new one, at the same poses.
         left_travel: whether the ball left the gauges' travel with the new geometry.
-        length: what was measured with the new geometry in two seats; none without a length check.
-        confirming: records at points of their own, that were measured because a test failed narrowly; none
-            otherwise.
+        length: what was measured with the new geometry in two seats; None without a length check.
+        confirming: records at points of their own, measured because a test failed narrowly; else None.
     """
 
     records: MeasurementSet
@@ -140,52 +148,6 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
     )
 
 
-def outcome_line(
-    result: IdentificationResult, parameters: int, verified: Verification, unknowns: int | None = None
-) -> str:
-    """The outcome of a calibration in one line: what was used, before and after, the error, the verdict.
-
-    ``unknowns``: how many of the parameters are identified, if not all.
-    """
-    what = f"{parameters} parameters"
-    if result.identifies is not ParameterChoice.ALL:
-        what = f"zeros only, {unknowns} of {what}"
-    parts = [f"{what}, {result.records} records at {result.points} points"]
-    if verified.before_mm is not None and verified.after_mm is not None:
-        means = f"{verified.before_mm:.2f} -> {verified.after_mm:.3f} mm"
-        parts.append(f"mean deviation at held-out poses {means}")
-    return outcome_of(parts, verified.accuracy, verified.verdict, reason_of(verified))
-
-
-def outcome_of(
-    parts: Sequence[str], accuracy: VerifiedAccuracy | None, verdict: Verdict, reason: str
-) -> str:
-    """An outcome in one line: some parts, the error that decides, the verdict, and its reason if any."""
-    stated = [] if accuracy is None else [_stated(accuracy)]
-    because = f" ({reason})" if reason else ""
-    return f"{'; '.join([*parts, *stated])}: {verdict}{because}"
-
-
-def _stated(accuracy: VerifiedAccuracy) -> str:
-    """The error that decides: that of the position where both do."""
-    worst = worst_verdict(error.verdict for _, _, error in accuracy.errors)
-    name, unit, error = next(one for one in accuracy.errors if one[2].verdict is worst)
-    return f"{name} error at the task poses {error.value:.3f} +- {error.expanded:.3f} {unit} ({error.rule})"
-
-
-def reason_of(verified: Verification) -> str:
-    """Why a verdict is not that of the stated error."""
-    failed = [test.sentence for test in verified.tests if not test.passed]
-    if verified.is_worse:
-        doubt = f"; {ZEROS_DOUBTED.rstrip('.')}" if doubts_zeros(verified.tests) else ""
-        return f"worse than before{doubt}"
-    if verified.verdict is Verdict.NOT_EVALUATED and failed:
-        return failed[0].rstrip(".")
-    if verified.verdict is Verdict.NOT_EVALUATED and verified.accuracy is not None:
-        return "U is above the limit"
-    return ""
-
-
 def verified_accuracy(
     settings: CellSettings,
     robot: Robot,
@@ -199,52 +161,33 @@ def verified_accuracy(
     budget = task.budget(updated, belief, robot.effects, robot.known_effects)
     if budget is None:
         return None
-    check = measured and _length_check(settings, robot, updated, budget, measured)
-    length = check and length_result(check, settings.uncertainty.common_scale_um_m)
-    if check and length and length.replaces_stated:
-        budget = (
-            task.budget(updated, belief, robot.effects, robot.known_effects, check.observation) or budget
-        )
-    # With zeros alone, what is written is not what the records tell of all parameters.
+    length = None
+    if measured is not None:
+        covariance = updated.free_covariance * updated.goodness.noise_factor**2
+        judged = JudgedGeometry(covariance, budget.parameter_columns)
+        check = length_check(settings, robot, updated.geometry, judged, measured, robot.effects)
+        length = length_result(check, settings.uncertainty.common_scale_um_m)
+        if length.replaces_stated:
+            effects = robot.effects, robot.known_effects
+            budget = task.budget(updated, belief, *effects, check.observation) or budget
+    # With zeros alone, what is written is not the estimate of all parameters.
     written = found.free if robot.identifies is ParameterChoice.ALL else robot.free_parameters
     errors = budget.errors_of(written - updated.free)
-    limits = settings.acceptance
-    factor = limits.guard_band_factor
-    return VerifiedAccuracy(
-        position=JudgedError.of(errors.position, limits.position_mm, factor),
-        orientation=JudgedError.of(errors.orientation, limits.orientation_deg, factor),
-        poses=len(task.poses),
-        task_named=bool(settings.task.poses),
-        worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
-        length=length,
-        scale_of=VerifiedAccuracy.scale_with(robot.mechanism),
-    )
+    limits, is_named = ErrorLimits.of(settings.acceptance), bool(settings.task.poses)
+    return VerifiedAccuracy.of(errors, limits, robot, task, task_named=is_named, length=length)
 
 
 def _noise_in_mm(robot: Robot, updated: Identification) -> Noise:
-    """The noise of a record, that of encoders of angles as what it does to the ball."""
+    """The noise of a record; that of encoders of angles as the motion of the ball that it makes."""
     if robot.mechanism.words.joint_unit is JointUnit.MM:
         return robot.noise
     covariances = robot.noise.encoder_covariance(updated.prediction.by_joints)
-    of_ball = float(np.sqrt(np.mean(np.trace(covariances, axis1=1, axis2=2)) / 3.0))
-    return replace(robot.noise, encoder=of_ball)
-
-
-def _length_check(
-    settings: CellSettings,
-    robot: Robot,
-    updated: Identification,
-    budget: UncertaintyBudget,
-    measured: LengthMeasurements,
-) -> LengthCheck:
-    """By the best estimate of the geometry, whose errors the budget has."""
-    covariance = updated.free_covariance * updated.goodness.noise_factor**2
-    judged = JudgedGeometry(covariance, budget.parameter_columns)
-    return length_check(settings, robot, updated.geometry, judged, measured, robot.effects)
+    ball_mm = float(np.sqrt(np.mean(np.trace(covariances, axis1=1, axis2=2)) / 3.0))
+    return replace(robot.noise, encoder=ball_mm)
 
 
 def _length_test(accuracy: VerifiedAccuracy | None) -> tuple[ModelTest, ...]:
-    """Whether the records of a length check agree with each other; none without one."""
+    """Whether the records of a length check agree with each other; empty without one."""
     length = accuracy and accuracy.length
     if not length:
         return ()
@@ -260,14 +203,3 @@ def _verdict(tests: Sequence[ModelTest], accuracy: VerifiedAccuracy | None, *, w
         return Verdict.NOT_EVALUATED
     evidence = Verdict.PASS if all(test.passed for test in tests) else Verdict.NOT_EVALUATED
     return worst_verdict([evidence, accuracy.position.verdict, accuracy.orientation.verdict])
-
-
-def is_worse(before: DeviationStatistics, after: DeviationStatistics, noise: Noise) -> bool:
-    """Whether the mean distance is significantly larger than before, at the same poses.
-
-    A mean of n distances to one noisy reference has at most the variance of a record, once for the
-    reference and 1/n for the poses.
-    """
-    record_mm = float(np.hypot(noise.gauge_mm, noise.encoder))
-    standard_error = record_mm * float(np.sqrt(2.0 + 1.0 / before.poses + 1.0 / after.poses))
-    return after.mean_mm - before.mean_mm > SIGNIFICANT_SIGMAS * standard_error

@@ -20,8 +20,9 @@ from hexacell.verdict.acceptance_gates import gates
 from hexacell.verdict.assessment import Assessment, assess
 from hexacell.verdict.findings import findings
 from hexacell.verdict.fit_document import fit_document
-from hexacell.verdict.length_check import LengthMeasurements, length_line, length_statement
-from hexacell.verdict.verification import HeldOut, outcome_line, reason_of, verify
+from hexacell.verdict.length_check import LengthMeasurements, length_statement
+from hexacell.verdict.outcome import length_line, outcome_line, reason_of
+from hexacell.verdict.verification import HeldOut, verify
 from procedures.calibration.held_out_poses import PosesByPoint
 from procedures.calibration.noise_steps import noise_readings
 from procedures.calibration.workflow import Calibration, Mode

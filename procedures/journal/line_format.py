@@ -7,15 +7,12 @@ line has ``"version"`` behind ``"n"`` and begins so in every version; without it
 
 from __future__ import annotations
 
-import json
 import re
 import time
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -110,15 +107,6 @@ def decode(line: bytes, path: Path, due: int) -> Entry | None:
         reason = first_mistake(error, "the event") if isinstance(error, ValidationError) else str(error)
         raise _foreign(reason, path, due) from error
     return Entry(due, when, float(monotonic) if monotonic else None, found)
-
-
-def with_event(line: bytes, change: Callable[[dict[str, Any]], dict[str, Any]]) -> bytes:
-    """A whole line with another content of its event; its number, version and times stay."""
-    record = json.loads(line)
-    record["event"] = change(record["event"])
-    del record["crc"]
-    body = json.dumps(record, ensure_ascii=False, separators=(",", ":")).encode()
-    return b'%b,"crc":"%08x"}\n' % (body[:-1], _checksum(body[:-1]))
 
 
 def stated_version(line: bytes) -> int:

@@ -44,7 +44,8 @@ from hexacell.services.run.calibration_run import new_calibration
 from hexacell.services.schedule import unattended_runs
 from hexacell.verdict.acceptance_gates import gates
 from hexacell.verdict.decision import Verdict
-from hexacell.verdict.verification import outcome_line, verify
+from hexacell.verdict.outcome import outcome_line
+from hexacell.verdict.verification import verify
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal import line_format
 from procedures.journal.line_format import Entry, encode

@@ -1,6 +1,6 @@
-"""A copy of a run folder that may be given to others: the same run, its passwords masked.
+"""A copy of a run folder that may be given to others: the same run, its secrets masked.
 
-Journals of earlier versions have the whole cell file, with passwords that stood in it.
+Journal and trace of the wire are recorded without passwords; the files of configs may have secrets.
 """
 
 from __future__ import annotations
@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from hexacell.config.change import ConfigChange
 from hexacell.config.layout import fingerprint_of
@@ -16,19 +15,12 @@ from hexacell.config.receipt import AFTER, BEFORE, RECEIPT
 from hexacell.errors import FileError, UsageError
 from hexacell.runs.run_folder import CELL_FILE, MEASUREMENTS, RESULT, RunFolder
 from hexacell.storage import atomic_files
-from hexacell.storage.secrets import MASK, clear_secrets, with_lines_masked, without_secrets
-from hexacell.storage.toml_document import TomlDocument
+from hexacell.storage.secrets import with_lines_masked, without_secrets
 from procedures.engine.config_edits import PROVISIONAL_FOLDER
 from procedures.journal.journal import read_entries
-from procedures.journal.line_format import with_event
-from procedures.run.events import RunStarted
 
 _CONFIG = re.compile(f"({BEFORE}|{AFTER})(-[0-9]+)?")
 """A file of a config, as it was or as it was written."""
-
-_AS_THEY_ARE = (MEASUREMENTS, RESULT, RECEIPT, f"{PROVISIONAL_FOLDER}/{RECEIPT}")
-_WIRE_LINE = re.compile(r"(?P<head>\S+ .+ [<>] )(?P<bytes>[0-9a-f]{2}(?: [0-9a-f]{2})*)  .*")
-_HALF_MASKED = re.compile(rb"\*\*\*[^\s]+")
 
 
 def export_run(run: Path, target: Path) -> tuple[str, ...]:
@@ -41,36 +33,29 @@ def export_run(run: Path, target: Path) -> tuple[str, ...]:
         FileError: there is no run, its journal is damaged, or the copy cannot be written.
     """
     folder = RunFolder(run)
-    entries = read_entries(folder.journal)
+    read_entries(folder.journal)
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise UsageError("something is there already", subject=target, action="Name a new folder")
-    started = entries[0].event if entries else None
-    cell_text = started.cell_text if isinstance(started, RunStarted) else ""
     names = []
-    for name, data in _files(folder, cell_text):
+    for name, data in _files(folder):
         atomic_files.create_folder_durably((target / name).parent)
         atomic_files.write_atomically(target / name, data)
         names.append(name)
     return tuple(names)
 
 
-def _files(folder: RunFolder, cell_text: str) -> Iterator[tuple[str, bytes]]:
+def _files(folder: RunFolder) -> Iterator[tuple[str, bytes]]:
     """The files of the copy: name and content."""
-    yield folder.journal.name, _journal(folder.journal, cell_text)
-    if (text := _kept(folder, CELL_FILE)) is not None:
-        yield CELL_FILE, _text(text)
-    for name in _configs(folder.path):
+    yield folder.journal.name, atomic_files.read_bytes(folder.journal)
+    for name in (CELL_FILE, *_configs(folder.path)):
         if (text := _kept(folder, name)) is not None:
-            yield name, _text(text)
-    for name in _AS_THEY_ARE:
+            yield name, _masked(text)
+    traces = sorted(path.name for path in folder.path.glob(f"{folder.wire.name}*"))
+    for name in (MEASUREMENTS, RESULT, RECEIPT, f"{PROVISIONAL_FOLDER}/{RECEIPT}", *traces):
         if (data := _kept(folder, name)) is not None:
             yield name, data
     if _kept(folder, folder.proposal.name) is not None:
         yield folder.proposal.name, _proposal(folder.proposal)
-    passwords = _passwords_in(cell_text)
-    for path in sorted(folder.path.glob(f"{folder.wire.name}*")):
-        if (data := _kept(folder, path.name)) is not None:
-            yield path.name, _wire(data, passwords)
 
 
 def _configs(folder: Path) -> Iterator[str]:
@@ -87,19 +72,8 @@ def _kept(folder: RunFolder, name: str) -> bytes | None:
     return None if path.is_symlink() or path.parent.is_symlink() else atomic_files.read_if_present(path)
 
 
-def _journal(path: Path, cell_text: str) -> bytes:
-    first, *others = atomic_files.read_bytes(path).splitlines(keepends=True) or [b""]
-    if not cell_text:
-        return first + b"".join(others)
-
-    def masked(event: dict[str, Any]) -> dict[str, Any]:
-        return {**event, "cell_text": _text(cell_text.encode()).decode()}
-
-    return with_event(first, masked) + b"".join(others)
-
-
-def _text(data: bytes) -> bytes:
-    """A cell file or a controller's config, masked; also where it is no TOML."""
+def _masked(data: bytes) -> bytes:
+    """A cell file or a controller's config without secrets, also where it is not TOML."""
     text = data.decode("utf-8", "surrogateescape")
     try:
         masked = without_secrets(text)
@@ -111,7 +85,7 @@ def _text(data: bytes) -> bytes:
 def _proposal(path: Path) -> bytes:
     change = ConfigChange.load(path)
     first, *further = (
-        {"text_before": _text(before).decode(), "text_after": _text(after).decode()}
+        {"text_before": _masked(before).decode(), "text_after": _masked(after).decode()}
         for before, after in zip(change.before_contents, change.after_contents, strict=True)
     )
     files = zip(change.further, further, strict=True)
@@ -123,30 +97,3 @@ def _proposal(path: Path) -> bytes:
         "sha256_after": fingerprint_of(masked.after_contents),
     }
     return masked.model_copy(update=sums).to_json()
-
-
-def _passwords_in(cell_text: str) -> list[bytes]:
-    try:
-        document = TomlDocument.parse(cell_text)
-    except FileError:
-        return []
-    return [str(document.value(path)).encode() for path in clear_secrets(document)]
-
-
-def _wire(data: bytes, passwords: list[bytes]) -> bytes:
-    lines = data.decode("utf-8", "replace").splitlines()
-    return "".join(f"{_wire_line(line, passwords)}\n" for line in lines).encode()
-
-
-def _wire_line(line: str, passwords: list[bytes]) -> str:
-    """A line of a trace; its bytes stand in it twice."""
-    parts = _WIRE_LINE.fullmatch(line)
-    if parts is None:
-        return line
-    data = whole = bytes.fromhex(parts["bytes"])
-    for password in filter(None, passwords):
-        data = re.sub(rb"(?<!\S)" + re.escape(password) + rb"(?!\S)", MASK.encode(), data)
-    data = _HALF_MASKED.sub(MASK.encode(), data)
-    if data == whole:
-        return line
-    return f"{parts['head']}{data.hex(' ')}  {data.decode('ascii', 'replace').strip()}"

@@ -263,7 +263,7 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
             subject=request.folder.path,
             action="Finish it with that version, or begin a new run",
         )
-    if state.started.cell_text not in {request.cell.text_without_secrets, request.cell.text}:
+    if state.started.cell_text != request.cell.text_without_secrets:
         raise UsageError(
             f"{request.cell.path} has changed since the run began",
             action="Undo the change, or begin a new run",

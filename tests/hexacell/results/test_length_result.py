@@ -19,7 +19,8 @@ from hexacell.robot.model import robot_of
 from hexacell.text.verdict import not_checked, verification_text
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import LengthMeasurements, length_standard
-from hexacell.verdict.verification import HeldOut, Verification, outcome_line, verify
+from hexacell.verdict.outcome import outcome_line
+from hexacell.verdict.verification import HeldOut, Verification, verify
 from tests.hexacell.results.two_seat_records import two_seat_records
 
 FIXTURE = LengthCheckSettings(

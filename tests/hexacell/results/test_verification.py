@@ -22,7 +22,8 @@ from hexacell.robot.model import Robot, robot_of
 from hexacell.text.verdict import verification_text
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.model_evidence import ZEROS_DOUBTED
-from hexacell.verdict.verification import HeldOut, Verification, outcome_line, reason_of, verify
+from hexacell.verdict.outcome import outcome_line, reason_of
+from hexacell.verdict.verification import HeldOut, Verification, verify
 from tests.small_cell import changed
 
 NOISE_MM = 0.01

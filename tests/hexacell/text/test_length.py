@@ -9,7 +9,8 @@ from hexacell.results.result import LengthResult, LengthSource
 from hexacell.text.run import question_text
 from hexacell.text.verdict import earlier_scale_line, length_text, not_checked, scale_lines
 from hexacell.verdict.decision import JudgedError, Verdict
-from hexacell.verdict.length_check import LengthStatement, length_line
+from hexacell.verdict.length_check import LengthStatement
+from hexacell.verdict.outcome import length_line
 from procedures.run.questions import ask_mounting
 
 SOURCES = tuple(

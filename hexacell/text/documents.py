@@ -4,28 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
-from hexacell.dry_run.checks import QuickTrial
-from hexacell.results.run_comparison import ParameterTrend, RunComparison
-from hexacell.services.history.drift_history import DriftHistory, FoundChange
-from hexacell.services.history.retention import Retention
-from hexacell.services.history.run_index import PastRun
-from hexacell.services.offline import NextPose, PlanTrial
-from hexacell.services.run.calibration_run import RunRequest
-from hexacell.services.schedule.schedules import Schedule
-from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
-from hexacell.services.write_back.config_rollback import ConfigRollback
-from hexacell.services.write_back.proposals import AppliedProposal
 from hexacell.text.layout import iso
-from hexacell.text.run_story import run_story
 from hexacell.text.verdict import teaching_sentence
-from procedures.journal.line_format import Entry
-from procedures.replay.comparison import ReplayReport
-from procedures.run import events
-from procedures.run.state import RunState
+
+if TYPE_CHECKING:
+    from drivers.interfaces import DeviceIdentity
+    from hexacell.dry_run.checks import QuickTrial
+    from hexacell.results.run_comparison import ParameterTrend, RunComparison
+    from hexacell.services.history.drift_history import DriftHistory, FoundChange
+    from hexacell.services.history.retention import Retention
+    from hexacell.services.history.run_index import PastRun
+    from hexacell.services.offline import NextPose, PlanTrial
+    from hexacell.services.run.calibration_run import RunRequest
+    from hexacell.services.schedule.schedules import Schedule
+    from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
+    from hexacell.services.write_back.config_rollback import ConfigRollback
+    from hexacell.services.write_back.proposals import AppliedProposal
+    from procedures.journal.line_format import Entry
+    from procedures.replay.comparison import ReplayReport
+    from procedures.run import events
+    from procedures.run.state import RunState
 
 
 def next_document(proposed: NextPose) -> dict[str, Any]:
@@ -308,6 +309,8 @@ def retention_document(found: Retention, *, is_deleted: bool) -> dict[str, Any]:
 
 def story_document(entries: Sequence[Entry]) -> dict[str, Any]:
     """What ``history --show --json`` prints."""
+    from hexacell.text.run_story import run_story  # noqa: PLC0415 - needs the words of all events
+
     return {
         "events": [
             {"line": entry.number, "at": entry.at.isoformat(), "kind": entry.event.kind, "text": text}

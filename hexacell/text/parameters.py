@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from hexacell.cell.model import CellSettings
 from hexacell.checks.check_result import ParameterChange
@@ -14,9 +15,10 @@ from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGM
 from hexacell.kinematics.parameters import ParameterSet, ParameterUnit
 from hexacell.kinematics.rotations import Array
 from hexacell.results.run_comparison import ParameterDifference
-from hexacell.services.recorded.recorded_robot import geometry_before
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
-from procedures.run.state import RunState
+
+if TYPE_CHECKING:
+    from procedures.run.state import RunState
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +93,8 @@ def parameter_rows(
 
 def rows_of_run(state: RunState, settings: CellSettings | None) -> tuple[ParameterRow, ...]:
     """What a run identified, or what a check found to have changed; empty where nothing is known yet."""
+    from hexacell.services.recorded.recorded_robot import geometry_before  # noqa: PLC0415 - only for runs
+
     if state.judged is not None and state.judged.check is not None:
         return rows_of_changes(state.judged.check.changes)
     if state.identified is None or state.started is None or settings is None:

@@ -47,3 +47,42 @@ def test_a_next_pose_needs_no_records(cell) -> None:
 def test_what_is_no_run_is_refused(tmp_path) -> None:
     with pytest.raises(UsageError, match="this is no run folder"):
         api.reported_run(tmp_path)
+
+
+EVENTS = {"procedures.run.events", "procedures.steps"}
+HEAVY = {"textual", "matplotlib", "sqlalchemy", "canopen", "rich", *EVENTS}
+FIT = """
+from pathlib import Path
+from hexacell import api
+cell, measurements = Path(sys.argv[1]), Path(sys.argv[2])
+assert api.fit_measurements(api.load_cell(cell), api.read_measurements(measurements)).is_usable
+"""
+COMMAND = """
+from hexacell.cli.app import main
+main(sys.argv[3:])
+"""
+
+
+@pytest.mark.parametrize(
+    ("program", "command", "not_loaded"),
+    [
+        ("import hexacell.api", [], {"numpy", "pydantic", *HEAVY}),
+        (FIT, [], HEAVY),
+        (COMMAND, ["fit", "CELL", "--measurements", "CSV"], HEAVY),
+        (COMMAND, ["status", "CELL"], {*HEAVY, "scipy"} - {"sqlalchemy"}),
+        (COMMAND, ["cell", "show", "CELL"], {*HEAVY, "scipy", "procedures"}),
+        (COMMAND, ["cell", "validate", "CELL"], {*HEAVY, "scipy", "procedures"} - {"canopen"}),
+    ],
+    ids=["api", "fit by the api", "fit", "status", "cell show", "cell validate"],
+)
+def test_what_is_not_needed_is_not_imported(noisy, tmp_path, program, command, not_loaded) -> None:
+    """Measured as modules, not as seconds: what each of them costs is in ``python -X importtime``."""
+    cell, path = bundled_config("simulated-hexaglide"), tmp_path / "measurements.csv"
+    write_measurements(path, noisy)
+    names = {"CELL": str(cell), "CSV": str(path)}
+    words = [str(cell), str(path), *(names.get(word, word) for word in command)]
+    code = f"import sys\n{program}\nprint(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.splitlines()[-1].split())
+    assert "hexacell" in loaded
+    assert loaded & not_loaded == set()

@@ -12,9 +12,9 @@ import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivers.encoders.bank import SampleHistory, ThreadedBank, joint_variables
+from drivers.encoders.bank import BankSession, ThreadedBank
 from drivers.errors import BusError, InvalidSampleError, PortLost, SilentNodeError
-from drivers.interfaces import DeviceIdentity, EncoderSample
+from drivers.interfaces import DeviceIdentity
 from drivers.serial.adapters import adapter_at
 from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort, RefusedRequest
 from drivers.serial.request_port import NoAnswer
@@ -23,184 +23,10 @@ from hexacell.cell.described_devices import ModbusEncoderSettings
 from hexacell.cell.devices import EncoderSettings
 from hexacell.errors import UsageError
 
-PROTOCOL = "modbus"
 LINE = {"baudrate": 19200, "bytesize": 8, "parity": "E", "stopbits": 1}
 DAMAGED_TRIES = 3
-
-
-class ModbusBank(ThreadedBank["ModbusSession"]):
-    """The encoder bank of a cell; see :class:`drivers.interfaces.EncoderBank`."""
-
-    def __init__(self, settings: EncoderSettings, trace: TraceRecorder | None = None) -> None:
-        super().__init__()
-        if settings.modbus is None:
-            raise UsageError(
-                "it is not stated in which registers the encoders are",
-                action="Add [encoders.modbus] with port and registers to the cell file",
-            )
-        self._settings, self._described = settings, settings.modbus
-        self._trace = trace
-
-    def _begin(self, closing: threading.Event) -> ModbusSession:
-        return ModbusSession(self._settings, self._described, closing, self._trace)
-
-
-class ModbusSession:
-    """An open line on which all six encoders answered. Used by one thread."""
-
-    def __init__(
-        self,
-        settings: EncoderSettings,
-        described: ModbusEncoderSettings,
-        closing: threading.Event,
-        trace: TraceRecorder | None = None,
-    ) -> None:
-        self._settings, self._described, self._closing = settings, described, closing
-        self._history = SampleHistory(settings, [f"encoder of leg {leg}" for leg in range(1, 7)])
-        self._url = _port_of(described)
-        self._port = ModbusPort(self._url, {**LINE, **described.serial}, closing, trace)
-        self._port.subject = "encoders"
-        try:
-            self._spans = self._begin()
-        except BaseException:
-            self._port.close()
-            raise
-
-    @property
-    def identities(self) -> tuple[DeviceIdentity, ...]:
-        """Legs 1 to 6: such encoders have no names of their own."""
-        adapter = adapter_at(self._url)
-        return tuple(
-            DeviceIdentity(
-                f"encoder of leg {leg}", PROTOCOL, f"device {device}, register {register}", port=adapter
-            )
-            for leg, (device, register) in enumerate(self._described.places, 1)
-        )
-
-    def read(self) -> EncoderSample:
-        """One complete sample.
-
-        Raises:
-            SilentNodeError: a device did not answer in time.
-            InvalidSampleError: a count means no valid position, or a joint jumped.
-            WrongSetting: negative counts are read as unsigned ones.
-            DeviceError: a device refuses, or the line was lost.
-        """
-        counts = self._sampled(self._spans)
-        self._history.check_signs(counts)
-        positions = joint_variables(counts, self._settings)
-        self._history.check_speed(positions)
-        return EncoderSample(counts, positions, self._settings.unit)
-
-    def close(self) -> None:
-        """Close the line."""
-        self._port.close()
-
-    def _begin(self) -> tuple[RegisterSpan, ...]:
-        """Open the line, and read; some devices refuse a request with registers that they do not have."""
-        joined = register_spans(self._described, joined=True)
-        single = register_spans(self._described, joined=False)
-        try:
-            self._port.open()
-        except PortLost as error:
-            raise BusError(error.problem, subject="encoders", action=error.action) from error
-        try:
-            self._sampled(joined)
-        except RefusedRequest:
-            self._sampled(single)
-            return single
-        return joined
-
-    def _sampled(self, spans: Sequence[RegisterSpan]) -> tuple[int, ...]:
-        """The counts of legs 1 to 6, at one instant."""
-        try:
-            return self._counts(spans)
-        except PortLost as error:
-            raise _lost(error) from error
-
-    def _counts(self, spans: Sequence[RegisterSpan]) -> tuple[int, ...]:
-        latch = self._described.latch
-        if latch is not None:
-            self._port.write_to_all(latch.register_, latch.value)
-            self._closing.wait(latch.delay_s)
-        there = self._read_all(spans)
-        if latch is not None or len(spans) == 1:
-            return there
-        back = self._read_all(spans[::-1])
-        return tuple(round((one + other) / 2) for one, other in zip(there, back, strict=True))
-
-    def _read_all(self, spans: Sequence[RegisterSpan]) -> tuple[int, ...]:
-        found = {leg: count for span in spans for leg, count in self._read_span(span).items()}
-        return tuple(found[leg] for leg in sorted(found))
-
-    def _read_span(self, span: RegisterSpan) -> dict[int, int]:
-        """Counts by leg."""
-        counts = counts_in(self._answer(span), span, self._described, signed=self._settings.signed)
-        for leg, count in counts.items():
-            if count in self._described.invalid:
-                raise _invalid(leg, count)
-        return counts
-
-    def _answer(self, span: RegisterSpan) -> bytes:
-        """The registers; a damaged answer is asked for again."""
-        function = FUNCTIONS[self._described.kind]
-        request = REQUEST.pack(span.device, function, span.first, span.count)
-        self._port.subject = span.subject
-        for _ in range(DAMAGED_TRIES):
-            try:
-                return self._port.exchange(request, b"", self._settings.timeout_s)
-            except NoAnswer as error:
-                received = error.received
-                if not received:
-                    break
-        raise self._unanswered(span, received)
-
-    def _unanswered(self, span: RegisterSpan, received: bytes) -> SilentNodeError:
-        if received:
-            return SilentNodeError(
-                f"answers {received!r}, no single frame with a right checksum, {DAMAGED_TRIES} times",
-                subject=span.subject,
-                action="Check its cable, and serial in [encoders.modbus], then open the encoders again; "
-                "the set that was being measured is void",
-            )
-        return SilentNodeError(
-            f"does not answer within {self._settings.timeout_s:g} s",
-            subject=span.subject,
-            action="Check its supply and cable, and devices and serial in [encoders.modbus], then open the "
-            "encoders again; the set that was being measured is void",
-        )
-
-
-def _invalid(leg: int, count: int) -> InvalidSampleError:
-    return InvalidSampleError(
-        f"shows {count}, which means no valid position; it cannot be trusted",
-        subject=f"encoder of leg {leg}",
-        action="Remove the cause, or correct invalid in [encoders.modbus], then measure again",
-    )
-
-
-def _port_of(described: ModbusEncoderSettings) -> str:
-    if described.port is None:
-        raise BusError(
-            "have no port in the cell file",
-            subject="encoders",
-            action="State `port` under [encoders.modbus]",
-        )
-    return described.port
-
-
-def _lost(error: PortLost) -> BusError:
-    """The line is the encoders' bus: a run opens them again."""
-    return BusError(
-        error.problem,
-        subject="encoders",
-        action="Plug its adapter in and open the encoders again; the set that was being measured is void",
-    )
-
-
 MAX_REGISTERS = 125
-"""Of an answer (Modbus Application Protocol 6.3)."""
-
+"""Registers that one answer can have (Modbus Application Protocol 6.3)."""
 REGISTER_BITS, REGISTER_BYTES = 16, 2
 
 
@@ -215,7 +41,7 @@ class RegisterSpan:
 
     @property
     def subject(self) -> str:
-        """Of messages."""
+        """The subject of messages about these encoders."""
         legs = ", ".join(map(str, sorted(self.legs)))
         named = f"encoder of leg {legs}" if len(self.legs) == 1 else f"encoders of legs {legs}"
         return f"{named} (device {self.device})"
@@ -239,15 +65,141 @@ def counts_in(
     data: bytes, span: RegisterSpan, described: ModbusEncoderSettings, *, signed: bool
 ) -> dict[int, int]:
     """The counts by leg in the registers of a span, each with its high byte first."""
-    size = described.bits // 8
-    starts = {leg: REGISTER_BYTES * (described.registers[leg - 1] - span.first) for leg in span.legs}
-    return {
-        leg: _count(data[start : start + size], described, signed=signed) for leg, start in starts.items()
-    }
+    found = {}
+    for leg in span.legs:
+        start = REGISTER_BYTES * (described.registers[leg - 1] - span.first)
+        places = range(start, start + described.bits // 8, REGISTER_BYTES)
+        registers = [data[place : place + REGISTER_BYTES] for place in places]
+        if described.word_order == "little":
+            registers.reverse()
+        found[leg] = int.from_bytes(b"".join(registers), signed=signed)
+    return found
 
 
-def _count(data: bytes, described: ModbusEncoderSettings, *, signed: bool) -> int:
-    registers = [data[start : start + REGISTER_BYTES] for start in range(0, len(data), REGISTER_BYTES)]
-    if described.word_order == "little":
-        registers.reverse()
-    return int.from_bytes(b"".join(registers), signed=signed)
+class ModbusBank(ThreadedBank["ModbusSession"]):
+    """The encoder bank of a cell; implements :class:`drivers.interfaces.EncoderBank`."""
+
+    def __init__(self, settings: EncoderSettings, trace: TraceRecorder | None = None) -> None:
+        super().__init__(settings, trace)
+        if settings.modbus is None:
+            raise UsageError(
+                "it is not stated in which registers the encoders are",
+                action="Add [encoders.modbus] with port and registers to the cell file",
+            )
+        self._described = settings.modbus
+
+    def _begin(self, closing: threading.Event) -> ModbusSession:
+        return ModbusSession(self._settings, self._described, closing, self._trace)
+
+
+class ModbusSession(BankSession):
+    """An open line on which all six encoders answered."""
+
+    def __init__(
+        self,
+        settings: EncoderSettings,
+        described: ModbusEncoderSettings,
+        closing: threading.Event,
+        trace: TraceRecorder | None = None,
+    ) -> None:
+        super().__init__(settings, [f"encoder of leg {leg}" for leg in range(1, 7)])
+        self._described, self._closing = described, closing
+        if described.port is None:
+            raise BusError(
+                "have no port in the cell file",
+                subject="encoders",
+                action="State `port` under [encoders.modbus]",
+            )
+        self._url = described.port
+        self._port = ModbusPort(self._url, {**LINE, **described.serial}, closing, trace)
+        self._port.subject = "encoders"
+        try:
+            self._begin()
+        except BaseException:
+            self._port.close()
+            raise
+
+    @property
+    def identities(self) -> tuple[DeviceIdentity, ...]:
+        """One identity a leg: such encoders have no names of their own."""
+        adapter = adapter_at(self._url)
+        return tuple(
+            DeviceIdentity(
+                f"encoder of leg {leg}", "modbus", f"device {device}, register {register}", port=adapter
+            )
+            for leg, (device, register) in enumerate(self._described.places, 1)
+        )
+
+    def close(self) -> None:
+        """Close the line."""
+        self._port.close()
+
+    def _begin(self) -> None:
+        """Open the line, and read; some devices refuse a request with registers that they do not have."""
+        try:
+            self._port.open()
+        except PortLost as error:
+            raise BusError(error.problem, subject="encoders", action=error.action) from error
+        self._spans = register_spans(self._described, joined=True)
+        try:
+            self._sample()
+        except RefusedRequest:
+            self._spans = register_spans(self._described, joined=False)
+            self._sample()
+
+    def _sample(self) -> tuple[int, ...]:
+        latch, spans = self._described.latch, self._spans
+        try:
+            if latch is not None:
+                self._port.write_to_all(latch.register_, latch.value)
+                self._closing.wait(latch.delay_s)
+            there = self._read_all(spans)
+            if latch is not None or len(spans) == 1:
+                return there
+            back = self._read_all(spans[::-1])
+        except PortLost as error:  # the line is the encoders' bus: a run opens them again
+            raise BusError(
+                error.problem,
+                subject="encoders",
+                action="Plug its adapter in and open the encoders again; the set that was being measured "
+                "is void",
+            ) from error
+        return tuple(round((one + other) / 2) for one, other in zip(there, back, strict=True))
+
+    def _read_all(self, spans: Sequence[RegisterSpan]) -> tuple[int, ...]:
+        found: dict[int, int] = {}
+        for span in spans:
+            found |= counts_in(self._answer(span), span, self._described, signed=self._settings.signed)
+            for leg in span.legs:
+                if found[leg] in self._described.invalid:
+                    raise InvalidSampleError(
+                        f"shows {found[leg]}, which means no valid position; it cannot be trusted",
+                        subject=f"encoder of leg {leg}",
+                        action="Remove the cause, or correct invalid in [encoders.modbus], "
+                        "then measure again",
+                    )
+        return tuple(found[leg] for leg in sorted(found))
+
+    def _answer(self, span: RegisterSpan) -> bytes:
+        """The registers; a damaged answer is asked for again."""
+        request = REQUEST.pack(span.device, FUNCTIONS[self._described.kind], span.first, span.count)
+        self._port.subject = span.subject
+        for _ in range(DAMAGED_TRIES):
+            try:
+                return self._port.exchange(request, b"", self._settings.timeout_s)
+            except NoAnswer as error:
+                received = error.received
+                if not received:
+                    break
+        void = "then open the encoders again; the set that was being measured is void"
+        if received:
+            raise SilentNodeError(
+                f"answers {received!r}, no single frame with a right checksum, {DAMAGED_TRIES} times",
+                subject=span.subject,
+                action=f"Check its cable, and serial in [encoders.modbus], {void}",
+            )
+        raise SilentNodeError(
+            f"does not answer within {self._settings.timeout_s:g} s",
+            subject=span.subject,
+            action=f"Check its supply and cable, and devices and serial in [encoders.modbus], {void}",
+        )

@@ -22,12 +22,10 @@ from drivers.encoders.object_dictionary import (
     RESOLUTION,
     REVISION,
     SERIAL_NUMBER,
-    SYNC_COUNTER,
     UNITS_PER_TURN,
     VENDOR,
     WARNINGS,
     DeviceType,
-    ObjectEntry,
 )
 from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity
@@ -41,6 +39,10 @@ from hexacell.kinematics.parameters import JointUnit
 
 STEP_OBJECTS = {"6005h": MEASURING_STEP_SETTING, "6501h": MEASURING_STEP}
 """Objects that a device may have its measuring step in."""
+
+REVERSED = 1 << 3
+"""Bit of the operating parameters: counts grow in the other direction (CiA 406)."""
+_HALF = 1 << 31
 
 SECOND_RESPONSE_S = 0.03
 """How long a second device may take to respond to the same request."""
@@ -56,7 +58,17 @@ def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float
         node.check_alone()
     missing = [node for node in nodes if not node.sdo.has_responded]
     if missing:
-        raise _missing(missing, _unexpected_nodes(nodes, bus))
+        # Nodes that respond but belong to no leg often have a node id from the factory.
+        bus.network.scanner.search()
+        bus.listen(SECOND_RESPONSE_S)
+        unexpected = sorted(set(bus.network.scanner.nodes) - {node.leg.node for node in nodes})
+        found = ", ".join(map(str, unexpected))
+        hint = f"; node {found} is on the bus but belongs to no leg" if unexpected else ""
+        raise BusError(
+            f"no device responds{hint}",
+            subject=subject_of([node.leg for node in missing]),
+            action="Check supply, cable, bit rate and node id",
+        )
 
 
 def read_device_type(node: EncoderNode, unit: JointUnit = JointUnit.MM) -> DeviceType:
@@ -127,14 +139,32 @@ def read_identity(node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
         value = node.read_optional(entry)
         words += [] if value is None else [f"{name} 0x{value:08X}"]
     serial_number = node.read_optional(SERIAL_NUMBER)
+    settings, warnings = read_settings(node), node.read_optional(WARNINGS)
     return DeviceIdentity(
         name=node.leg.subject,
         protocol="cia406",
         description=", ".join(words),
         serial_number="" if serial_number is None else str(serial_number),
-        settings=read_settings(node),
-        remark=read_warnings(node),
+        settings=settings,
+        remark=f"it reports a warning: {WARNINGS} is {warnings:#06x}" if warnings else "",
     )
+
+
+def read_settings(node: EncoderNode) -> str:
+    """Direction, preset and offset in words, as far as the device has them.
+
+    A preset, a reversed direction or an offset that somebody set changes a joint variable without moving
+    the joint. They are part of the identity, which every run records and compares.
+    """
+    words = []
+    parameters = node.read_optional(OPERATING_PARAMETERS)
+    if parameters is not None:
+        direction = "reversed, " if parameters & REVERSED else ""
+        words.append(f"operating parameters {direction}{parameters:#06x}")
+    for name, entry in (("preset", PRESET), ("offset", OFFSET)):
+        if (value := node.read_optional(entry)) is not None:
+            words.append(f"{name} {value if value < _HALF else value - 2 * _HALF}")
+    return ", ".join(words)
 
 
 def check_serial_number(node: EncoderNode, identity: DeviceIdentity, settings: EncoderSettings) -> None:
@@ -151,65 +181,8 @@ def check_serial_number(node: EncoderNode, identity: DeviceIdentity, settings: E
         )
 
 
-def _missing(missing: Sequence[EncoderNode], unexpected: Sequence[int]) -> BusError:
-    found = ", ".join(str(node) for node in unexpected)
-    hint = f"; node {found} is on the bus but belongs to no leg" if unexpected else ""
-    return BusError(
-        f"no device responds{hint}",
-        subject=subject_of([node.leg for node in missing]),
-        action="Check supply, cable, bit rate and node id",
-    )
-
-
-def _unexpected_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus) -> list[int]:
-    """Nodes that respond but belong to no leg: often with a node id from the factory."""
-    bus.network.scanner.search()
-    bus.listen(SECOND_RESPONSE_S)
-    return sorted(set(bus.network.scanner.nodes) - {node.leg.node for node in nodes})
-
-
 def _device_type_text(value: int) -> str:
     profile, kind = value & 0xFFFF, value >> 16
     if profile == ENCODER_PROFILE:
         return f"0x{value:08X} (an encoder, but of class {kind}; linear ones are 8 and 10)"
     return f"0x{value:08X} (profile {profile}; encoders are {ENCODER_PROFILE})"
-
-
-REVERSED = 1 << 3
-"""Bit of the operating parameters: counts grow in the other direction (CiA 406)."""
-
-_HALF = 1 << 31
-
-
-def read_settings(node: EncoderNode) -> str:
-    """Direction, preset and offset in words, those that the device has."""
-    words = []
-    parameters = node.read_optional(OPERATING_PARAMETERS)
-    if parameters is not None:
-        direction = "reversed, " if parameters & REVERSED else ""
-        words.append(f"operating parameters {direction}{parameters:#06x}")
-    for name, entry in (("preset", PRESET), ("offset", OFFSET)):
-        value = _signed(node, entry)
-        words += [] if value is None else [f"{name} {value}"]
-    return ", ".join(words)
-
-
-def read_warnings(node: EncoderNode) -> str:
-    """The warnings that the device reports, in words; empty without."""
-    value = node.read_optional(WARNINGS)
-    return f"it reports a warning: {WARNINGS} is {value:#06x}" if value else ""
-
-
-def switch_sync_counter_off(node: EncoderNode) -> None:
-    """Have the node take a SYNC without a counter, as this program sends it.
-
-    Raises:
-        DeviceError: it refuses that.
-    """
-    if node.read_optional(SYNC_COUNTER):
-        node.write(SYNC_COUNTER, 0)
-
-
-def _signed(node: EncoderNode, entry: ObjectEntry) -> int | None:
-    value = node.read_optional(entry)
-    return value if value is None or value < _HALF else value - 2 * _HALF

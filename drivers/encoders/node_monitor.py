@@ -1,10 +1,11 @@
-"""Monitoring of the nodes: boot-up, heartbeat and emergency messages (CiA 301)."""
+"""Monitoring of the nodes: boot-up, heartbeat, emergency messages (CiA 301), and alarm entries."""
 
 from __future__ import annotations
 
 import struct
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from canopen.emcy import EmcyError
 
@@ -21,6 +22,8 @@ BOOT_UP = 0x00
 OPERATIONAL = 0x05
 """The NMT state in the heartbeats of a started node."""
 
+_COMMUNICATION = 0x10
+"""Bit of the error register for communication errors, which do not concern positions."""
 _COMMUNICATION_CLASS = 0x8
 """The first digit of the codes of communication errors (CiA 301, table of error codes)."""
 
@@ -92,7 +95,8 @@ class NodeMonitor:
             self.emergency = None
             return
         self.emergencies += 1
-        self.emergency = _text(code, register)
+        words = _KNOWN_EMERGENCIES.get(code) or EmcyError(code, register, b"", 0.0).get_desc().lower()
+        self.emergency = f"emergency {code:04X} ({words}, error register {register:#04x})"
         self.is_about_the_bus = code >> 12 == _COMMUNICATION_CLASS
         self._condition.notify_all()
 
@@ -105,7 +109,11 @@ def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
         return
     restarted = [monitor.leg for monitor in faulty if monitor.restarted]
     if restarted:
-        raise _restarted(restarted)
+        raise RestartedNodeError(
+            "restarted, or was stopped, during the run and lost its configuration: the set is void",
+            subject=subject_of(restarted),
+            action="Check its supply, open the encoders again and repeat the set",
+        )
     silent = [monitor for monitor in faulty if monitor.is_silent(now_s)]
     if silent:
         what = f"no heartbeat for {silent[0].timeout_s:.2g} s"
@@ -121,41 +129,36 @@ def invalid_sample(what: str, subject: str, action: str = _CHECK_DEVICE) -> Inva
     return InvalidSampleError(f"{what}; its position cannot be trusted", subject=subject, action=action)
 
 
-def _restarted(legs: Sequence[Leg]) -> RestartedNodeError:
-    return RestartedNodeError(
-        "restarted, or was stopped, during the run and lost its configuration: the set is void",
-        subject=subject_of(legs),
-        action="Check its supply, open the encoders again and repeat the set",
-    )
+@dataclass(frozen=True, slots=True)
+class AlarmTiming:
+    """When alarm entries are read.
 
+    Attributes:
+        period_s: shortest period.
+        bus_share: largest share of the time, where samples follow each other without a pause.
+        warnings_every: warnings are read at one of so many readings: an SDO takes as long as a position.
+    """
 
-def _text(code: int, register: int) -> str:
-    description = _KNOWN_EMERGENCIES.get(code) or EmcyError(code, register, b"", 0.0).get_desc().lower()
-    return f"emergency {code:04X} ({description}, error register {register:#04x})"
-
-
-ALARM_POLL_S = 0.1
-"""Shortest period at which the alarm entries are read."""
-
-BUS_SHARE = 0.02
-"""Of the time of samples that follow each other without a pause, so much goes to reading alarm entries."""
-
-WARNINGS_EVERY = 10
-"""Warnings are read at each such reading only: an SDO takes as long as a position."""
-
-_COMMUNICATION = 0x10
-"""Bit of the error register for communication errors, which do not concern positions."""
+    period_s: float = 0.1
+    bus_share: float = 0.02
+    warnings_every: int = 10
 
 
 class AlarmPoll:
-    """Reads the alarm entries of all nodes: at first, after emergencies, and every ``ALARM_POLL_S``.
+    """Reads the alarm entries of all nodes: at first, after emergencies, and periodically.
 
-    On a slow bus such a reading takes a quarter of that. Where samples follow each other without a pause it
-    is put off therefore, until it is no more than ``BUS_SHARE`` of the time.
+    Some alarms come without an emergency, and stand in 1001h and 6503h only. On a slow bus a reading takes
+    a quarter of the period. Where samples follow each other without a pause it is put off therefore.
     """
 
-    def __init__(self, nodes: Sequence[EncoderNode], monitors: Sequence[NodeMonitor]) -> None:
+    def __init__(
+        self,
+        nodes: Sequence[EncoderNode],
+        monitors: Sequence[NodeMonitor],
+        timing: AlarmTiming = AlarmTiming(),
+    ) -> None:
         self._monitors = monitors
+        self._timing = timing
         self._emergencies_seen = -1
         self._polls = 0
         self._begun_s = self._polled_s = self._sampling_s = self._cost_s = 0.0
@@ -165,7 +168,7 @@ class AlarmPoll:
             for entry in (ERROR_REGISTER, ALARMS, WARNINGS)
             if node.read_optional(entry) is not None
         ]
-        # A warning from before is told when the encoders are opened, and need not end every run.
+        # A warning that is there at the opening is a remark then, and need not end every run.
         self._known = {
             (node, entry): node.read(entry) for node, entry in self._entries if entry is WARNINGS
         }
@@ -190,16 +193,16 @@ class AlarmPoll:
         self._polls += 1
         self._emergencies_seen = -1  # due again at once, should one be found
         for node, entry in self._entries:
-            if entry is not WARNINGS or self._polls % WARNINGS_EVERY == 0:
+            if entry is not WARNINGS or self._polls % self._timing.warnings_every == 0:
                 self._check_entry(node, entry)
         self._emergencies_seen = emergencies
         self._polled_s, self._sampling_s = time.monotonic(), 0.0
         self._cost_s = self._polled_s - now_s
 
     def _is_due(self, now_s: float) -> bool:
-        since_s = now_s - self._polled_s
+        since_s, timing = now_s - self._polled_s, self._timing
         has_paused = since_s >= 2.0 * self._sampling_s
-        return since_s >= ALARM_POLL_S and (has_paused or BUS_SHARE * since_s >= self._cost_s)
+        return since_s >= timing.period_s and (has_paused or timing.bus_share * since_s >= self._cost_s)
 
     def _check_entry(self, node: EncoderNode, entry: ObjectEntry) -> None:
         value = node.read(entry)

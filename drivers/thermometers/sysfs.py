@@ -9,6 +9,7 @@ which takes up to 750 ms; the file is empty during another measurement.
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -20,6 +21,8 @@ from hexacell.storage.atomic_files import os_error_to_file_error
 
 MAX_BYTES = 64
 PLAUSIBLE_C = (-100.0, 300.0)
+
+_log = logging.getLogger("drivers.thermometers")
 
 
 class SysfsThermometer:
@@ -40,7 +43,7 @@ class SysfsThermometer:
 
     async def open(self) -> DeviceIdentity:
         """Read it once; raises ``DeviceError`` if that gives no temperature."""
-        await self.read()
+        _log.info("%s: %s", self._subject, (await self.read()).raw)
         return DeviceIdentity(self._subject, "sysfs", str(self._path))
 
     async def read(self) -> TemperatureReading:
@@ -88,6 +91,7 @@ class SysfsThermometer:
         return celsius
 
     def _error(self, problem: str) -> DeviceError:
+        _log.warning("%s %s", self._subject, problem)
         return DeviceError(
             problem, subject=self._subject, action=f"Check the sensor behind {self._settings.path}"
         )

@@ -1,4 +1,4 @@
-"""The nodes of the server: the latest results of a cell, and the event that tells a new one.
+"""The nodes of the server: the latest results of a cell, and the event of a new one.
 
 Names, meanings and values are those of OPC 40001-101 (Machinery, Result Transfer), 1.00: ResultManagement
 with its Results, ResultMetaData, ResultReadyEventType. They are in a namespace of their own, because the
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 NAMESPACE = "urn:hexacell:results"
 MOST_RESULTS = 10
-"""Of a cell in the address space; older ones are in its run folders."""
+"""Results of a cell in the address space; older ones are in its run folders."""
 
 FIELDS = (
     ("ResultId", ua.VariantType.String),
@@ -37,7 +37,7 @@ FIELDS = (
     ("LimitMm", ua.VariantType.Double),
 )
 META_DATA = 6
-"""So many of the fields are of ResultMetaData, the others of ResultContent."""
+"""The first fields are those of ResultMetaData, the others those of ResultContent."""
 
 
 class ResultNodes:
@@ -73,9 +73,10 @@ class ResultNodes:
             await parent.add_variable(self._namespace, name, value, varianttype=kind)
         self._shown.append(node)
         while len(self._shown) > MOST_RESULTS:
-            await self._event.isession.delete_nodes(_deletion(self._shown.popleft()))
+            oldest = ua.DeleteNodesItem(self._shown.popleft().nodeid, DeleteTargetReferences=True)
+            await self._event.isession.delete_nodes(ua.DeleteNodesParameters([oldest]))
 
-    async def tell(self, result: PublishedResult) -> None:
+    async def notify(self, result: PublishedResult) -> None:
         """Raise the event of a result that is ready."""
         event = self._event.event
         event.Severity = SEVERITIES[result.evaluation]
@@ -84,12 +85,8 @@ class ResultNodes:
         await self._event.trigger(message=result.details)
 
 
-def _deletion(node: Node) -> ua.DeleteNodesParameters:
-    return ua.DeleteNodesParameters([ua.DeleteNodesItem(node.nodeid, DeleteTargetReferences=True)])
-
-
 def _values(result: PublishedResult) -> tuple[object, ...]:
-    """In the order of ``FIELDS``."""
+    """The values of a result, in the order of ``FIELDS``."""
     return (
         result.result_id,
         result.is_simulated,

@@ -1,4 +1,4 @@
-"""One run as other machines are told of it, in the words of OPC 40001-101 (Machinery, Result Transfer)."""
+"""Runs that have ended as results for other machines, in the words of OPC 40001-101 (Result Transfer)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hexacell.verdict.decision import Verdict
 
 
 class ResultEvaluation(IntEnum):
-    """Whether a result was in tolerance; the values of ResultEvaluationEnum there."""
+    """Whether a result was in tolerance: values of ResultEvaluationEnum."""
 
     UNDEFINED = 0
     OK = 1
@@ -26,7 +26,7 @@ class ResultEvaluation(IntEnum):
 
 
 class ResultState(IntEnum):
-    """How far the measurement went; the values of ResultState there."""
+    """How far the measurement went: values of ResultState."""
 
     COMPLETED = 1
     ABORTED = 3
@@ -46,7 +46,7 @@ SEVERITIES = {
     ResultEvaluation.NOT_DECIDABLE: 500,
     ResultEvaluation.NOT_OK: 800,
 }
-"""Of the event, 1 to 1000 (OPC 10000-5, 6.4.2)."""
+"""Severity of the event, 1 to 1000 (OPC 10000-5, 6.4.2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class PublishedResult:
 
 
 def published_result(cell: str, run: PastRun, *, is_simulated: bool) -> PublishedResult | None:
-    """What is published of a run; nothing of one that goes on, or that cannot be read."""
+    """The result of a run; None for one that goes on, or that cannot be read."""
     summary = run.summary
     if not summary.is_over or summary.ended is None:
         return None
@@ -95,7 +95,7 @@ def published_result(cell: str, run: PastRun, *, is_simulated: bool) -> Publishe
 
 
 class NewResults:
-    """Results of a cell, each given once; ``warn`` is told, once each, why runs cannot be read."""
+    """Results of a cell, each given once; ``warn`` gets the reason, once, why runs cannot be read."""
 
     def __init__(self, cell: Cell, warn: Callable[[str], None]) -> None:
         self._cell = cell
@@ -105,29 +105,22 @@ class NewResults:
         self._warned: str | None = None
 
     def fetch(self) -> list[PublishedResult]:
-        """Those that are new, the oldest first. Runs are read only if a run folder has changed."""
+        """New results, the oldest first. Runs are read only if a run folder has changed."""
         try:
             stamps = folder_stamps(runs_folder(self._cell))
             if stamps == self._stamps:
                 return []
-            found = self._ended()
+            name, is_simulated = self._cell.settings.name, self._cell.settings.simulation is not None
+            found = [
+                published_result(name, run, is_simulated=is_simulated)
+                for run in reversed(past_runs(self._cell))
+            ]
         except FileError as error:
-            self._warn_once(str(error))
+            if str(error) != self._warned:
+                self._warned = str(error)
+                self._warn(self._warned)
             return []
         self._stamps, self._warned = stamps, None
-        fresh = [one for one in found if one.result_id not in self._known]
+        fresh = [one for one in found if one is not None and one.result_id not in self._known]
         self._known.update(one.result_id for one in fresh)
         return fresh
-
-    def _ended(self) -> list[PublishedResult]:
-        name, is_simulated = self._cell.settings.name, self._cell.settings.simulation is not None
-        found = (
-            published_result(name, run, is_simulated=is_simulated)
-            for run in reversed(past_runs(self._cell))
-        )
-        return [one for one in found if one is not None]
-
-    def _warn_once(self, text: str) -> None:
-        if text != self._warned:
-            self._warned = text
-            self._warn(text)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ class _Readers:
         password: str | bytes | None = None,
         certificate: object = None,  # noqa: ARG002 - likewise
     ) -> User | None:
-        """The user, or none for whoever is refused."""
+        """The user; None for whoever is refused."""
         text = password.decode("utf-8", "replace") if isinstance(password, bytes) else password
         return User(role=UserRole.User) if self._reader.is_this(username, text) else None
 
@@ -47,7 +48,7 @@ async def serve_results(
     ready: Callable[[str], None],
     warn: Callable[[str], None],
 ) -> None:
-    """Serve until ``stop`` is set; ``ready`` is told the address, ``warn`` why runs cannot be read.
+    """Serve until ``stop`` is set; ``ready`` gets the address, ``warn`` the reason why runs cannot be read.
 
     Raises:
         FileError: its certificate cannot be read or made.
@@ -95,20 +96,15 @@ async def _follow(
     ready: Callable[[], None],
     warn: Callable[[str], None],
 ) -> None:
-    """Show what there is, then show and tell what is new."""
+    """Show what there is, then show what is new with an event."""
     results = NewResults(cell, warn)
     for result in (await asyncio.to_thread(results.fetch))[-MOST_RESULTS:]:
         await nodes.show(result)
     ready()
-    while not await _is_set_within(stop, settings.poll_s):
+    while not stop.is_set():
+        with suppress(TimeoutError):
+            await asyncio.wait_for(stop.wait(), settings.poll_s)
+            return
         for result in await asyncio.to_thread(results.fetch):
             await nodes.show(result)
-            await nodes.tell(result)
-
-
-async def _is_set_within(stop: asyncio.Event, seconds: float) -> bool:
-    try:
-        await asyncio.wait_for(stop.wait(), seconds)
-    except TimeoutError:
-        return False
-    return True
+            await nodes.notify(result)

@@ -1,4 +1,4 @@
-"""Devices that were found: in words, and as text for a cell file."""
+"""Devices that were found, in words and as text for a cell file; and one that was watched."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from hexacell.services.devices.device_search import (
 from hexacell.text.planning import device_line
 
 AXES = "xyz"
-FRAMES_TOLD = 12
+MOST_FRAMES = 12
 
 
 def search_document(found: SearchFindings) -> dict[str, Any]:
@@ -59,7 +59,7 @@ def search_lines(found: SearchFindings) -> Iterator[str]:
 
 
 def cell_lines(found: SearchFindings) -> Iterator[str]:
-    """The sections of a cell file for what was found; the axes are guesses, as nothing tells them."""
+    """The sections of a cell file for what was found; the axes are guesses, as no device reports them."""
     for axis, gauge in zip(AXES, found_gauges(found), strict=False):
         yield from _gauge_section(axis, gauge)
     if bank := found_bank(found):
@@ -116,10 +116,12 @@ def _bus_lines(bus: BusFindings) -> Iterator[str]:
 
 
 def _overheard_lines(name: str, frames: tuple[FoundFrame, ...]) -> Iterator[str]:
-    for frame in frames[:FRAMES_TOLD]:
-        yield f"CAN {name}, frame {_number(frame)}: {_frame_words(frame)}"
-    if len(frames) > FRAMES_TOLD:
-        yield f"CAN {name}: frames with {len(frames) - FRAMES_TOLD} further identifiers"
+    for frame in frames[:MOST_FRAMES]:
+        what = f"{frame.length} bytes, {frame.per_second:.0f} a second"
+        data = "its data change" if frame.changes else "its data stay the same"
+        yield f"CAN {name}, frame {_number(frame)}: {what}, {data}"
+    if len(frames) > MOST_FRAMES:
+        yield f"CAN {name}: frames with {len(frames) - MOST_FRAMES} further identifiers"
     if frames:
         yield (
             f"CAN {name}: no CANopen node that answers sends these frames. If they are of encoders, name "
@@ -139,13 +141,8 @@ def _node_words(node: FoundNode) -> str:
 
 
 def _number(frame: FoundFrame) -> str:
-    """As candump has it: 11 bits in three digits, 29 in eight."""
+    """An identifier in the format of candump: 11 bits in three digits, 29 in eight."""
     return f"{frame.identifier:0{8 if frame.is_extended else 3}X}"
-
-
-def _frame_words(frame: FoundFrame) -> str:
-    data = "its data change" if frame.changes else "its data stay the same"
-    return f"{frame.length} bytes, {frame.per_second:.0f} a second, {data}"
 
 
 def _gauge_section(axis: str, gauge: FoundGauge) -> Iterator[str]:
@@ -169,8 +166,8 @@ def _encoder_section(bus: BusFindings, encoders: tuple[FoundNode, ...]) -> Itera
 
 
 def _described_encoder_section(bus: BusFindings) -> Iterator[str]:
-    """Encoders that only a DBC file describes: which of the frames are theirs, nothing tells."""
-    frames = [_number(frame) for frame in bus.frames[:FRAMES_TOLD]]
+    """Encoders that only a DBC file describes: which of the frames are theirs is not known."""
+    frames = [_number(frame) for frame in bus.frames[:MOST_FRAMES]]
     yield from ("[encoders]", *_keys({"protocol": "dbc"}))
     yield f"bus = {{ {', '.join(_keys(bus.bus))} }}"
     yield "measuring_step_nm = 1000  # no coarser than the steps in the DBC file"
@@ -195,7 +192,7 @@ MEANING = {
     Failure.INVALID: "The device itself says that positions are invalid: look at its magnet or scale.",
 }
 NOISY = 3.0
-"""A scatter of so many times what the cell file states is told."""
+"""A scatter of so many times what the cell file states is reported."""
 
 
 def diagnosis_document(found: DeviceDiagnosis) -> dict[str, Any]:

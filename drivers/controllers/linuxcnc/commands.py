@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from typing import TypeVar
@@ -21,8 +22,10 @@ from hexacell.kinematics.pose import Pose
 
 T = TypeVar("T")
 
+_log = logging.getLogger("drivers.controllers.linuxcnc")
+
 NO_REASON = "it is on, and gives no reason"
-"""Why a command is refused, as far as can be known, by a LinuxCNC that nothing keeps from executing it."""
+"""The reason of a refusal where nothing is known that keeps LinuxCNC from executing the command."""
 
 _MAX_ERRORS = 100
 _MAX_SHOWN = 4
@@ -85,7 +88,7 @@ class ControllerCommands:
         return response.text
 
     async def get_if_known(self, what: str) -> str:
-        """The same; empty if the server does not know ``what``."""
+        """The text after ``WHAT``; empty if the server does not know ``what``."""
         return (await self._query(what)).text
 
     async def set(self, what: str, timeout_s: float | None = None) -> None:
@@ -96,7 +99,9 @@ class ControllerCommands:
         """
         response = await self.connection.request(f"set {what}", timeout_s)
         if not response.accepted:
-            raise await self._refusal(what, response)
+            refusal = await self._refusal(what, response)
+            _log.warning("%s %s", self.subject, refusal.problem)
+            raise refusal
 
     async def pose(self) -> Pose:
         """The actual pose, mm and deg, by the controller's own kinematics."""
@@ -105,8 +110,8 @@ class ControllerCommands:
 
     async def joints(self) -> tuple[float, ...]:
         """The six actual joint variables, mm or deg."""
-        told = self._parsed(parse_positions, await self.get("joint_pos"))
-        return tuple(self.joint_unit_mm * value for value in told)
+        positions = self._parsed(parse_positions, await self.get("joint_pos"))
+        return tuple(self.joint_unit_mm * value for value in positions)
 
     async def all_homed(self) -> bool:
         """Whether every joint is homed."""
@@ -135,10 +140,14 @@ class ControllerCommands:
         messages = [*explanations, *await self.errors()]
         if len(messages) > _MAX_SHOWN:
             messages[_MAX_SHOWN:] = [f"and {len(messages) - _MAX_SHOWN} more"]
-        return "; ".join(messages) or await self._state()
+        if messages:
+            return "; ".join(messages)
+        if await self.is_on("estop"):
+            return "it is in emergency stop"
+        return NO_REASON if await self.is_on("machine") else "it is switched off"
 
     async def _query(self, what: str) -> Response:
-        # Another program's client may garble our command (see send_arbiter). A query can be repeated
+        # Another program's client may garble our command. A query can be repeated
         # safely; a set command is left to the caller.
         response = await self.connection.request(f"get {what}")
         return response if response.accepted else await self.connection.request(f"get {what}")
@@ -155,11 +164,6 @@ class ControllerCommands:
             f"'set {what}'", await self.reason(response.explanations), subject=self.subject
         )
 
-    async def _state(self) -> str:
-        if await self.is_on("estop"):
-            return "it is in emergency stop"
-        return NO_REASON if await self.is_on("machine") else "it is switched off"
-
     def _parsed(self, parse: Callable[[str], T], text: str) -> T:
         try:
             return parse(text)
@@ -171,7 +175,7 @@ class CommandChannel:
     """A connection that is opened when it is needed, and replaced after it broke.
 
     Attributes:
-        commands: the present connection, if there is one.
+        commands: the current connection, if there is one.
     """
 
     def __init__(self, connect: Callable[[], Awaitable[ControllerCommands]]) -> None:

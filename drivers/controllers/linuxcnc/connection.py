@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
+import logging
 import os
 import re
 from collections import deque
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcontext, suppress
 from typing import Self
 
 from drivers.controllers.linuxcnc.protocol import (
@@ -25,9 +25,78 @@ from drivers.errors import ConnectionLost, ResponseTimeout
 from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError, UsageError
 
+_log = logging.getLogger("drivers.controllers.linuxcnc")
+
 _CLIENT = "hexacell 1.0"
 _CHUNK = 4096
 _SHOWN = 80
+PARSED_S = 0.02
+"""Within this time, s, LinuxCNC has read a command that was sent."""
+
+
+class SendArbiter:
+    """Which of our connections may send a command now, by two locks: the line, and a stop in progress.
+
+    LinuxCNC 2.9 reads the commands of all clients with one ``strtok()``: two commands that arrive at the
+    same moment garble each other. A query is answered within a millisecond. A command may take as long as
+    a move, but ``PARSED_S`` after it was sent the server has read it, and another connection may send.
+
+    =================  ==============================  =========================================
+    connection         sends within                    waits for
+    =================  ==============================  =========================================
+    for commands       ``command_turn``                the end of a stop, then the line
+    for status         ``query_turn``                  the line
+    opening either     ``exclusive``                   the line, which it keeps until greeted
+    for a stop         no turn                         nothing, except another stop
+    =================  ==============================  =========================================
+    """
+
+    def __init__(self) -> None:
+        self._line = asyncio.Lock()
+        self._stop = asyncio.Lock()
+
+    @asynccontextmanager
+    async def query_turn(self) -> AsyncIterator[None]:
+        """Send inside; the line is released after ``PARSED_S`` even if the answer is still awaited."""
+        await self._line.acquire()
+        is_held = True
+
+        def release() -> None:
+            nonlocal is_held
+            if is_held:
+                is_held = False
+                self._line.release()
+
+        timer = asyncio.get_running_loop().call_later(PARSED_S, release)
+        try:
+            yield
+        finally:
+            timer.cancel()
+            release()
+
+    @asynccontextmanager
+    async def command_turn(self) -> AsyncIterator[None]:
+        """Send inside, as in ``query_turn``, but not before a stop in progress has ended."""
+        await self.stop_ended()
+        async with self.query_turn():
+            yield
+
+    @asynccontextmanager
+    async def exclusive(self) -> AsyncIterator[None]:
+        """Send inside, however long it takes; no other connection sends meanwhile."""
+        async with self._line:
+            yield
+
+    @asynccontextmanager
+    async def stopping(self) -> AsyncIterator[None]:
+        """Stop the machine inside: no command is sent meanwhile; stops run one after another."""
+        async with self._stop:
+            yield
+
+    async def stop_ended(self) -> None:
+        """Wait until no stop is in progress."""
+        async with self._stop:
+            pass
 
 
 class Connection:
@@ -51,7 +120,7 @@ class Connection:
         writer: asyncio.StreamWriter,
     ) -> None:
         self.server = ""
-        self.send_turn: Callable[[], contextlib.AbstractAsyncContextManager[None]] = contextlib.nullcontext
+        self.send_turn: Callable[[], AbstractAsyncContextManager[None]] = nullcontext
         self._wire = LineRecord(address.name, recorder)
         self._address = address
         self._timeouts = timeouts
@@ -81,9 +150,11 @@ class Connection:
             await connection._greet()
             if commanding:
                 await connection.take_control()
-        except BaseException:
+        except BaseException as error:
+            _log.warning("%s: no connection: %s", address.name, error)
             await connection.close()
             raise
+        _log.info("%s: connected to %s", address.name, connection.server)
         return connection
 
     async def request(self, command: str, timeout_s: float | None = None) -> Response:
@@ -127,14 +198,14 @@ class Connection:
     async def close(self) -> None:
         """Close the connection; closing twice is harmless."""
         self._writer.transport.abort()
-        with contextlib.suppress(OSError):
+        with suppress(OSError):
             await self._writer.wait_closed()
 
     async def _greet(self) -> None:
         await self._write(self._encoded(f"hello {self._address.connect_password} {_CLIENT}"))
         self.server = self._server_in(await self._first_line())
         await self._write(self._encoded("set echo off"))
-        with contextlib.suppress(TimeoutError):  # the only response, if any, is the echo
+        with suppress(TimeoutError):  # the only response, if any, is the echo
             await self._line(loop_time() + self._timeouts.explanation)
         await self.request("set verbose on")
 
@@ -204,6 +275,7 @@ class Connection:
             if remarks:  # 2.10 refuses without a NAK while another client moves the machine
                 return Response(accepted=False, explanations=tuple(remarks))
             asked = " ".join(command.split()[:2])  # no passwords in messages
+            _log.warning("%s: no answer to '%s' within %g s", self._address.name, asked, timeout_s)
             raise ResponseTimeout(
                 f"is frozen: it is connected, but did not answer '{asked}' within {timeout_s:g} s",
                 subject=self._address.name,
@@ -225,6 +297,7 @@ class Connection:
             data = b""
         self._record(TrafficDirection.RECEIVED, data)
         if not data:
+            _log.warning("%s: the connection was closed", self._address.name)
             raise ConnectionLost(
                 "closed the connection: it was ended or restarted",
                 subject=self._address.name,
@@ -238,7 +311,7 @@ class Connection:
 
 
 def without_passwords(data: bytes, address: Address) -> bytes:
-    """Traffic with every password masked as a whole, also where one begins with the other."""
+    """Traffic with every password masked as a whole, even where one begins with the other."""
     for password in (address.connect_password, address.enable_password):
         data = re.sub(rb"(?<= )" + re.escape(password.encode()) + rb"(?![^\s])", b"***", data)
     return data
@@ -259,62 +332,3 @@ async def _connect(
         reason = os.strerror(number) if number > 0 else error.strerror
         problem = f"cannot be reached: {reason or error}"
         raise ConnectionLost(problem, subject=address.name, action=start) from error
-
-
-PARSED_S = 0.02
-
-
-class SendArbiter:
-    """Two locks shared by the connections to one server: the line, and a stop in progress."""
-
-    def __init__(self) -> None:
-        self._line = asyncio.Lock()
-        self._stop = asyncio.Lock()
-
-    @asynccontextmanager
-    async def query_turn(self) -> AsyncIterator[None]:
-        """Send inside; the line is released after ``PARSED_S`` even if the answer is still awaited."""
-        await self._line.acquire()
-        release = _ReleaseOnce(self._line)
-        timer = asyncio.get_running_loop().call_later(PARSED_S, release)
-        try:
-            yield
-        finally:
-            timer.cancel()
-            release()
-
-    @asynccontextmanager
-    async def command_turn(self) -> AsyncIterator[None]:
-        """The same, but not before a stop in progress has ended."""
-        await self.stop_ended()
-        async with self.query_turn():
-            yield
-
-    @asynccontextmanager
-    async def exclusive(self) -> AsyncIterator[None]:
-        """Send inside, however long it takes; no other connection sends meanwhile."""
-        async with self._line:
-            yield
-
-    @asynccontextmanager
-    async def stopping(self) -> AsyncIterator[None]:
-        """Stop the machine inside: no command is sent meanwhile; stops run one after another."""
-        async with self._stop:
-            yield
-
-    async def stop_ended(self) -> None:
-        """Wait until no stop is in progress."""
-        async with self._stop:
-            pass
-
-
-class _ReleaseOnce:
-    """Releases a lock at the first call."""
-
-    def __init__(self, lock: asyncio.Lock) -> None:
-        self._lock: asyncio.Lock | None = lock
-
-    def __call__(self) -> None:
-        lock, self._lock = self._lock, None
-        if lock is not None:
-            lock.release()

@@ -49,7 +49,7 @@ class LinuxcncrshController:
 
     Orders run one after another; ``stop``, ``status`` and ``close`` do not wait for them. The next
     order replaces a broken connection. A controller that was restarted, or whose control another
-    client took, must be prepared again. States and locks are described in :mod:`.session`.
+    client took, must be prepared again. States and locks are described in ``session.py``.
     """
 
     def __init__(
@@ -134,7 +134,7 @@ class LinuxcncrshController:
             await self._restore_modes_unless_stopped(commands, stops)
 
     async def position(self) -> ReportedPosition | None:
-        """Actual pose and joints; none before all joints are homed, when both may be those of home."""
+        """Actual pose and joints; None before all joints are homed, when both may be those of home."""
         async with self._order:
             commands = await self._session.synchronized()
             if not await commands.all_homed():
@@ -152,7 +152,7 @@ class LinuxcncrshController:
             return await (await self._session.synchronized()).joints()
 
     async def joints_now(self) -> tuple[float, ...] | None:
-        """The six joints, also during ``move``; none before all are homed."""
+        """The six joints, also during ``move``; None before all are homed."""
         return await self._session.joints()
 
     async def status(self) -> ControllerStatus:
@@ -243,7 +243,7 @@ class LinuxcncrshController:
             await self._start_up(commands, action, stops)
         self._session.machine_is_enabled()
         if self._joints_before_reload is not None:
-            # With other zeros it tells other joints where it stands: encoders then show whether it moved.
+            # With other zeros it reports other joints where it stands: encoders then show whether it moved.
             if not self._settings.joints_include_zeros:
                 self._require_unmoved(self._joints_before_reload, await commands.joints())
             self._joints_before_reload = None

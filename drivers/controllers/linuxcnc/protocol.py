@@ -1,4 +1,4 @@
-"""The linuxcncrsh protocol as pure functions: encoding commands, parsing responses.
+"""The linuxcncrsh protocol: addresses, time-outs, commands and responses, without a connection.
 
 A client sends ``get <what>`` or ``set <what> <value>``, one line each. ``get`` answers
 ``<WHAT> <words>``, ``set`` answers ``SET <WHAT> ACK`` once verbose is on, and both answer ``NAK``
@@ -37,167 +37,10 @@ _SECONDS_A_MINUTE = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class Response:
-    """The response to one command.
-
-    ``text`` follows the queried name, and is empty after ``set``. ``explanations`` are the error lines
-    that came with it.
-    """
-
-    accepted: bool
-    text: str = ""
-    explanations: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class RefusalReason:
-    """What LinuxCNC's error message says of a pose that it refuses: ``axis`` is none or of ``xyzabc``."""
-
-    axis: str | None = None
-    is_highest: bool = True
-
-
-class LineBuffer:
-    """Splits received bytes into lines at any mixture of CR and LF; drops blank lines."""
-
-    def __init__(self) -> None:
-        self._rest = b""
-
-    def feed(self, data: bytes) -> list[str]:
-        """The lines completed by ``data``; undecodable bytes become replacement characters."""
-        *complete, self._rest = (self._rest + data).replace(b"\r", b"\n").split(b"\n")
-        return [line.decode("utf-8", "replace").strip() for line in complete if line.strip()]
-
-    @property
-    def rest(self) -> str:
-        """The received part of an incomplete line."""
-        return self._rest.decode("utf-8", "replace").strip()
-
-
-def encode_command(command: str) -> bytes:
-    """The bytes of one command line.
-
-    Raises:
-        ValueError: It is longer than the server's buffer, or is more than one line.
-    """
-    line = command.encode() + b"\r\n"
-    if len(line) > MAX_LINE_BYTES:
-        raise ValueError(f"a command of {len(line)} bytes is longer than the {MAX_LINE_BYTES} it can take")
-    if b"\r" in line[:-2] or b"\n" in line[:-2]:
-        raise ValueError("a command must be a single line")
-    return line
-
-
-def timed_move(pose: Pose, duration_s: float) -> str:
-    """The block that moves to ``pose`` in inverse time: F is 1 / duration, in 1/min.
-
-    In millimetres (G21), and in machine coordinates (G53): no query tells that the coordinate system is
-    rotated (G10 L2 R). It has more decimals than the six of reported positions. A feed rate (G94) would
-    count X, Y and Z only (LinuxCNC, G-code reference, G93 and G94), and a rapid move (G0) goes as fast as
-    it can.
-
-    Raises:
-        ValueError: A coordinate is not a finite number.
-    """
-    if not all(math.isfinite(value) for value in pose.as_tuple()):
-        raise ValueError("a coordinate is not a finite number")
-    words = zip("XYZABC", pose.as_tuple(), strict=True)
-    coordinates = " ".join(f"{axis}{value:.{_DECIMALS}f}" for axis, value in words)
-    return f"G21 G53 G93 G1 {coordinates} F{_SECONDS_A_MINUTE / duration_s:.{_DECIMALS}f}"
-
-
-def restoring_block(codes: str) -> str:
-    """The block that restores what :func:`timed_move` changes, from the words after ``PROGRAM_CODES``.
-
-    That are inches, the motion, the feed mode, and the feed, which a change of its mode sets to zero. A G1
-    that has no feed is refused, and other motions need more words: instead, no motion is active (G80).
-    """
-    words = codes.upper().split()
-    mode = next((word for word in words if word in ("G93", "G94", "G95")), "G94")
-    feed = next((word for word in words if word.startswith("F")), "F0")
-    has_feed = mode != "G93" and float(feed[1:]) != 0.0
-    motion = "G0" if not words or "G0" in words else "G1" if "G1" in words and has_feed else "G80"
-    units = ("G20",) if "G20" in words else ()
-    return " ".join((*units, mode, motion, *((feed,) if has_feed else ())))
-
-
-def parse_explanation(line: str) -> str:
-    """The explanation in one of 2.10's ``error: ...`` lines, empty for any other line."""
-    return line[len(_EXPLANATION) :].strip() if line.lower().startswith(_EXPLANATION) else ""
-
-
-def parse_response(line: str, command: str) -> Response | None:
-    """The response to ``command`` in ``line``; none if the line is something else, such as an echo."""
-    verb, name = (word.upper() for word in command.split()[:2])
-    names = (name, _RESPONSE_NAME.get(name, name))
-    match line.upper().split():
-        case [said, "NAK"] if said == verb:
-            return Response(accepted=False)
-        case [said, what, "NAK"] if said == verb and what in names:
-            return Response(accepted=False)
-        case ["SET", what, "ACK"] if verb == "SET" and what in names:
-            return Response(accepted=True)
-        case [what, *_] if verb == "GET" and what in names:
-            return Response(accepted=True, text=line[len(what) :].strip())
-    return None
-
-
-def parse_pose(text: str) -> Pose:
-    """The pose, mm and deg, in the words after ``ABS_ACT_POS``."""
-    return Pose(*parse_positions(text))
-
-
-def parse_positions(text: str) -> tuple[float, float, float, float, float, float]:
-    """The first six numbers of an answer: joints 1 to 6, mm, or a pose's coordinates.
-
-    Raises:
-        ValueError: There are fewer than six, or one of them is no finite number.
-    """
-    try:
-        x, y, z, a, b, c = (float(word) + 0.0 for word in text.split()[:_LEGS])  # -0.0 becomes 0.0
-    except ValueError as error:
-        raise ValueError(f"it reports {text!r} where six positions belong") from error
-    if not all(math.isfinite(value) for value in (x, y, z, a, b, c)):
-        raise ValueError(f"it reports {text!r}, which is no position")
-    return x, y, z, a, b, c
-
-
-def parse_pose_refusal(reason: str) -> RefusalReason | None:
-    """Why a pose is refused; none if the messages say that something else prevents the move.
-
-    The messages are those of LinuxCNC's motion module (``command.c``): ``would exceed C's positive limit``,
-    ``would exceed joint 3's negative limit``, ``fails kinematicsInverse``.
-    """
-    if found := _AXIS_LIMIT.search(reason):
-        return RefusalReason(found["axis"].lower(), found["side"].lower() == "positive")
-    return RefusalReason() if _UNREACHABLE.search(reason) else None
-
-
-def parse_number(text: str) -> float:
-    """The first number of an answer; not finite where there is none."""
-    try:
-        return float(text.split(maxsplit=1)[0])
-    except (IndexError, ValueError):
-        return math.nan
-
-
-def parse_homed(text: str) -> tuple[bool, ...]:
-    """Whether each joint is homed, from the words after ``JOINT_HOMED``."""
-    return tuple(word.upper() == "YES" for word in text.split())
-
-
-def pose_difference(one: Pose, other: Pose) -> tuple[float, float]:
-    """The largest difference of a position, mm, and of an angle, deg; a full turn counts as none."""
-    differences = [a - b for a, b in zip(one.as_tuple(), other.as_tuple(), strict=True)]
-    angles = [math.remainder(difference, 360.0) for difference in differences[3:]]
-    return max(map(abs, differences[:3])), max(map(abs, angles))
-
-
-@dataclass(frozen=True, slots=True)
 class Address:
     """A server and the passwords it was started with; they are sent in clear text.
 
-    ``unit_mm`` is one unit of the positions that it tells, ``joint_unit_mm`` one of the joint variables.
+    ``unit_mm`` is one unit of the positions that it reports, ``joint_unit_mm`` one of the joint variables.
     """
 
     host: str
@@ -252,3 +95,160 @@ class Timeouts:
 def loop_time() -> float:
     """The time of the running event loop, s."""
     return asyncio.get_running_loop().time()
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """The response to one command.
+
+    ``text`` follows the queried name, and is empty after ``set``. ``explanations`` are the error lines
+    that came with it.
+    """
+
+    accepted: bool
+    text: str = ""
+    explanations: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RefusalReason:
+    """Why LinuxCNC refuses a pose: the limit of ``axis``, one of ``xyzabc``, or another reason if None."""
+
+    axis: str | None = None
+    is_highest: bool = True
+
+
+class LineBuffer:
+    """Splits received bytes into lines at any mixture of CR and LF; drops blank lines."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def feed(self, data: bytes) -> list[str]:
+        """The lines completed by ``data``; undecodable bytes become replacement characters."""
+        *complete, self._rest = (self._rest + data).replace(b"\r", b"\n").split(b"\n")
+        return [line.decode("utf-8", "replace").strip() for line in complete if line.strip()]
+
+    @property
+    def rest(self) -> str:
+        """The received part of an incomplete line."""
+        return self._rest.decode("utf-8", "replace").strip()
+
+
+def encode_command(command: str) -> bytes:
+    """The bytes of one command line.
+
+    Raises:
+        ValueError: It is longer than the server's buffer, or is more than one line.
+    """
+    line = command.encode() + b"\r\n"
+    if len(line) > MAX_LINE_BYTES:
+        raise ValueError(f"a command of {len(line)} bytes is longer than the {MAX_LINE_BYTES} it can take")
+    if b"\r" in line[:-2] or b"\n" in line[:-2]:
+        raise ValueError("a command must be a single line")
+    return line
+
+
+def timed_move(pose: Pose, duration_s: float) -> str:
+    """The block that moves to ``pose`` in inverse time: F is 1 / duration, in 1/min.
+
+    In millimetres (G21), and in machine coordinates (G53): no query shows that the coordinate system is
+    rotated (G10 L2 R). It has more decimals than the six of reported positions. A feed rate (G94) would
+    count X, Y and Z only (LinuxCNC, G-code reference, G93 and G94), and a rapid move (G0) goes as fast as
+    it can.
+
+    Raises:
+        ValueError: A coordinate is not a finite number.
+    """
+    if not all(math.isfinite(value) for value in pose.as_tuple()):
+        raise ValueError("a coordinate is not a finite number")
+    words = zip("XYZABC", pose.as_tuple(), strict=True)
+    coordinates = " ".join(f"{axis}{value:.{_DECIMALS}f}" for axis, value in words)
+    return f"G21 G53 G93 G1 {coordinates} F{_SECONDS_A_MINUTE / duration_s:.{_DECIMALS}f}"
+
+
+def restoring_block(codes: str) -> str:
+    """The block that restores what :func:`timed_move` changes, from the words after ``PROGRAM_CODES``.
+
+    That are inches, the motion, the feed mode, and the feed, which a change of its mode sets to zero. A G1
+    that has no feed is refused, and other motions need more words: instead, no motion is active (G80).
+    """
+    words = codes.upper().split()
+    mode = next((word for word in words if word in ("G93", "G94", "G95")), "G94")
+    feed = next((word for word in words if word.startswith("F")), "F0")
+    has_feed = mode != "G93" and float(feed[1:]) != 0.0
+    motion = "G0" if not words or "G0" in words else "G1" if "G1" in words and has_feed else "G80"
+    units = ("G20",) if "G20" in words else ()
+    return " ".join((*units, mode, motion, *((feed,) if has_feed else ())))
+
+
+def parse_explanation(line: str) -> str:
+    """The explanation in one of 2.10's ``error: ...`` lines, empty for any other line."""
+    return line[len(_EXPLANATION) :].strip() if line.lower().startswith(_EXPLANATION) else ""
+
+
+def parse_response(line: str, command: str) -> Response | None:
+    """The response to ``command`` in ``line``; None if the line is something else, such as an echo."""
+    verb, name = (word.upper() for word in command.split()[:2])
+    names = (name, _RESPONSE_NAME.get(name, name))
+    match line.upper().split():
+        case [said, "NAK"] if said == verb:
+            return Response(accepted=False)
+        case [said, what, "NAK"] if said == verb and what in names:
+            return Response(accepted=False)
+        case ["SET", what, "ACK"] if verb == "SET" and what in names:
+            return Response(accepted=True)
+        case [what, *_] if verb == "GET" and what in names:
+            return Response(accepted=True, text=line[len(what) :].strip())
+    return None
+
+
+def parse_pose(text: str) -> Pose:
+    """The pose, mm and deg, in the words after ``ABS_ACT_POS``."""
+    return Pose(*parse_positions(text))
+
+
+def parse_positions(text: str) -> tuple[float, float, float, float, float, float]:
+    """The first six numbers of an answer: joints 1 to 6, mm, or a pose's coordinates.
+
+    Raises:
+        ValueError: There are fewer than six, or one of them is no finite number.
+    """
+    try:
+        x, y, z, a, b, c = (float(word) + 0.0 for word in text.split()[:_LEGS])  # -0.0 becomes 0.0
+    except ValueError as error:
+        raise ValueError(f"it reports {text!r} where six positions belong") from error
+    if not all(math.isfinite(value) for value in (x, y, z, a, b, c)):
+        raise ValueError(f"it reports {text!r}, which is no position")
+    return x, y, z, a, b, c
+
+
+def parse_pose_refusal(reason: str) -> RefusalReason | None:
+    """Why a pose is refused; None if the messages say that something else prevents the move.
+
+    The messages are those of LinuxCNC's motion module (``command.c``): ``would exceed C's positive limit``,
+    ``would exceed joint 3's negative limit``, ``fails kinematicsInverse``.
+    """
+    if found := _AXIS_LIMIT.search(reason):
+        return RefusalReason(found["axis"].lower(), found["side"].lower() == "positive")
+    return RefusalReason() if _UNREACHABLE.search(reason) else None
+
+
+def parse_number(text: str) -> float:
+    """The first number of an answer; not finite where there is none."""
+    try:
+        return float(text.split(maxsplit=1)[0])
+    except (IndexError, ValueError):
+        return math.nan
+
+
+def parse_homed(text: str) -> tuple[bool, ...]:
+    """Whether each joint is homed, from the words after ``JOINT_HOMED``."""
+    return tuple(word.upper() == "YES" for word in text.split())
+
+
+def pose_difference(one: Pose, other: Pose) -> tuple[float, float]:
+    """The largest difference of a position, mm, and of an angle, deg, less full turns."""
+    differences = [a - b for a, b in zip(one.as_tuple(), other.as_tuple(), strict=True)]
+    angles = [math.remainder(difference, 360.0) for difference in differences[3:]]
+    return max(map(abs, differences[:3])), max(map(abs, angles))

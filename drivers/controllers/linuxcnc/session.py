@@ -20,6 +20,7 @@ status connection (one status query at a time), the two locks of the arbiter.
 from __future__ import annotations
 
 import asyncio
+import logging
 from enum import Enum, auto
 
 from drivers.controllers.linuxcnc import startup
@@ -32,6 +33,8 @@ from drivers.errors import ConnectionLost
 from drivers.interfaces import ControllerStatus
 from drivers.wire_trace import TraceRecorder
 from hexacell.errors import DeviceError
+
+_log = logging.getLogger("drivers.controllers.linuxcnc")
 
 
 class SessionState(Enum):
@@ -88,7 +91,7 @@ class Session:
         return commands
 
     async def in_control(self) -> ControllerCommands:
-        """The same, after taking control in any case; older error messages are dropped."""
+        """The command connection, after taking control in any case; older error messages are dropped."""
         self._set_state(SessionState.CONTROL_LOST)
         commands = await self.synchronized()
         await commands.errors()
@@ -96,11 +99,11 @@ class Session:
         return commands
 
     def machine_is_enabled(self) -> None:
-        """Note that it was seen enabled: what disables it from now on is an error."""
+        """The machine was seen enabled: what disables it from now on is an error."""
         self._status.begin_enabled()
 
     async def reconnect(self) -> ControllerCommands:
-        """The same, as soon as a controller that may be restarting can be reached.
+        """The command connection, as soon as a controller that may be restarting can be reached.
 
         Raises:
             ConnectionLost: It cannot be reached within ``timeouts.reconnect``.
@@ -125,7 +128,7 @@ class Session:
         return await self._status.read()
 
     async def joints(self) -> tuple[float, ...] | None:
-        """Where the joints are now, over the same connection; none before all are homed.
+        """Where the joints are now, over the status connection; None before all are homed.
 
         Raises:
             DeviceError: The session is closed, or they cannot be read.
@@ -141,6 +144,7 @@ class Session:
             DeviceError: The machine could not be stopped, or that is unknown.
         """
         self.stop_count += 1
+        _log.info("%s: stop", self._address.name)
         async with self._arbiter.stopping():
             try:
                 ready = await self._status.release_connection()

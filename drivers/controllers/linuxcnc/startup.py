@@ -36,7 +36,7 @@ async def acknowledge_on_completion(commands: ControllerCommands) -> None:
 
 
 async def next_action(commands: ControllerCommands) -> StartupAction | None:
-    """What it needs next before it can move; none if nothing.
+    """The next action that it needs before it can move; None if it is ready.
 
     LinuxCNC starts in emergency stop and not homed. A later emergency stop leaves the joints homed.
     """

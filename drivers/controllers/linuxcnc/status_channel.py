@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from contextlib import nullcontext
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, nullcontext
 
 from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands, ErrorMessages
 from drivers.controllers.linuxcnc.connection import Connection, SendArbiter
@@ -41,32 +42,14 @@ class StatusConnection:
         self._query = asyncio.Lock()
 
     async def read(self) -> ControllerStatus:
-        """The machine's status now.
-
-        Raises:
-            DeviceError: It cannot be read.
-        """
-        async with self._query:
-            commands = await self._channel.synchronized()
-            try:
-                return await self._read(commands)
-            except ConnectionLost:
-                await self._channel.close()
-                raise
+        """The machine's status now; raises ``DeviceError`` if it cannot be read."""
+        async with self._synchronized() as commands:
+            return await self._read(commands)
 
     async def joints(self) -> tuple[float, ...] | None:
-        """Where the joints are now; none before all are homed.
-
-        Raises:
-            DeviceError: It cannot be read.
-        """
-        async with self._query:
-            commands = await self._channel.synchronized()
-            try:
-                return await commands.joints() if await commands.all_homed() else None
-            except ConnectionLost:
-                await self._channel.close()
-                raise
+        """Where the joints are now; None before all are homed."""
+        async with self._synchronized() as commands:
+            return await commands.joints() if await commands.all_homed() else None
 
     def begin_disabled(self) -> None:
         """An order is about to enable the machine."""
@@ -77,7 +60,7 @@ class StatusConnection:
         self._was_enabled = True
 
     async def release_connection(self) -> Connection | None:
-        """Give the connection away for a stop; none if a query occupies it for too long."""
+        """Give the connection away for a stop; None if a query occupies it for too long."""
         try:
             async with asyncio.timeout(RELEASE_TIMEOUT_S):
                 await self._query.acquire()
@@ -95,6 +78,17 @@ class StatusConnection:
     async def close(self) -> None:
         """Close the connection; closing twice is harmless."""
         await self._channel.close()
+
+    @asynccontextmanager
+    async def _synchronized(self) -> AsyncIterator[ControllerCommands]:
+        """One query at a time; a connection that breaks is replaced at the next one."""
+        async with self._query:
+            commands = await self._channel.synchronized()
+            try:
+                yield commands
+            except ConnectionLost:
+                await self._channel.close()
+                raise
 
     async def _read(self, commands: ControllerCommands) -> ControllerStatus:
         known = len(self._messages.for_status)

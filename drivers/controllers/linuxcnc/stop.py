@@ -41,9 +41,10 @@ async def stop_in_place(
                 await _try_to_stop(address, timeouts, tolerance_mm, recorder)
     except TimeoutError:
         problem = f"still moves {timeouts.stop:g} s after the stop command"
-        raise _not_stopped(problem, address) from None
+        raise DeviceError(problem, subject=address.name, action="Press the emergency stop") from None
     except DeviceError as error:
-        raise _not_stopped(f"could not be stopped: it {error.problem}", address) from error
+        problem = f"could not be stopped: it {error.problem}"
+        raise DeviceError(problem, subject=address.name, action="Press the emergency stop") from error
 
 
 async def _stopped_over(
@@ -96,7 +97,3 @@ async def _is_at_standstill(commands: ControllerCommands, poll_s: float, toleran
         if max(abs(new - old) for new, old in zip(now, first, strict=True)) > tolerance_mm:
             return False
     return True
-
-
-def _not_stopped(problem: str, address: Address) -> DeviceError:
-    return DeviceError(problem, subject=address.name, action="Press the emergency stop")

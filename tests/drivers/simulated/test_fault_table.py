@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.encoders import node_monitor as alarm_poll
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.dbc import DbcBank
 from drivers.encoders.modbus import ModbusBank
+from drivers.encoders.node_monitor import AlarmTiming
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
 from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
@@ -256,9 +256,7 @@ def table(found: list[Row]) -> str:
 async def test_every_fault_is_seen_or_harmless_as_the_table_says(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(alarm_poll, "ALARM_POLL_S", 0.0)
-    monkeypatch.setattr(alarm_poll, "BUS_SHARE", math.inf)
-    monkeypatch.setattr(alarm_poll, "WARNINGS_EVERY", 1)
+    monkeypatch.setattr(Cia406Bank, "alarm_timing", AlarmTiming(0.0, math.inf, 1))
     made = table(await rows(tmp_path))
     with capsys.disabled():
         print(f"\n{made}")

@@ -43,7 +43,7 @@ class SysfsThermometer:
 
     async def open(self) -> DeviceIdentity:
         """Read it once; raises ``DeviceError`` if that gives no temperature."""
-        _log.info("%s: %s", self._subject, (await self.read()).raw)
+        _log.info("%s: opened, %s", self._subject, (await self.read()).raw)
         return DeviceIdentity(self._subject, "sysfs", str(self._path))
 
     async def read(self) -> TemperatureReading:
@@ -91,7 +91,6 @@ class SysfsThermometer:
         return celsius
 
     def _error(self, problem: str) -> DeviceError:
-        _log.warning("%s %s", self._subject, problem)
         return DeviceError(
             problem, subject=self._subject, action=f"Check the sensor behind {self._settings.path}"
         )

@@ -117,16 +117,6 @@ class Check:
         further = self._further_records(measurements, effects) if stated.is_consistent else None
         return replace(stated, verdict=Verdict.NOT_EVALUATED, further_records=further)
 
-    def predicted_error(self, measurements: MeasurementSet) -> float | None:
-        """The error predicted at the worst task pose, 1 sigma, mm; None if no task pose can be taken.
-
-        Raises:
-            IdentifiabilityError: the records do not belong to this robot.
-        """
-        belief = self._estimates(measurements)[0].estimate.belief
-        error = self.plan.task.error(belief)
-        return None if error is None else error.worst(belief.covariance)
-
     def false_records(self, measurements: MeasurementSet) -> frozenset[RecordId]:
         """Records that the others prove false; no statement counts them."""
         return self._estimates(measurements)[0].estimate.false_records

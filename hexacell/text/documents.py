@@ -12,7 +12,7 @@ from hexacell.text.verdict import teaching_sentence
 
 if TYPE_CHECKING:
     from drivers.interfaces import DeviceIdentity
-    from hexacell.dry_run.checks import QuickTrial
+    from hexacell.dry_run.quick_level import QuickTrial
     from hexacell.results.run_comparison import ParameterTrend, RunComparison
     from hexacell.services.history.drift_history import DriftHistory, FoundChange
     from hexacell.services.history.retention import Retention

@@ -9,7 +9,7 @@ from pathlib import Path
 from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.checks.quick_level import QuickAccuracy
-from hexacell.dry_run.checks import QuickTrial
+from hexacell.dry_run.quick_level import QuickTrial
 from hexacell.dry_run.verdict_forecast import NOISE, WANTED, VerdictForecast
 from hexacell.measurements.records import RecordId
 from hexacell.results.result import AcceptedResult

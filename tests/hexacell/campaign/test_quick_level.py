@@ -13,7 +13,7 @@ from hexacell.checks.check import Check, identified_before
 from hexacell.checks.quick_level import AS_ACCURATE, QuickLevel
 from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
-from hexacell.dry_run.checks import try_quick_level
+from hexacell.dry_run.quick_level import try_quick_level
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.measurements.records import MeasurementSet

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hexacell.campaign.budget import noise_minutes
-from hexacell.campaign.planner import Plan
 from hexacell.checks.quick_level import QuickAccuracy, QuickLevel
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import HexacellError
-from hexacell.identification.problem.prior import Prior
 from hexacell.robot.virtual_robot import VirtualRobot
 
 MOST_TRIED = 3
@@ -37,19 +33,7 @@ class QuickTrial:
 
 def try_quick_level(quick: QuickLevel) -> QuickTrial:
     """Carry the quick level out on a robot drawn from what is known; takes a second or two."""
-    for campaign in _on_expected_robots(quick.plan, quick.expected):
-        with suppress(HexacellError):
-            return QuickTrial(
-                quick.accuracy(campaign.measurements),
-                campaign.state.begun_points,
-                _minutes_of(campaign),
-            )
-    return QuickTrial(None)
-
-
-def _on_expected_robots(plan: Plan, expected: Prior) -> Iterator[VirtualCampaign]:
-    """The campaigns on some robots drawn from what is ``expected``, of those that can be measured."""
-    plan = replace(plan, with_forecast=False)
+    plan, expected = replace(quick.plan, with_forecast=False), quick.expected
     root = np.linalg.cholesky(expected.covariance)
     for number in range(MOST_TRIED):
         random = np.random.default_rng([plan.settings.identification.seed, number])
@@ -58,13 +42,10 @@ def _on_expected_robots(plan: Plan, expected: Prior) -> Iterator[VirtualCampaign
         campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, truth, random))
         try:
             campaign.carry_out()
+            accuracy = quick.accuracy(campaign.measurements)
         except HexacellError:
             continue
-        yield campaign
-
-
-def _minutes_of(campaign: VirtualCampaign) -> float:
-    """How long its records take, measuring the noise included, held-out poses not."""
-    plan = campaign.plan
-    measuring = plan.budget.time_model.minutes(len(campaign.measurements), campaign.state.begun_points)
-    return noise_minutes(plan.settings, pilots=0) + measuring
+        points = campaign.state.begun_points
+        minutes = plan.budget.time_model.minutes(len(campaign.measurements), points)
+        return QuickTrial(accuracy, points, noise_minutes(plan.settings, pilots=0) + minutes)
+    return QuickTrial(None)

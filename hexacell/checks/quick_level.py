@@ -7,7 +7,6 @@ the worst task pose is that of the last calibration, or its budget is used. Its 
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -129,14 +128,14 @@ class QuickLevel:
         error = self._worst(likeliest.estimate.belief)
         if error is None or wanted is None:
             return None
-        errors = self._errors_after(likeliest)
+        errors, enough = self._errors_after(likeliest), AS_ACCURATE * wanted
         return QuickAccuracy(
             records=len(measurements),
             error_mm=error,
             calibrated_mm=wanted,
             drift_scale=likeliest.scale,
             further=tuple(FurtherRecords(records=n, error_mm=errors[n]) for n in FURTHER_RECORDS),
-            records_to_calibrated=_first_within(errors, AS_ACCURATE * wanted),
+            records_to_calibrated=next((n for n, mm in enumerate(errors) if mm <= enough), None),
         )
 
     def _known_error(self, measurements: MeasurementSet) -> float | None:
@@ -175,10 +174,3 @@ class QuickLevel:
     def _before(self) -> IdentifiedBefore:
         assert self.check.before is not None  # noqa: S101 - likewise
         return self.check.before
-
-
-def _first_within(errors: list[float], wanted: float) -> int | None:
-    """The first number of records after which a falling error is within what is wanted."""
-    if errors[-1] > wanted:
-        return None
-    return bisect_left(errors, True, key=lambda error: error <= wanted)

@@ -111,7 +111,8 @@ def forecast_verdicts(stated: Array, budget: UncertaintyBudget, limits: ErrorLim
     verdicts = [
         limits.decide_largest(first, second) for first, second in zip(positions, orientations, strict=True)
     ]
-    name, part = _largest_part(budget)
+    parts = [(line.combined_mm, line.effect.name) for line in budget.lines if not line.effect.is_estimated]
+    part, name = max([(budget.noise_mm, NOISE), *parts])
     factor = limits.guard_band_factor
     return VerdictForecast(
         _probabilities(verdicts),
@@ -183,12 +184,6 @@ def _probabilities(verdicts: Sequence[Verdict]) -> dict[Verdict, float]:
 
 def _passing(statements: Sequence[LargestError], guard_band_factor: float) -> float:
     return float(np.quantile([one.value + guard_band_factor * one.expanded for one in statements], WANTED))
-
-
-def _largest_part(budget: UncertaintyBudget) -> tuple[str, float]:
-    parts = [(line.combined_mm, line.effect.name) for line in budget.lines if not line.effect.is_estimated]
-    size, name = max([(budget.noise_mm, NOISE), *parts])
-    return name, size
 
 
 def predicted_verdicts(

@@ -28,7 +28,7 @@ def stated_limits(settings: CellSettings, controller: ControllerGeometry, frames
     ``frames`` lead from the controller's to the convention's.
     """
     limits = settings.limits
-    lowest, highest, told = _joint_ranges(settings, controller)
+    lowest, highest, zeroed = _joint_ranges(settings, controller)
     return Limits(
         limits.gauge_travel_mm,
         float(np.radians(limits.tilt_deg)),
@@ -40,7 +40,7 @@ def stated_limits(settings: CellSettings, controller: ControllerGeometry, frames
         _axis_limits(limits, controller.limits),
         _leg_limits(settings, controller),
         gauge_travel_of(settings),
-        told_joints=told,
+        told_joints=zeroed,
     )
 
 
@@ -59,14 +59,14 @@ def _joint_ranges(
     settings: CellSettings, controller: ControllerGeometry
 ) -> tuple[Array, Array, ZeroedRanges | None]:
     """The narrowest of the stated ranges, (6,) lowest and (6,) highest, and what depends on the zeros."""
-    limits, told = settings.limits, controller.limits.joints
+    limits, of_controller = settings.limits, controller.limits.joints
     lowest, highest = np.full(6, limits.joint_min), np.full(6, limits.joint_max)
     if limits.joints is not None:
         low, high = np.transpose(limits.joints)
         lowest, highest = np.maximum(lowest, low), np.minimum(highest, high)
-    if told is None:
+    if of_controller is None:
         return lowest, highest, None
-    zeroed = ZeroedRanges(lowest, highest, *np.transpose(told))
+    zeroed = ZeroedRanges(lowest, highest, *np.transpose(of_controller))
     if not settings.controller.joints_include_zeros:
         return *zeroed.at(np.zeros(6)), None
     return *zeroed.at(joint_zeros(settings.mechanism, controller.geometry)), zeroed

@@ -11,7 +11,7 @@ from math import isfinite
 from typing import Any, Generic, TypeVar
 
 from hexacell.study.design_records import PAPER_DEG, RANDOM_DEG, OrientationChoice
-from hexacell.study.design_study import DESIGN, ChoiceCurve, DesignStudy, Spread
+from hexacell.study.design_study import DESIGN, DesignStudy, Spread
 from hexacell.study.paper_experiment import EXPERIMENT
 from hexacell.study.paper_simulation import PAPER
 from hexacell.study.tasks import Study
@@ -69,7 +69,11 @@ def design_lines(study: DesignStudy) -> Iterator[str]:
     head = f"{'error':<16} {'noise':<8} {'task':<8} {'gauges':<9} robots"
     yield f"  {'orientations':<15} {'records':<8} {head}"
     for name, curve in study.choices.items():
-        yield from _choice_lines(name, curve)
+        if not curve.by_records:
+            yield f"  {name:<15} none of {curve.tried} robots is identified"
+        for count, spread in curve.by_records.items():
+            robots = f"{curve.deviation_mm:<9.3g} {spread.robots}/{curve.tried}"
+            yield f"  {name:<15} {count:<8} {_spread(spread)} {robots}"
     if ratios := ", ".join(f"{name} {ratio:.1f}" for name, ratio in study.noise_ratio.items()):
         yield wrapped(f"Noise on the parameters, times that of adaptive orientations: {ratios}.")
     for name, rows in study.sweeps.items():
@@ -77,14 +81,6 @@ def design_lines(study: DesignStudy) -> Iterator[str]:
         yield f"  {name:<24} {'error':<16} {'noise':<8} {'task':<8} robots"
         for value, spread in rows.items():
             yield f"  {value:<24g} {_spread(spread)} {spread.robots}"
-
-
-def _choice_lines(name: str, curve: ChoiceCurve) -> Iterator[str]:
-    if not curve.by_records:
-        yield f"  {name:<15} none of {curve.tried} robots is identified"
-    for count, spread in curve.by_records.items():
-        robots = f"{curve.deviation_mm:<9.3g} {spread.robots}/{curve.tried}"
-        yield f"  {name:<15} {count:<8} {_spread(spread)} {robots}"
 
 
 def _spread(one: Spread) -> str:

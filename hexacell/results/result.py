@@ -42,7 +42,7 @@ class OutlierRecord(Frozen):
 
     @classmethod
     def of(cls, record: RecordId, fault: DataFault) -> Self:
-        """A record and its fault; the gauges of a zero shift are named in its finding only."""
+        """A record and its fault as an outlier; the gauges of a zero shift are in its finding only."""
         point, orientation = record
         gauges = () if fault.kind is DataFaultKind.ZERO_SHIFT else tuple(fault.gauges)
         return cls(
@@ -54,7 +54,7 @@ class IdentificationResult(Frozen):
     """The identified geometry and its uncertainty: the first part of ``result.json``.
 
     ``expected_chi2`` is the mean of ``chi2`` if model and noise are right, where an earlier result, or the
-    tolerances of what is held, take part in the estimate; where only the drawing does, it is none, and that
+    tolerances of what is held, take part in the estimate; where only the drawing does, it is None, and that
     mean is ``dof``. ``identifies`` says which parameters are identified; the others are as the controller
     has them, with their tolerances as sigma.
     """
@@ -78,8 +78,8 @@ class IdentificationResult(Frozen):
 
     @classmethod
     def of(cls, found: Identification, zeros: IdentifiedZeros | None = None) -> Self:
-        """What is kept of an identification, or of the zeros alone."""
-        parameters, told = found.geometry.parameters, zeros or found
+        """The result of an identification, or of the zeros alone."""
+        parameters, kept = found.geometry.parameters, zeros or found
         return cls(
             converged=found.converged,
             termination=found.termination,
@@ -89,10 +89,10 @@ class IdentificationResult(Frozen):
             residual_rms_mm=found.residual_rms_mm,
             chi2=found.goodness.chi2,
             dof=found.dof,
-            geometry=parameters.document(told.geometry.vector),
-            sigma=parameters.document(told.sigma),
-            covariance=told.covariance.tolist(),
-            undetermined=told.undetermined,
+            geometry=parameters.document(kept.geometry.vector),
+            sigma=parameters.document(kept.sigma),
+            covariance=kept.covariance.tolist(),
+            undetermined=kept.undetermined,
             outliers=tuple(OutlierRecord.of(record, fault) for record, fault in found.left_out),
             frame=found.problem.mechanism.convention.name,
             expected_chi2=found.goodness.expected if found.problem.prior.is_estimate or zeros else None,
@@ -100,7 +100,7 @@ class IdentificationResult(Frozen):
         )
 
     def document(self, parameters: ParameterSet) -> dict[str, Any]:
-        """The same as JSON has it, with a row for each of the ``parameters``."""
+        """The result as a JSON document, with a row for each of the ``parameters``."""
         return self.model_dump(mode="json") | {"parameters": self._parameter_rows(parameters)}
 
     def _parameter_rows(self, parameters: ParameterSet) -> list[dict[str, Any]]:
@@ -159,7 +159,7 @@ class LengthSource(Frozen):
 
 
 class LengthResult(Frozen):
-    """What a length check says of the scale common to all encoders.
+    """The scale common to all encoders, as a length check found it.
 
     Attributes:
         distance_mm: certified, at the temperature of the fixture.
@@ -168,7 +168,7 @@ class LengthResult(Frozen):
         expanded_um_m: its expanded uncertainty U, k = 2.
         stated_um_m: one standard deviation of the scale by the cell file.
         sources: what the uncertainty consists of.
-        is_consistent: whether the records agree with each other; otherwise the check says nothing.
+        is_consistent: whether the records agree with each other; otherwise the check has no result.
         reason: why they do not, empty if they do.
     """
 
@@ -208,9 +208,9 @@ class AcceptedResult(Frozen):
         covariance: of the parameters, mm^2, in the mechanism's frame convention.
         effects: what one unit of each cause of a systematic effect did to the free parameters: by the
             name of the effect, a row a cause.
-        length: what the length check of its run found; none without one.
-        leg_temperatures_c: mean temperature of each leg while the geometry was measured; none of a leg
-            without a thermometer that answered; empty in older runs.
+        length: what the length check of its run found; None without one.
+        leg_temperatures_c: mean temperature of each leg while the geometry was measured; None for
+            a leg without a thermometer that answered.
     """
 
     run: str
@@ -222,5 +222,5 @@ class AcceptedResult(Frozen):
 
     @property
     def parameter_columns(self) -> dict[str, Array]:
-        """The same as errors (p, k) of the free parameters."""
+        """Errors (p, k) of the free parameters, by the name of the effect."""
         return {name: np.array(rows).T for name, rows in self.effects.items()}

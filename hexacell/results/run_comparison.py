@@ -20,12 +20,12 @@ from hexacell.kinematics.rotations import Array
 from hexacell.results.result import IdentificationResult
 
 LEAST_RUNS = 3
-"""Of a trend: two runs are compared, and tell no trend."""
+"""Fewest runs of a trend: two are compared, and show none."""
 
 DAY_S = 86_400.0
 
 TIED = 1e-12
-"""Of the largest variance of a combination of parameters: one with less has none but rounding."""
+"""Share of the largest variance below which that of a combination of parameters is rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class ParameterDifference:
 
     @property
     def change(self) -> float:
-        """From the one to the other."""
+        """The change from the one to the other."""
         return self.after - self.before
 
     @property
@@ -120,7 +120,7 @@ def compare_results(
 def trends(
     parameters: ParameterSet, results: Sequence[tuple[datetime, IdentificationResult]]
 ) -> tuple[ParameterTrend, ...]:
-    """The trend of every free parameter; none from fewer than three results, or of one instant.
+    """The trend of every free parameter; empty for fewer than three results, or one instant.
 
     Raises:
         UsageError: the results are in different frame conventions.

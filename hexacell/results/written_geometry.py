@@ -37,7 +37,7 @@ class TaskDisplacement(Frozen):
 
     @classmethod
     def of(cls, moved: PoseErrors, limits: AcceptanceSettings) -> TaskDisplacement | None:
-        """Of n poses; none without any."""
+        """Displacement over n poses; None without any."""
         if not len(moved.angles):
             return None
         distance, angle = moved.position_largest_mm, moved.orientation_largest_deg
@@ -53,7 +53,7 @@ class TaskDisplacement(Frozen):
 class WrittenGeometry:
     """A geometry in the frames in which a controller gets it.
 
-    ``displacement`` is none where no task pose tells it, or no frames were chosen.
+    ``displacement`` is None where no task pose shows it, or no frames were chosen.
     """
 
     geometry: Geometry

@@ -39,7 +39,7 @@ MOST_RECORDS_BEFORE_NEXT = 500
 
 
 StatedPose = tuple[KeyPath, str, Pose]
-"""Where a pose is in the cell file, what it is for, and the pose itself."""
+"""Place of a pose in the cell file, its use, and the pose itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +47,8 @@ class NextPose:
     """What to measure next.
 
     Attributes:
-        forecast: absent where the robot can take no task pose.
-        left_out: the records so far that the others prove false.
+        forecast: None where the robot can reach no task pose.
+        left_out: records so far that the others prove false.
     """
 
     decision: StartPoint | MeasurePose | Finished
@@ -82,8 +82,8 @@ def fit_measurements(
 ) -> Assessment:
     """Identify the geometry of a cell's robot from records, and check it.
 
-    ``folder`` is where they are kept: if it is that of a run, its journal tells what commanded them, and
-    the noise that it measured. ``identify_only``: in the place of what the cell file says.
+    ``folder`` is where they are kept: if it is that of a run, what commanded them and the noise that it
+    measured come from its journal. ``identify_only`` replaces what the cell file states.
 
     Raises:
         IdentifiabilityError: the records cannot determine it.

@@ -46,7 +46,7 @@ UNITS = {"mm": r"\milli\metre", "um": r"\micro\metre", "deg": r"\degree", "rad":
 DEGREE_CELSIUS = r"\degreecelsius"
 DECIMALS = 6
 
-# XML 1.0 has no others, and none of the escapes that it has makes one valid.
+# XML 1.0 allows no other characters, not even as escapes.
 _NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 register_namespace("dcc", DCC)
@@ -63,7 +63,7 @@ def certificate_of_run(run: ReportedRun) -> bytes:
     accuracy = judged_accuracy(run.state.judged)
     if accuracy is None:
         raise UsageError(
-            "the run says nothing of the errors at the task poses, so that nothing can be certified",
+            "the run has no result on the errors at the task poses, so that nothing can be certified",
             subject=run.name,
             action="Name a calibration or a check with a verdict; a report is made of any run",
         )

@@ -220,7 +220,7 @@ def history_document(runs: Sequence[PastRun]) -> dict[str, Any]:
 
 
 def past_run_document(run: PastRun) -> dict[str, Any]:
-    """One of the runs that ``history --json`` prints."""
+    """A run in the document of ``history --json``."""
     was, position = run.summary, run.summary.position
     return {
         "run": str(run.folder.path),

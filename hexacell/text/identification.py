@@ -48,7 +48,7 @@ def identification_report(assessed: Assessment) -> str:
 
 
 def _verdict_line(assessed: Assessment) -> str:
-    """That records of the identification alone give no verdict on the robot, and what U it would have."""
+    """Why the records of an identification alone give no verdict, and what U the robot would have."""
     sentence = f"Verdict: {Verdict.NOT_EVALUATED}, as no held-out records test this model."
     budget = assessed.budget
     if budget is None or assessed.refused:

@@ -17,9 +17,9 @@ from hexacell.text.layout import duration, wrapped
 
 THOUSAND = 1e3
 WHOLE = 9.95
-"""From here on sizes are told in whole micrometres or millidegrees."""
+"""Size from which figures are whole micrometres or millidegrees."""
 NOTEWORTHY_DRIFT = 1.0
-"""In units of the noise of a record: a smaller drift within seconds is not mentioned."""
+"""Smallest drift within seconds that is mentioned, in units of the noise of a record."""
 
 
 def measured_noise_text(measured: MeasuredNoise) -> str:
@@ -28,12 +28,12 @@ def measured_noise_text(measured: MeasuredNoise) -> str:
 
 
 def measured_noise_lines(measured: MeasuredNoise) -> tuple[str, ...]:
-    """The same, each sentence as one line without indentation."""
+    """What was measured and what is wrong, each sentence as one line without indentation."""
     return tuple(" ".join(line.split()) for line in [*_summary(measured), *_warnings(measured)])
 
 
 def noise_and_averaging_text(measured: MeasuredNoise) -> str:
-    """The same, and what means of more readings gain."""
+    """What was measured, what is wrong, and what means of more readings gain."""
     return _paragraphs([*_summary(measured), *_warnings(measured), *_averaging(measured)])
 
 

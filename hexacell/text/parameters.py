@@ -27,7 +27,7 @@ class ParameterRow:
 
     Attributes:
         old, new: its values; None in a check, which finds the change alone.
-        doubt: why the change says nothing; empty if it does.
+        doubt: why the change is no result; empty if it is one.
     """
 
     name: str

@@ -72,7 +72,7 @@ def resume_command(request: RunRequest) -> str:
 
 
 def closing_lines(request: RunRequest, ended: events.Ended) -> tuple[str, ...]:
-    """Where everything about the run is, what must be taught anew, and last its result in one line."""
+    """The run folder, what must be taught anew, and last the result in one line."""
     teaching = () if ended.displacement is None else (teaching_line(ended.displacement),)
     return (f"Everything about this run is in {request.folder.path}", *teaching, ended.line)
 
@@ -103,7 +103,7 @@ def question_text(question: Question) -> str:
 
 
 def _mounting_text(mounting: int, seat: int, pose: Pose) -> str:
-    """Where the fixture and the gauges are wanted in a length check."""
+    """Instructions for mounting the fixture and the gauges in a length check."""
     where = f"\nLength check, mounting {mounting}: the robot holds the ball at {pose}.\n"
     if mounting == 1:
         return (
@@ -118,9 +118,9 @@ def _mounting_text(mounting: int, seat: int, pose: Pose) -> str:
 
 
 def _expected(improvement: ExpectedImprovement) -> str:
-    """What the change is for."""
+    """What the change improves."""
     return (
-        f"Largest position error at the task poses: {improvement.now_mm:.3g} mm with the config of now, "
+        f"Largest position error at the task poses: {improvement.now_mm:.3g} mm with the current config, "
         f"0 +- {improvement.expanded_mm:.2g} mm with this one."
     )
 

@@ -1,4 +1,4 @@
-"""What a check says of a robot: its errors at the task poses, and the verdict on them."""
+"""The statement of a check: the robot's errors at the task poses, and the verdict on them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_FURTHER_RECORDS = 200
 
 @dataclass(frozen=True, slots=True)
 class CheckStatement:
-    """What is said of the robot by the records so far.
+    """Errors of the robot and the verdict on them, by the records so far.
 
     Attributes:
         estimate: the estimate that it is made from.

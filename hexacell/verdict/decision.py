@@ -95,7 +95,7 @@ class JudgedError(Frozen):
 
 
 def worst_verdict(verdicts: Iterable[Verdict]) -> Verdict:
-    """The verdict of several together: the worst of them; not evaluated if there is none."""
+    """The verdict of several together: the worst of them; not evaluated without any."""
     order = list(Verdict)
     return max(verdicts, key=order.index, default=Verdict.NOT_EVALUATED)
 

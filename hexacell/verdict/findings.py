@@ -117,7 +117,7 @@ def _incomplete(assessed: Assessment) -> str:
 
 
 def _point_verdict(assessed: Assessment) -> str:
-    """That records which agree with the noise together contradict each other by points."""
+    """Doubt where records agree with the noise together, and contradict each other by points."""
     contradicted = contradicted_points(assessed.points)
     if not contradicted or assessed.found.goodness.agreement is ChiSquareVerdict.TOO_LARGE:
         return ""

@@ -83,7 +83,7 @@ def doubts_zeros(tests: Sequence[ModelTest]) -> bool:
 
 
 def fails_narrowly(tests: Sequence[ModelTest]) -> bool:
-    """Whether tests failed, each of them in a way that confirming records can tell from chance."""
+    """Whether tests failed, each of them in a way that confirming records can distinguish from chance."""
     failed = [test for test in tests if not test.passed]
     return bool(failed) and all(test.failed_narrowly for test in failed)
 

@@ -91,7 +91,7 @@ class Verification(Frozen):
 
     @property
     def needs_confirmation(self) -> bool:
-        """Whether only confirming records can tell if the model is wrong, or chance made a test fail."""
+        """Whether only confirming records can decide if the model is wrong, or chance made a test fail."""
         return fails_narrowly(self.tests) and self.accuracy is not None and not self.is_worse
 
 

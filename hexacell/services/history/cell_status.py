@@ -42,10 +42,10 @@ class CellStatus:
     """The state of one cell.
 
     Attributes:
-        in_use_by: who holds its lock, in words; none if nobody does.
+        in_use_by: who holds its lock, in words; None if nobody does.
         latest: the run that ended last, and ``judged`` the last one with a verdict.
         passed_at: when a run passed last.
-        in_force: the run whose config the controller has; none where it was never calibrated, or edited.
+        in_force: the run whose config the controller has; None where it was never calibrated, or edited.
         due_at: when the next calibration is due, where the cell file says how long one is valid.
         proposal: the newest run whose proposal waits for a person.
         drift: the watch over all runs.
@@ -69,20 +69,20 @@ class CellStatus:
 
     @property
     def worst_share(self) -> tuple[str, float] | None:
-        """The parameter whose cumulative sum is nearest to its limit, and how near; none without runs."""
+        """The parameter whose cumulative sum is nearest to its limit, and how near; None without runs."""
         return max(self.drift.shares, key=lambda one: one[1], default=None)
 
 
 @dataclass(frozen=True, slots=True)
 class UnreadableCell:
-    """A cell of which nothing can be said, as its file, or that of its controller, cannot be used."""
+    """A cell whose file, or that of its controller, cannot be used."""
 
     path: Path
     error: HexacellError
 
 
 def cell_status(cell: Cell) -> CellStatus:
-    """Of one cell, from its run folders.
+    """The status of a cell, from its run folders.
 
     Raises:
         FileError: the controller's config, or the folder of the runs, cannot be read.
@@ -161,7 +161,7 @@ class FleetRun:
 
 
 def publish_status(status: CellStatus) -> None:
-    """Put how a cell is into the archive that it shares; nothing where it shares none.
+    """Put the status of a cell into the archive that it shares, if it shares one.
 
     Raises:
         ArchiveUnavailable: it cannot be written.
@@ -177,7 +177,7 @@ def publish_status(status: CellStatus) -> None:
 
 
 def fleet_cell(status: CellStatus) -> FleetCell:
-    """What others are told of a cell."""
+    """The status of a cell as an archive has it."""
     latest, judged = status.latest, status.judged
     accuracy = None if judged is None else judged.summary.accuracy
     return FleetCell(

@@ -49,13 +49,13 @@ class FoundChange:
 
     @property
     def leg(self) -> int:
-        """The likeliest one."""
+        """The leg that changed most likely."""
         return self.possible_legs[0]
 
 
 @dataclass(frozen=True, slots=True)
 class DriftHistory:
-    """What all runs of a cell say of changes.
+    """Changes of a robot, by all runs of its cell.
 
     Attributes:
         runs: when each run ended that counts, oldest first.

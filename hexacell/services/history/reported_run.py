@@ -35,7 +35,7 @@ class ReportedRun:
     Attributes:
         settings: the cell file as it was when the run began.
         began, ended: when its first and last event were written, UTC.
-        document: the identification as ``fit --json`` has it; empty where there is none.
+        document: the identification as ``fit --json`` has it; empty without one.
         fingerprints: SHA-256 of the files of the folder, by their names.
     """
 
@@ -49,7 +49,7 @@ class ReportedRun:
 
     @property
     def name(self) -> str:
-        """That of its folder."""
+        """The name of its folder."""
         return self.folder.path.resolve().name
 
     @property
@@ -60,12 +60,12 @@ class ReportedRun:
 
     @property
     def geometry_before(self) -> Geometry:
-        """That of the controller when the run began, in the mechanism's frame convention."""
+        """The controller's geometry when the run began, in the mechanism's frame convention."""
         return geometry_before(self.settings, self.started)
 
     @property
     def identifier(self) -> str:
-        """What names this report and no other: cell, run, and a part of the journal's fingerprint."""
+        """Unique name of this report: cell, run, and a part of the journal's fingerprint."""
         digits = self.fingerprints[JOURNAL][:IDENTIFIER_DIGITS]
         return f"{self.settings.name} / {self.name} / {digits}"
 

@@ -61,7 +61,7 @@ def retention(cell: Cell, days: float, index: RunIndex | None = None) -> Retenti
 
 
 def reason_to_keep(run: PastRun) -> KeptFor | None:
-    """Why a run stays however old it is; none if it may go."""
+    """Why a run stays however old it is; None if it may go."""
     was = run.summary
     if not was.mode:
         return KeptFor.UNREADABLE
@@ -92,7 +92,7 @@ def delete_runs(cell: Cell, runs: Sequence[PastRun]) -> None:
 
 
 def _delete(path: Path) -> None:
-    """In one step for all who list runs: a folder that is half deleted would be a damaged run."""
+    """Delete a folder in one step for all who list runs: half deleted it would be a damaged run."""
     leaving = path.with_name(f"{LEAVING}{path.name}")
     try:
         path.rename(leaving)

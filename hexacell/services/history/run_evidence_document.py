@@ -29,7 +29,7 @@ REFERENCE_C = 20.0
 def evidence_document(settings: CellSettings, folder: RunFolder) -> EvidenceDocument | None:
     """The evidence of a run by the settings that the cell has now.
 
-    None where it has none: it is not over, measured no geometry, its residuals do not agree with the noise,
+    None without any: it is not over, measured no geometry, its residuals do not agree with the noise,
     it started from a drawing, a thermometer on a leg never answered, or its journal cannot be read.
     """
     try:

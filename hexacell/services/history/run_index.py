@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from hexacell.runs.archive import Archive
 
 BATCH = 100
-"""Of runs that are kept at once, so that an interrupted reading of thousands of folders is not lost."""
+"""Number of runs stored at once, so that an interrupted reading of thousands of folders is not lost."""
 
 NOTHING = b""
 """What is kept of a run that has no such document."""
@@ -47,12 +47,12 @@ class RunSummary(Frozen):
     Attributes:
         began, ended: when its first and its last event were written, UTC.
         mode: check, quick, optimise or length; empty where its journal cannot be read.
-        verdict: none where there is none.
-        accuracy: the errors at the task poses that the verdict is on; none where there is no such verdict.
+        verdict: None without one.
+        accuracy: the errors at the task poses that the verdict is on; None without such a verdict.
         line: how it ended, in words; why its journal cannot be read, if it cannot.
         has_result: whether it identified a geometry of its own, with which no other result took part.
         is_over: whether it has ended; one that has not can be resumed.
-        written_sha256: fingerprint of the controller's config as it wrote it; none where it wrote none.
+        written_sha256: fingerprint of the controller's config as it wrote it; None where it wrote none.
         has_written: whether it wrote the config at all, whatever was undone.
         has_proposal: whether it has a proposal that is not in the config, and can be applied.
         has_begun: whether it began at all; one that was refused each time did not.
@@ -119,7 +119,7 @@ class EvidenceDocument(Frozen):
 
     @property
     def evidence(self) -> RunEvidence:
-        """The evidence again."""
+        """The evidence that the document holds."""
         from hexacell.drift.run_evidence import RunEvidence  # noqa: PLC0415 - only where runs are watched
 
         weighted = _doubles(self.weighted)
@@ -129,7 +129,7 @@ class EvidenceDocument(Frozen):
 
 
 class RunIndex:
-    """The runs of a cell; ``warn`` is told why the archive cannot be used, if it cannot.
+    """The runs of a cell; ``warn`` is called with the reason if the archive cannot be used.
 
     ``url`` is that of a shared archive, if it is another than the cell file's.
     """
@@ -153,7 +153,7 @@ class RunIndex:
     ) -> dict[str, Document]:
         """The documents of all runs, or of some, by name; without those that have none.
 
-        ``read`` derives a document from its folder; a part of the runs has none. ``context`` is a word for
+        ``read`` derives a document from its folder, or None. ``context`` is a word for
         what it depends on beside the folder: documents of another one are derived again.
 
         Raises:
@@ -184,7 +184,7 @@ class RunIndex:
             known = archive.documents(kind)
             archive.forget([name for name in known if name not in stamps])
         except ArchiveUnavailable as error:
-            self._tell(error)
+            self._warn_once(error)
             return {}
         return known
 
@@ -194,9 +194,9 @@ class RunIndex:
         try:
             archive.store(kind, documents)
         except ArchiveUnavailable as error:
-            self._tell(error)
+            self._warn_once(error)
 
-    def _tell(self, error: ArchiveUnavailable) -> None:
+    def _warn_once(self, error: ArchiveUnavailable) -> None:
         self._has_warned = True
         self._warn(str(error))
 

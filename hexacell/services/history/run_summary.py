@@ -69,9 +69,9 @@ def state_of(folder: RunFolder) -> RunState:
 
 
 def result_of_its_own(state: RunState) -> IdentificationResult | None:
-    """What its records alone identified; none where nothing was identified, and none of the quick level.
+    """The result of the records of a run alone; None where nothing was identified, or by the quick level.
 
-    That of the quick level has the errors of the result that it started from: the two are no two witnesses.
+    The result of the quick level has the errors of the one that it started from: they are not independent.
     """
     is_quick = state.started is not None and state.started.mode == "quick"
     return None if state.identified is None or is_quick else state.identified.result
@@ -88,7 +88,7 @@ def require_result(state: RunState, run: str) -> IdentificationResult:
 
 
 def judged_accuracy(judged: events.ResultValidated | None) -> VerifiedAccuracy | None:
-    """The errors at the task poses that a verdict is on; none where there is no such verdict."""
+    """The errors at the task poses that a verdict is on; None without such a verdict."""
     if judged is None:
         return None
     if judged.verification is not None:

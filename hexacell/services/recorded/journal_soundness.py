@@ -122,7 +122,7 @@ class _Event:
             yield "the run was over before"
 
     def _place(self) -> Iterator[str]:
-        """Of which set it is, and at which place in it."""
+        """The set that the event is of, and its place in it."""
         event = self.event
         step = event.step if isinstance(event, events.StepBegun | events.Failed) else None
         at = step.at if isinstance(step, StepOfSet) else getattr(event, "at", None)
@@ -143,9 +143,9 @@ class _Event:
     def _is_pilot(self, orientation: int) -> bool:
         """Whether a pilot pose is meant, and may be: it is left for, but is no record."""
         event = self.event
-        told = event.step if isinstance(event, events.StepBegun | events.Failed) else event
+        subject = event.step if isinstance(event, events.StepBegun | events.Failed) else event
         number = pilot_number(orientation)
-        return isinstance(told, OF_PILOTS) and number is not None and number <= MOST_TO_A_LIST
+        return isinstance(subject, OF_PILOTS) and number is not None and number <= MOST_TO_A_LIST
 
     def _points(self, phase: Phase) -> int:
         if not self.follows_plan:
@@ -235,7 +235,7 @@ class _Event:
         variances = np.diag(covariance)
         bound = np.sqrt(np.abs(variances)[:, np.newaxis] * np.abs(variances))
         if (variances < 0.0).any() or (np.abs(covariance) > 1.001 * bound + 1e-12).any():
-            yield "a covariance is none"
+            yield "this is no covariance"
 
     def _effects(self, effects: dict[str, tuple[tuple[float, ...], ...]]) -> Iterator[str]:
         free = len(self.settings.mechanism.convention.free_names())
@@ -277,7 +277,7 @@ def _noise_problems(measured: events.NoiseMeasured) -> Iterator[str]:
 
 
 def _out_of_range(value: object, limit: float, but: Iterable[str] = ()) -> Iterator[str]:
-    """The first number below a value that is none, or too large."""
+    """The first number in a value that is not finite, or too large."""
     found = next((one for one in _numbers_in(value, but) if not abs(one) <= limit), None)
     if found is not None:
         yield f"{found:g} is not within +-{limit:g}"

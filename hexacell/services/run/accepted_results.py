@@ -14,6 +14,7 @@ from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.results.result import AcceptedResult, LengthResult
 from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.services.recorded.journal_soundness import require_sound
 from hexacell.services.recorded.recorded_robot import started_robot
 from hexacell.services.write_back.proposals import later_approval
@@ -38,7 +39,7 @@ def last_accepted_result(cell: Cell) -> AcceptedResult | None:
     written = fingerprint(*cell.config_paths)
     folder = runs_folder(cell)
     paths = sorted(folder.iterdir()) if folder.is_dir() else []
-    found = (_accepted(cell, path) for path in paths if _wrote(path, written))
+    found = (_accepted(cell, path, written) for path in paths)
     newest = max((one for one in found if one is not None), key=lambda one: one.at, default=None)
     return None if newest is None else _result(cell, newest)
 
@@ -53,17 +54,11 @@ class _AcceptedRun:
     identified: events.Identified
 
 
-def _wrote(path: Path, sha256: str) -> bool:
-    """Whether a run wrote the config with this fingerprint."""
+def _accepted(cell: Cell, path: Path, sha256: str) -> _AcceptedRun | None:
+    """A run, if it wrote the config with this fingerprint, and its result stayed in the controller."""
     try:
-        return Receipt.of(path).sha256_after == sha256
-    except HexacellError:
-        return False
-
-
-def _accepted(cell: Cell, path: Path) -> _AcceptedRun | None:
-    """A run, if its result stayed in the controller."""
-    try:
+        if Receipt.of(path).sha256_after != sha256:
+            return None
         journal = RunFolder(path).journal
         entries = read_entries(journal)
         history = (entry.event for entry in entries)
@@ -107,16 +102,15 @@ def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
 
 
 def _length(state: RunState) -> LengthResult | None:
-    """What the length check of a run found, or, if it had none, of that which it started from."""
-    verification = None if state.judged is None else state.judged.verification
-    accuracy = None if verification is None else verification.accuracy
-    found = None if accuracy is None else accuracy.length
+    """What the length check of a run found, or of the run that it started from."""
+    accuracy = judged_accuracy(state.judged)
     before = None if state.started is None else state.started.accepted
+    found = None if accuracy is None else accuracy.length
     return found or (None if before is None else before.length)
 
 
 def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], ...]]:
-    """What the systematic effects, as the cell file has them now, did to the result."""
+    """Errors of the result by the systematic effects that the cell file states now."""
     if state.started is None:
         return {}
     settings, started = cell.settings, state.started

@@ -151,7 +151,6 @@ async def _checked_devices(
 
 
 async def _position_failures(cell: Cell, connected: Connected) -> list[HexacellError]:
-    """See :func:`~procedures.calibration.preflight.position_failures`."""
     config = CurrentConfig(cell.config_paths, config_layout(cell.settings))
     check = PositionCheck(connected.settings, connected.devices, connected.clock, config)
     return await position_failures(check)

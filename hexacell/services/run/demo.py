@@ -27,11 +27,11 @@ MARKER = ".hexacell-demo"
 """Name of the file that marks a folder as a demo's, which the next demo may replace."""
 
 RUN = "demo"
-"""Name of its run, among the runs of its cell; the same each time, so that it can be referred to."""
+"""Name of the demo's run; the same each time, so that it can be referred to."""
 
 
 def require_simulation(cell: Cell) -> Cell:
-    """The same cell, once it is certain that it needs no devices.
+    """Return a cell, once it is certain that it needs no devices.
 
     Raises:
         UsageError: it is a real cell.

@@ -25,7 +25,7 @@ class EventStream:
 
     Args:
         target: is replaced, if it is a file.
-        warn: is told once if the target takes no more.
+        warn: is called once if the target takes no more.
 
     Raises:
         UsageError: nobody reads the pipe.
@@ -38,7 +38,7 @@ class EventStream:
         self._descriptor: int | None = _opened(target)
 
     def listener(self, journal: Path) -> Listener:
-        """What a run with this journal tells its events; the file need not exist yet."""
+        """A listener for a run with this journal; the file need not exist yet."""
         copied = 0
 
         def listen(_: events.Event, __: RunState) -> None:

@@ -217,7 +217,7 @@ def pdf_of(report: Report) -> bytes:
 
 
 def typst_of(report: Report) -> str:
-    """The markup of a report; every text is a string literal, so that none is taken for markup."""
+    """The markup of a report; every text is a string literal, never markup."""
     day = report.issued
     colours = {Tone.GOOD: 'rgb("#1b7837")', Tone.BAD: 'rgb("#b2182b")', Tone.OPEN: 'rgb("#b8860b")'}
     head = PREAMBLE.format(

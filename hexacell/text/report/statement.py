@@ -31,7 +31,7 @@ MODELS = {
     "optimise": "Held-out poses, which took no part, test the model.",
     "quick": "The last accepted result takes part, with what may have drifted; held-out poses test it.",
     "check": "What was known from the last accepted result, or from the drawing, takes part.",
-    "length": "The ball in two seats at a certified distance tells the scale of the encoders.",
+    "length": "The ball in two seats at a certified distance gives the scale of the encoders.",
 }
 """What distinguishes the method of each kind of work."""
 
@@ -55,7 +55,7 @@ def statement_chapter(run: ReportedRun) -> Chapter:
 
 
 def found_and_left_chapter(run: ReportedRun) -> Chapter:
-    """As found and as left, and what must be taught anew."""
+    """Errors as found and as left, and what must be taught anew."""
     state = run.state
     moved = None if state.proposed is None else state.proposed.displacement
     rows = [row for row in (_mean_row(run), _error_row(run)) if row is not None]
@@ -141,7 +141,7 @@ def scope_sentences(accuracy: VerifiedAccuracy | None) -> str:
 
 
 def decision_rule(accuracy: VerifiedAccuracy | None) -> str:
-    """By which errors and their uncertainty become a verdict."""
+    """The rule by which errors and their uncertainty become a verdict."""
     factor = 1.0 if accuracy is None else accuracy.position.guard_band_factor
     band = "U" if factor == 1.0 else f"{factor:g} U"
     return (

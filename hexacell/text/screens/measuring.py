@@ -25,10 +25,10 @@ NO_RUN = Guidance(
     stopping="nothing moves now",
 )
 RECORDS_HEADER = f"{'point/pose':12}{'x':>8}{'y':>8}{'z':>8}{'residual':>9}{'sigma':>6}"
-"""Of the list of records; the residual is the largest of x, y and z, and how many sigma that is."""
+"""Header of the list of records; the residual is the largest of x, y and z, sigma its ratio to noise."""
 
 PACE_RECORDS = 8
-"""The time that is left follows from the pace of so many records."""
+"""Number of the latest records whose pace gives the time that is left."""
 RESUMABLE = "What was measured is kept. Mend it, then press r in 2 Preflight, which resumes the run."
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Callable, Sequence
 from enum import Enum
@@ -10,6 +11,8 @@ from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Any
 
 from hexacell.errors import UsageError, did_you_mean
+
+_log = logging.getLogger(__name__)
 
 Factory = Callable[..., Any]
 
@@ -49,6 +52,7 @@ def load(group: Group, name: str) -> Factory:
         raise _broken(group, point, repr(error)) from error
     if not callable(factory):
         raise _broken(group, point, f"{factory!r} is not callable")
+    _log.debug("%s '%s' is %s", group.noun, name, point.value)
     return factory
 
 

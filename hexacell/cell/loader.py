@@ -6,6 +6,7 @@ and errors that a technician can act on.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import date
@@ -24,6 +25,8 @@ from hexacell.plugins import Group, load, names
 from hexacell.storage.atomic_files import read_text
 from hexacell.storage.secrets import MASK, without_secrets
 from hexacell.storage.toml_document import KeyPath, TomlDocument, is_secret, table_header
+
+_log = logging.getLogger(__name__)
 
 LARGEST_FILE_BYTES = 500_000
 """Of a cell file, which usually has less than ten thousand."""
@@ -99,7 +102,9 @@ def load_cell(path: Path) -> Cell:
 def checked_cell(path: Path, text: str) -> Cell:
     """The cell of a file's text, whether the file holds it yet or not; raises as ``load_cell`` does."""
     document = TomlDocument.parse(text, path)
-    return Cell(path, _checked(document, path), document)
+    settings = _checked(document, path)
+    _log.info("read the cell file %s: %s", path, settings.name)
+    return Cell(path, settings, document)
 
 
 def is_cell_file(path: Path) -> bool:

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import argparse
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from pathlib import Path
 
+from hexacell import __version__
 from hexacell.cli.console import Console, lost_output
 from hexacell.cli.fault_report import fault_line
 from hexacell.cli.parser import make_parser
 from hexacell.cli.platform_support import require_platform
 from hexacell.cli.signals import stop_signals_as_sigint
 from hexacell.errors import ExitCode, HexacellError, UsageError
+
+LOG_FILE = "HEXACELL_LOG_FILE"
+"""Variable of the environment with the file of ``--log-file``, for services and for the screen's runs."""
 
 LONGEST_NAME_BYTES, LONGEST_PATH = 255, 4000
 
@@ -32,15 +39,44 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _require_usable(typed)
             options = parser.parse_args(typed)
             require_platform(options.target)
-            module, _, command = options.target.partition(".")
-            code = getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options)
-            return _unless_output_is_lost(int(code), console)
+            return _unless_output_is_lost(_carried_out(options, typed), console)
     except KeyboardInterrupt:
         return _failed("interrupted", ExitCode.INTERRUPTED, console)
     except HexacellError as error:
         return _failed(str(error), error.exit_code, console)
     except Exception as error:
         return _failed(fault_line(error, typed), ExitCode.FAULT, console)
+
+
+def _carried_out(options: argparse.Namespace, typed: Sequence[str]) -> int:
+    """The exit code of the command, whose beginning, end and failure are logged where that is asked for."""
+    module, _, command = options.target.partition(".")
+    inherited = os.environ.get(LOG_FILE)
+    file = getattr(options, "log_file", None if inherited is None else Path(inherited))
+    verbosity = getattr(options, "verbose", 0)
+    if options.target == "tui.main" and file is not None:
+        os.environ[LOG_FILE] = str(file.absolute())  # the screen's run is in a process of its own
+    elif options.target == "tui.main" and verbosity:
+        raise UsageError("the screen takes the whole terminal", action="Name a file: --log-file FILE")
+    if file is None and not verbosity:  # the usual case needs no module for it
+        return int(getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options))
+    import logging  # noqa: PLC0415 - only where a log is asked for
+
+    from hexacell.cli.log import log  # noqa: PLC0415 - likewise
+
+    logger = logging.getLogger(__name__)
+    with log(file, verbosity):
+        logger.info("hexacell %s: %s", __version__, shlex.join(typed))
+        try:
+            code = int(getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options))
+        except HexacellError as error:
+            logger.error("exit code %d: %s", error.exit_code, error)  # noqa: TRY400 - foreseen, no fault
+            raise
+        except BaseException:
+            logger.exception("the command ended without a result")
+            raise
+        logger.info("exit code %d", code)
+        return code
 
 
 def _require_usable(typed: Sequence[str]) -> None:

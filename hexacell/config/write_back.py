@@ -10,6 +10,7 @@ behind, the next one settles (:mod:`~hexacell.config.pending_write`).
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ from hexacell.config.pending_write import forget_write, note_write
 from hexacell.config.receipt import AFTER, BEFORE, RECEIPT, Receipt
 from hexacell.errors import FileError, HexacellError, WriteBackUndone
 from hexacell.storage import atomic_files
+
+_log = logging.getLogger(__name__)
 
 
 def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
@@ -43,6 +46,7 @@ def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
     _require_unchanged(change.paths, found, before)
     _back_up(receipt, before, after)
     _replace(receipt, Replacement(change.paths, before, after))
+    _log.info("wrote %s; the previous version is in %s", _names(change.paths), backup_folder)
     return receipt
 
 
@@ -78,11 +82,16 @@ def restore(paths: tuple[Path, ...], contents: Contents, *, expected: Contents) 
     try:
         replacement.write()
         replacement.finish()
+        _log.info("restored an earlier version of %s", _names(paths))
     except BaseException:
         if len(replacement.changed) > 1:
             with suppress(FileError):
                 replacement.put_back(all_of_them=False)
         raise
+
+
+def _names(paths: Sequence[Path]) -> str:
+    return " and ".join(map(str, paths))
 
 
 def _require_unchanged(paths: Sequence[Path], found: Contents, before: Contents) -> None:

@@ -25,6 +25,7 @@ from __future__ import annotations
 import fcntl
 import getpass
 import json
+import logging
 import os
 import socket
 from collections.abc import Iterator
@@ -34,6 +35,8 @@ from pathlib import Path
 
 from hexacell.errors import CellBusy, FileError
 from hexacell.storage import atomic_files
+
+_log = logging.getLogger(__name__)
 
 _LONGEST_NOTE = 4096
 _MODE = 0o644
@@ -63,9 +66,11 @@ def _lock_of_file(config: Path) -> Iterator[None]:
     try:
         _acquire(descriptor, config)
         _note(descriptor, _this_process())
+        _log.info("this process holds the cell of %s", config)
         try:
             yield
         finally:
+            _log.info("this process releases the cell of %s", config)
             _note(descriptor, "")
             # Explicit, because a forked child may still have the descriptor open.
             fcntl.flock(descriptor, fcntl.LOCK_UN)

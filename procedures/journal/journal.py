@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import fcntl
 import gc
+import logging
 import os
 import stat
 from collections.abc import Iterator
@@ -23,6 +24,8 @@ from hexacell.errors import CellBusy, FileError
 from hexacell.storage import atomic_files
 from procedures.journal.line_format import RESTORE, Entry, begins_whole, decode, encode, now, stated_version
 from procedures.run.events import Event
+
+_log = logging.getLogger(__name__)
 
 LONGEST_LINE = 16 << 20
 """Bytes; no event comes near it. A file without line ends must not fill the memory."""
@@ -108,6 +111,7 @@ class Journal:
             ) from error
         self._events.append(event)
         self._whole += len(line)
+        _log.info("line %d of %s: %s", len(self._events), self.path, event.kind)
 
     def close(self) -> None:
         """Close the file, which releases its lock."""

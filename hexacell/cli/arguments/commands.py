@@ -30,6 +30,21 @@ def add_parser(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN40
     parser: Parser = commands.add_parser(
         name, help=summary, description=summary[0].upper() + summary[1:] + "."
     )
+    # Suppressed defaults: the options of an action must not hide those given before its name.
+    parser.add_argument(
+        "--log-file",
+        type=Path,
+        default=argparse.SUPPRESS,
+        metavar="FILE",
+        help="append to this file what the program does; with -v also the bytes on the lines",
+    )
+    parser.add_argument(
+        "-v",
+        "--verbose",
+        action="count",
+        default=argparse.SUPPRESS,
+        help="log on stderr what the program does; twice: also the bytes on the lines",
+    )
     return parser
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import ssl
 import threading
 import time
@@ -18,14 +19,16 @@ from hexacell.cell.operation import BROKERS, WEBHOOKS, Occasion, scheme_of
 from hexacell.services.notify.address import NoticeAddress
 from hexacell.services.notify.notice import Notice, NoticeUndelivered
 
+_log = logging.getLogger(__name__)
+
 PAUSES_S = (1.0, 4.0)
-"""Before another attempt: a service that is just being restarted is back after them."""
+"""Waits before another attempt, s: a service that is just being restarted is back after them."""
 
 TIMEOUT_S = 10.0
-"""Of each wait within an attempt."""
+"""Longest wait within an attempt, s."""
 
 LONGEST_ATTEMPT_S = 18.0
-"""Of one attempt, also where a server answers a byte at a time; all of them fit into a minute."""
+"""Longest attempt, s, also where a server answers a byte at a time; all attempts fit into a minute."""
 
 Sender = Callable[[NoticeAddress, Notice, float], None]
 
@@ -36,17 +39,22 @@ def deliver(
     longest_s: float = LONGEST_ATTEMPT_S,
     pause: Callable[[float], object] = time.sleep,
 ) -> None:
-    """Tell it, at once or at another attempt after a ``pause``, s.
+    """Deliver a notice, at once or at another attempt after a ``pause``, s.
 
     Raises:
         NoticeUndelivered: with the reason of the last attempt.
     """
-    for pause_s in PAUSES_S:
+    for pause_s in (*PAUSES_S, None):
         try:
-            return _attempt(address, notice, longest_s)
-        except NoticeUndelivered:
+            _attempt(address, notice, longest_s)
+        except NoticeUndelivered as error:
+            _log.warning("notice %s to %s: %s", notice.id, address.name, error)
+            if pause_s is None:
+                raise
             pause(pause_s)
-    return _attempt(address, notice, longest_s)
+        else:
+            _log.info("notice %s is delivered to %s", notice.id, address.name)
+            return
 
 
 def _attempt(address: NoticeAddress, notice: Notice, longest_s: float) -> None:

@@ -22,7 +22,7 @@ from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import exact_records
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.propagation import ScaleObservation
+from hexacell.uncertainty.propagation import Propagation, ScaleObservation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,21 +106,21 @@ class Task:
     ) -> UncertaintyBudget | None:
         """The uncertainty of the errors; None if the estimated robot can take no task pose.
 
-        ``earlier``, ``scale`` and ``zeros`` are those of :meth:`UncertaintyBudget.of`.
+        ``earlier`` and ``zeros`` are those of :meth:`.Propagation.of`, ``scale`` of
+        :meth:`.UncertaintyBudget.of`.
         """
         reached = self.reachable(belief)
         if not len(reached.poses) or not len(reached.workspace):
             return None
-        return UncertaintyBudget.of(
+        propagation = Propagation.of(
             found,
             belief,
-            effects,
             task=reached.poses,
             workspace=reached.workspace,
             earlier=earlier,
-            scale=scale,
             zeros=zeros,
         )
+        return UncertaintyBudget.of(propagation, effects, scale)
 
     def error(self, belief: RobotBelief, recorded: PoseBatch | None = None) -> TaskError | None:
         """How the error depends on the parameters; None if the estimated robot can take no task pose.

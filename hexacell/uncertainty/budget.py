@@ -20,10 +20,6 @@ from functools import cached_property
 
 import numpy as np
 
-from hexacell.identification.belief import RobotBelief
-from hexacell.identification.identified_zeros import IdentifiedZeros
-from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE
 from hexacell.uncertainty.effects import Effect, Occurrence
@@ -48,11 +44,11 @@ class BudgetLine:
         through_mm: through the result, as the records had the effect.
         direct_mm: by the effect itself at the task pose.
         combined_mm: of both, which partly cancel where the effect is the same.
-        per_unit_mm: the same by one unit of the effect.
-        is_visible: whether a length check or the chi-square tells of it while its error is harmless.
+        per_unit_mm: of both, by one unit of the effect.
+        is_visible: whether a length check or the chi-square shows it while its error is harmless.
         columns: (t, 6, k) errors at the task poses by one standard deviation of each cause, mm and rad.
         parameter_columns: (p, k) errors of the free parameters by one unit of each cause; of an effect that
-            is not in the records, none.
+            is not in the records, no columns.
     """
 
     effect: Effect
@@ -73,7 +69,7 @@ class UncertaintyBudget:
         jacobian: (t, 6, p) of the errors by the free parameters.
         noise: (t, 6, p) errors by the noise of the readings, mm and rad, one standard deviation a column.
         lines: the systematic effects.
-        known: (t, 6) errors that measurements of effects tell, mm and rad.
+        known: (t, 6) errors by the measured values of effects, mm and rad.
         has_held: whether ``noise`` contains what is not known of parameters that are not identified.
     """
 
@@ -85,41 +81,33 @@ class UncertaintyBudget:
 
     @classmethod
     def of(
-        cls,
-        found: Identification,
-        belief: RobotBelief,
-        effects: Iterable[Effect],
-        *,
-        task: PoseBatch,
-        workspace: PoseBatch,
-        earlier: Mapping[str, Array] | None = None,
-        scale: ScaleObservation | None = None,
-        zeros: IdentifiedZeros | None = None,
+        cls, propagation: Propagation, effects: Iterable[Effect], scale: ScaleObservation | None = None
     ) -> UncertaintyBudget:
-        """The budget of an identification; its estimate reaches all task and workspace poses.
+        """The budget of an identification for a task.
 
-        An effect that the mechanism cannot have gets no line. Where the prior was an earlier estimate,
-        ``earlier`` has the :attr:`parameter_columns` of that one's budget: both share constant effects.
-        ``scale`` is what a length check, with the :attr:`parameter_columns` of this budget, measured of the
-        scale common to all encoders, in the place of the size stated for it. ``zeros``: these alone are
-        identified, and what is held errs by its tolerances.
+        Args:
+            propagation: of the identification at the t task poses.
+            effects: that the machine may have; one that the mechanism cannot have gets no line.
+            scale: what a length check, with the :attr:`parameter_columns` of this budget, measured of the
+                scale common to all encoders, in the place of the size stated for it.
         """
-        propagation = Propagation.of(
-            found, belief, task=task, workspace=workspace, earlier=earlier, zeros=zeros
-        )
+        found, zeros = propagation.found, propagation.zeros
         effects = tuple(_measured(effect, scale) for effect in effects)
         measured = MeasuredScale.of(propagation, scale)
         covariance = (zeros or found).free_covariance * found.goodness.noise_factor**2
-        estimated = (effect for effect in effects if effect.is_estimated)
-        for columns in (effect.size * propagation.parameter_columns(effect) for effect in estimated):
-            covariance = covariance - columns @ columns.T
+        known = measured.known
+        for effect in effects:
+            if effect.is_estimated:
+                columns = effect.size * propagation.parameter_columns(effect)
+                covariance = covariance - columns @ columns.T
+            if effect.value:
+                known = known + effect.value * propagation.columns(effect).combined.sum(axis=-1)
         factor = covariance_factor(covariance)
         noise = propagation.jacobian @ factor + measured.by_parameters(factor)
         telling = TELLING_SIGMAS * np.sqrt(2.0 * found.goodness.expected)
         visible = telling / (HARMLESS_ERROR * _largest(noise)) ** 2
         lines = (_line(propagation, effect, visible, measured) for effect in effects)
         acting = tuple(line for line in lines if line.columns.shape[-1])
-        known = measured.known + _known(propagation, effects)
         return cls(propagation.jacobian, noise, acting, known, has_held=zeros is not None)
 
     def errors_of(self, difference: Array) -> TaskErrors:
@@ -146,7 +134,7 @@ class UncertaintyBudget:
 
     @cached_property
     def not_in_covariance(self) -> Array:
-        """The same without the effects that the covariance of the estimate contains already."""
+        """Errors (t, 6, k) without the effects that the covariance of the estimate contains already."""
         columns = [line.columns for line in self.lines if not line.effect.is_estimated]
         return _joined(columns, self.noise.shape[:2])
 
@@ -189,15 +177,6 @@ class UncertaintyBudget:
     @cached_property
     def _all(self) -> Array:
         return np.concatenate([self.noise, self.systematic], axis=-1)
-
-
-def _known(propagation: Propagation, effects: Iterable[Effect]) -> Array:
-    """Errors (t, 6) by the values of effects that were measured before."""
-    known = np.zeros(propagation.jacobian.shape[:2])
-    for effect in effects:
-        if effect.value:
-            known = known + effect.value * propagation.columns(effect).combined.sum(axis=-1)
-    return known
 
 
 def _measured(effect: Effect, scale: ScaleObservation | None) -> Effect:

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -62,31 +63,22 @@ class Propagation:
     """The linear maps at one identification, for one task.
 
     Attributes:
-        records: where the robot was measured.
-        readings: what the gauges saw there.
+        found: the identification.
+        zeros: these alone are identified; None where all parameters are.
         task: the t task poses.
         workspace: poses over which the frames are fitted.
-        gain: (p, n, 3) errors of the free parameters by errors of the records, mm.
         jacobian: (t, 6, p) of the errors at the task poses by the free parameters.
         frames: the fit of the frames.
-        elimination: that of the stations' unknowns.
-        record_jacobian: (n, 3, p) of the records by the free parameters.
-        covariance: (p, p) of the free parameters.
-        prior_gain: (p, p) errors of the free parameters by those of the prior's centre.
-        earlier: errors of that centre (p, k) by one unit of each cause, by the names of the effects.
+        earlier: errors (p, k) of the estimate that was the prior, by one unit of each cause, by the names
+            of the effects; empty where the prior is a drawing.
     """
 
-    records: Placement
-    readings: Readings
+    found: Identification
+    zeros: IdentifiedZeros | None
     task: Placement
     workspace: Placement
-    gain: Array
     jacobian: Array
     frames: FrameFit
-    elimination: NuisanceElimination
-    record_jacobian: Array
-    covariance: Array
-    prior_gain: Array
     earlier: Mapping[str, Array]
 
     @classmethod
@@ -100,40 +92,63 @@ class Propagation:
         earlier: Mapping[str, Array] | None = None,
         zeros: IdentifiedZeros | None = None,
     ) -> Propagation:
-        """Of an identification and the belief made of it, which reaches all task and workspace poses.
+        """Linearize at an identification whose estimate reaches all task and workspace poses.
 
-        ``earlier`` has the :meth:`parameter_columns` of the estimate that was the prior of this one, by the
-        names of the effects; none where the prior is a drawing. ``zeros``: these alone are identified.
+        ``earlier`` has the :meth:`parameter_columns` of the estimate that was the prior of this one.
         """
-        kept = np.eye(len(found.free)) if zeros is None else zeros.projector
-        problem, prediction = found.problem, found.prediction
-        elimination = NuisanceElimination(problem, prediction.weights)
-        centred = elimination.centred(prediction.jacobian)
-        weighted = np.swapaxes(centred, -1, -2) @ prediction.weights
         return cls(
-            records=Placement(problem.mechanism, found.geometry, prediction.poses, problem.joints),
-            readings=Readings(prediction.poses.rotations, problem.deviations, problem.gauges),
+            found=found,
+            zeros=zeros,
             task=placement_of(belief, task),
             workspace=placement_of(belief, workspace),
-            gain=np.einsum("pq,nqa->pna", kept @ found.free_covariance, weighted),
             jacobian=error_jacobian(belief, task, workspace),
             frames=teachable_frames(belief, workspace),
-            elimination=elimination,
-            record_jacobian=prediction.jacobian,
-            covariance=found.free_covariance,
-            prior_gain=kept @ found.free_covariance @ found.active_prior,
             earlier=earlier or {},
         )
+
+    @cached_property
+    def records(self) -> Placement:
+        """Where the robot was measured."""
+        problem = self.found.problem
+        return Placement(problem.mechanism, self.found.geometry, self.found.poses, problem.joints)
+
+    @cached_property
+    def readings(self) -> Readings:
+        """What the gauges saw at the records."""
+        problem = self.found.problem
+        return Readings(self.found.poses.rotations, problem.deviations, problem.gauges)
+
+    @cached_property
+    def _elimination(self) -> NuisanceElimination:
+        return NuisanceElimination(self.found.problem, self.found.prediction.weights)
+
+    @cached_property
+    def _kept_covariance(self) -> Array:
+        """(p, p): the covariance of the estimate, projected where zeros alone are identified."""
+        kept = np.eye(len(self.found.free)) if self.zeros is None else self.zeros.projector
+        covariance: Array = kept @ self.found.free_covariance
+        return covariance
+
+    @cached_property
+    def _gain(self) -> Array:
+        """(p, n, 3) errors of the free parameters by errors of the records, mm."""
+        prediction = self.found.prediction
+        centred = self._elimination.centred(prediction.jacobian)
+        weighted = np.swapaxes(centred, -1, -2) @ prediction.weights
+        gain: Array = np.einsum("pq,nqa->pna", self._kept_covariance, weighted)
+        return gain
 
     def parameter_columns(self, effect: Effect) -> Array:
         """Errors (p, k) of the free parameters by one unit of each cause of an effect."""
         if not effect.occurrence.is_in_records:
-            return np.zeros((len(self.gain), 0))
+            return np.zeros((len(self._gain), 0))
         on_records = errors_of_records(effect, self.records, self.readings)
-        each: Array = np.einsum("pna,nak->pnk", self.gain, on_records)
-        before = self.prior_gain @ self.earlier[effect.name] if effect.name in self.earlier else None
+        each: Array = np.einsum("pna,nak->pnk", self._gain, on_records)
+        before = None
+        if effect.name in self.earlier:
+            before = self._kept_covariance @ self.found.active_prior @ self.earlier[effect.name]
         if effect.occurrence is Occurrence.EVERY_STOP:
-            stops = each.reshape(len(self.gain), -1)
+            stops = each.reshape(len(each), -1)
             return compressed(stops if before is None else np.concatenate([before, stops], axis=-1))
         together: Array = each.sum(axis=1)
         return together if before is None else before + together
@@ -153,13 +168,12 @@ class Propagation:
         errors = errors_of_records(effect, self.records, self.readings)
         if effect.occurrence is Occurrence.EVERY_STOP:
             errors = each_alone(errors)
-        nothing = np.zeros(errors.shape[:2])
-        rows = self.elimination.system(
-            nothing, np.concatenate([self.record_jacobian, errors], axis=-1)
-        ).rows
-        by_parameters, by_causes = np.split(rows, [self.record_jacobian.shape[-1]], axis=1)
+        jacobian = self.found.prediction.jacobian
+        both = np.concatenate([jacobian, errors], axis=-1)
+        rows = self._elimination.system(np.zeros(errors.shape[:2]), both).rows
+        by_parameters, by_causes = np.split(rows, [jacobian.shape[-1]], axis=1)
         absorbed = by_parameters.T @ by_causes
-        return float(np.sum(by_causes**2) - np.sum(absorbed * (self.covariance @ absorbed)))
+        return float(np.sum(by_causes**2) - np.sum(absorbed * (self.found.free_covariance @ absorbed)))
 
     def _direct(self, effect: Effect) -> Array:
         """Errors (t, 6, k) by the effect itself; frames cannot be fitted to what differs at every stop."""

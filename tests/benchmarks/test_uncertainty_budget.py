@@ -42,6 +42,7 @@ from hexacell.uncertainty.effect_kinds import (
     temperature_at_work,
 )
 from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.propagation import Propagation
 from tests.benchmarks.imperfect_machine import ImperfectMachine
 
 MACHINES = int(os.environ.get("ROBOTS", "100"))
@@ -77,7 +78,8 @@ class Bench:
     def budget(self, found: Identification, effects: tuple[Effect, ...]) -> UncertaintyBudget:
         belief = self.robot.belief(found)
         reached = self.task.reachable(belief)
-        return UncertaintyBudget.of(found, belief, effects, task=reached.poses, workspace=reached.workspace)
+        propagation = Propagation.of(found, belief, task=reached.poses, workspace=reached.workspace)
+        return UncertaintyBudget.of(propagation, effects)
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.propagation import Propagation
 from hexacell.uncertainty.statement import LargestError
 from hexacell.verdict.decision import Verdict, decide
 
@@ -52,7 +53,8 @@ def stated(
     belief = robot.belief(found)
     reached = Task.of(settings, robot, belief).reachable(belief)
     task, workspace = reached.poses, reached.workspace
-    budget = UncertaintyBudget.of(found, belief, effects, task=task, workspace=workspace)
+    propagation = Propagation.of(found, belief, task=task, workspace=workspace)
+    budget = UncertaintyBudget.of(propagation, effects)
     agrees = found.goodness.agreement is not ChiSquareVerdict.TOO_LARGE
     return Stated(
         error=LargestError(0.0, budget.expanded_mm),

@@ -21,6 +21,7 @@ from hexacell.uncertainty.effect_kinds import (
     rail_waves,
     stop_repeatability,
 )
+from hexacell.uncertainty.propagation import Propagation
 from hexacell.uncertainty.statement import TaskErrors
 from tests.hexacell.uncertainty.conftest import belief_of
 
@@ -31,9 +32,8 @@ GAUGE_SCALE = 2e-3
 def budget_of(laboratory, paper):
     def budget(found, effects=()):
         belief = belief_of(found, paper.nominal, paper.branch)
-        return UncertaintyBudget.of(
-            found, belief, effects, task=laboratory.task, workspace=laboratory.workspace
-        )
+        poses = {"task": laboratory.task, "workspace": laboratory.workspace}
+        return UncertaintyBudget.of(Propagation.of(found, belief, **poses), effects)
 
     return budget
 
@@ -155,7 +155,7 @@ def test_a_budget_with_an_earlier_one_has_its_effects_on_the_prior(laboratory, e
     def budget(found, earlier):
         belief = belief_of(found, paper.nominal, paper.branch)
         poses = {"task": laboratory.task, "workspace": laboratory.workspace}
-        return UncertaintyBudget.of(found, belief, effects, **poses, earlier=earlier)
+        return UncertaintyBudget.of(Propagation.of(found, belief, **poses, earlier=earlier), effects)
 
     first = budget(exact, None)
     shared, lost = (budget(updated, earlier) for earlier in (first.parameter_columns, None))

@@ -25,6 +25,7 @@ from hexacell.uncertainty.effect_kinds import (
 )
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_records import JudgedGeometry, LengthRecords
+from hexacell.uncertainty.propagation import Propagation
 from tests.hexacell.uncertainty.conftest import belief_of
 from tests.hexacell.uncertainty.two_seats import TwoSeats
 
@@ -236,7 +237,7 @@ def test_joint_variables_of_other_poses_are_refused(laboratory, exact, paper) ->
 def budget_of(laboratory, paper, found, effects, scale=None) -> UncertaintyBudget:
     belief = belief_of(found, paper.nominal, paper.branch)
     poses = {"task": laboratory.task, "workspace": laboratory.workspace}
-    return UncertaintyBudget.of(found, belief, effects, **poses, scale=scale)
+    return UncertaintyBudget.of(Propagation.of(found, belief, **poses), effects, scale)
 
 
 def measured_budget(laboratory, paper, found, machine, fixture, effects, noise_mm=0.0, random=None):

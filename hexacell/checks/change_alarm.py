@@ -16,6 +16,7 @@ from hexacell.cell.fields import Frozen
 from hexacell.checks.check import Check
 from hexacell.drift.run_evidence import Causes, WhitenedRecords, whiten_records
 from hexacell.drift.single_cause import SingleCauseTest, possible_legs, single_cause_test
+from hexacell.identification.problem.prior import IdentifiedBefore
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import MachinePart
@@ -23,7 +24,6 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.effects import Effect, Occurrence, RecordEffects
-from hexacell.uncertainty.geometry_drift import IdentifiedBefore
 
 FIRST_RECORDS = 8
 """Number of a check's first records that are tested, references included."""

@@ -20,12 +20,12 @@ from hexacell.campaign.pose_list import PoseList
 from hexacell.cell.model import CellSettings
 from hexacell.checks.drift_estimator import GUARDED_SCALE, DriftEstimator, ScaledEstimate
 from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
+from hexacell.identification.problem.prior import IdentifiedBefore, drift_covariance, drift_sigma
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record, RecordId
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.geometry_drift import IdentifiedBefore, drift_covariance, drift_sigma
 from hexacell.verdict.check_statement import (
     CheckStatement,
     ErrorEstimate,

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.campaign.online_estimate import OnlineEstimate, OnlineEstimator
+from hexacell.identification.problem.prior import IdentifiedBefore
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
-from hexacell.uncertainty.geometry_drift import IdentifiedBefore, log_marginal_likelihood
 
 USUAL_SCALES = (1.0, 3.0, 10.0)
 """All as likely as each other before measuring."""
@@ -42,7 +42,7 @@ class ScaledEstimate:
         if found is None:
             return cls(scale, estimate, 0.0)
         is_whole = found.records == records
-        return cls(scale, estimate, log_marginal_likelihood(found) if is_whole else -np.inf)
+        return cls(scale, estimate, found.log_marginal_likelihood if is_whole else -np.inf)
 
 
 class DriftEstimator:

@@ -17,10 +17,9 @@ from hexacell.checks.drift_estimator import DriftEstimator, ScaledEstimate
 from hexacell.design.criteria import add_information
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.problem.data_requirements import is_overdetermined
-from hexacell.identification.problem.prior import Prior
+from hexacell.identification.problem.prior import IdentifiedBefore, Prior
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
-from hexacell.uncertainty.geometry_drift import IdentifiedBefore
 from hexacell.verdict.check_statement import MOST_FURTHER_RECORDS
 
 FURTHER_RECORDS = (12, 24, 48)

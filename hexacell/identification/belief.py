@@ -19,7 +19,7 @@ from hexacell.kinematics.rotations import Array, Mask
 from hexacell.limits.limits import Limits
 
 SPARE_ANGLE = float(np.radians(0.5))
-"""Of passive joints, rad: what the estimate may be wrong by once many poses were measured."""
+"""Turn of the platform, rad, by which the estimate may be wrong once many poses were measured."""
 
 SPARE_SIGMAS = 4.0
 """Standard deviations of the platform's orientation that passive joints keep besides."""
@@ -37,7 +37,7 @@ class RobotBelief:
 
     Attributes:
         free: estimated free parameters (p,), mm.
-        covariance: theirs (p, p), mm^2.
+        covariance: of the free parameters (p, p), mm^2.
         work_frame_turns: axes (k, 3) about which a work frame can be taught.
         refused: commands that the controller refused.
     """
@@ -53,12 +53,12 @@ class RobotBelief:
     refused: RefusedCommands = field(default_factory=RefusedCommands)
 
     def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> RobotBelief:
-        """The same at gauges that were zeroed where they show ``shown_mm`` along base x, y, z."""
+        """This belief with gauges that were zeroed where they show ``shown_mm`` along base x, y, z."""
         return self if shown_mm is None else replace(self, limits=self.limits.zeroed_at(shown_mm))
 
     @property
     def basis(self) -> Array:
-        """(P, p), from free parameters to all of them."""
+        """Matrix (P, p) from the free parameters to all of them."""
         return self.mechanism.convention.basis()
 
     @cached_property
@@ -81,24 +81,24 @@ class RobotBelief:
         return self.orientation_sigma_from(free_sensitivity(self.mechanism, self.estimate, *at_first))
 
     def orientation_sigma_from(self, sensitivity: FreeSensitivity) -> float:
-        """The same from the sensitivity there."""
+        """Standard deviation, rad, of the platform's orientation at the first pose of a sensitivity."""
         return float(self._orientation_sigmas(sensitivity.free[:1])[0])
 
     @cached_property
     def least_margins(self) -> Array:
-        """What passive joints and legs are to have left (m,) for ``SPARE_ANGLE``, or () without limits."""
+        """Margins (m,) that passive joints and legs keep for ``SPARE_ANGLE``, or () without limits."""
         return self.margins_for(SPARE_ANGLE)
 
     def margins_for(self, turn: float) -> Array:
-        """What they are to have left should the platform be turned by an angle, rad, from the estimate."""
+        """Margins (m,) to keep should the platform be turned by an angle, rad, from the estimate."""
         if self.limits.legs is None:
             return np.zeros(())
         return self.limits.legs.margins_for(turn, float(self.mechanism.platform_radius(self.estimate)))
 
     def margins_at(self, at: ActualPoses) -> Array:
-        """What they are to have left (n, m) where the robot goes without a record, from each of n poses.
+        """Margins (n, m) to keep where the robot goes without a record, from each of n poses.
 
-        ``SPARE_SIGMAS`` of what is not known of them there. While the orientation is uncertain nothing of
+        They are ``SPARE_SIGMAS`` of what is not known there. While the orientation is uncertain nothing of
         use would be left; the robot then goes only where robots drawn within the tolerances were tried.
         """
         if self.limits.legs is None:
@@ -144,10 +144,10 @@ class RobotBelief:
         return changes
 
     def keeps_limits(self, poses: PoseBatch, joints: Array, wanted: Array | None = None) -> Mask:
-        """At which of n poses, with joint variables (n, 6), mm, the estimated robot keeps its limits.
+        """Whether the estimated robot keeps its limits at n poses with joint variables (n, 6), mm.
 
-        Those of tilt and turn, joint ranges, passive joints and legs, with the ``wanted`` margins (m,) or
-        the least ones; an unreachable pose (NaN) does not.
+        The limits are those of tilt and turn, joint ranges, passive joints and legs, with the ``wanted``
+        margins (m,) or the least ones; an unreachable pose (NaN) does not keep them.
         """
         wanted = self.least_margins if wanted is None else wanted
         # Legs allow fewest; what else there is, is asked of the poses that are left.
@@ -158,7 +158,7 @@ class RobotBelief:
     def standing_at(
         self, command: PoseBatch, actual: ActualPoses, wanted: Array | None = None
     ) -> RobotBelief:
-        """The same, its limits widened where the robot is beyond them at a command (1)."""
+        """This belief with its limits widened where the robot is beyond them at a command (1)."""
         at = (command, actual.poses, actual.joints)
         wanted = self.least_margins if wanted is None else wanted
         limits = self.limits.including(self.mechanism, self.estimate, *at, wanted)

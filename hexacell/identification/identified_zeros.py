@@ -34,10 +34,10 @@ from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.rotations import Array
 
 SAME_CHANGE = 1e-6
-"""Of the largest singular value: zeros whose common change is no more than one of frames are one less."""
+"""Share of the largest singular value below which a common change of the zeros is one of the frames."""
 
 UNSEEN = 1e-3
-"""Of the largest: a change of the zeros that moves no pose more is none."""
+"""Share of the largest singular value below which a change of the zeros moves no pose."""
 
 
 class ParameterChoice(StrEnum):
@@ -84,7 +84,7 @@ class HeldParameters:
         return gain
 
     def covariance(self, gain: Array, estimated: Array) -> Array:
-        """That of the result (p, p), by that of the estimate of all parameters."""
+        """Covariance of the result (p, p), by that of the estimate of all parameters."""
         held = np.eye(len(gain)) - gain
         crossing = gain @ estimated @ held.T
         total = gain @ estimated @ gain.T + held @ self.tolerances @ held.T + crossing + crossing.T
@@ -112,7 +112,7 @@ class IdentifiedZeros:
 
     @classmethod
     def of(cls, found: Identification, controller: Geometry) -> IdentifiedZeros:
-        """Of a controller's geometry in any frames."""
+        """The zeros beside a controller's geometry in any frames."""
         mechanism = found.problem.mechanism
         normal, _ = mechanism.normalize_frames(controller)
         held = mechanism.convention.free_parameters(normal)
@@ -136,24 +136,24 @@ class IdentifiedZeros:
 
     @cached_property
     def free_covariance(self) -> Array:
-        """Theirs (p, p); of what is held it is that of the tolerances."""
+        """Covariance (p, p) of the free parameters; of what is held it is that of the tolerances."""
         return self.kept.covariance(self.projector, self.found.free_covariance)
 
     @property
     def geometry(self) -> Geometry:
-        """In the frame convention."""
+        """The geometry in the frame convention."""
         return self.found.problem.geometry(self.free)
 
     @property
     def covariance(self) -> Array:
-        """(P, P) of all parameters."""
+        """Covariance (P, P) of all parameters."""
         basis = self.found.problem.basis
         covariance: Array = basis @ self.free_covariance @ basis.T
         return covariance
 
     @property
     def sigma(self) -> Array:
-        """(P,)."""
+        """Standard deviations (P,) of all parameters."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
@@ -165,7 +165,7 @@ class IdentifiedZeros:
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Those of them of which the estimate by the records says hardly more than the drawing."""
+        """The zeros' parameters that the records determine hardly better than the drawing."""
         taken = self.found.problem.basis @ self.projector
         by_noise = np.sqrt(np.diag(taken @ self.found.free_covariance @ taken.T))
         limits = UNDETERMINED_RATIO * self.found.prior_sigma

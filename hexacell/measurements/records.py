@@ -81,7 +81,7 @@ class MeasurementSet:
         return len(self.records)
 
     def subset(self, rows: NDArray[np.intp]) -> MeasurementSet:
-        """Those in some rows."""
+        """The records in some rows."""
         return MeasurementSet(tuple(self.records[row] for row in rows.tolist()))
 
     @property

@@ -6,7 +6,7 @@ see of the ball's motion is no error of the model. The rest is, for each visit l
     r = d - G q,      G = dP/dq,      covariance  G diag(s_q^2) G^T + diag(s_d^2)
 
 with the noise of encoders and gauges that is stated for a record. Whether there is more is a chi-square
-test. Where it comes from, ball and joints tell together. With stops s of the joints that differ from
+test. Where it comes from, ball and joints show together. With stops s of the joints that differ from
 visit to visit, play p between their encoders and joints, and errors e and g of encoders and gauges,
 
     q = s + e,      d = G (s + p) + g,
@@ -19,8 +19,7 @@ it is ten times as likely as all joints or all encoders.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -31,7 +30,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.noise.standstill import SIGNIFICANCE
 
 FEWEST_VISITS = 3
-"""Fewer visits, the first one included, tell nothing."""
+"""Fewer visits, the first one included, show nothing."""
 CONFIDENCE = 0.95
 INSTRUMENT_ODDS = 10.0
 """How many times as likely as all joints or encoders a single instrument must be to be named."""
@@ -58,11 +57,6 @@ class ScatterSource(StrEnum):
     ENCODER_5 = "encoder 5"
     ENCODER_6 = "encoder 6"
 
-    @classmethod
-    def _missing_(cls, value: object) -> ScatterSource | None:
-        """Journals up to version 11 have the word for a Hexaglide's joints."""
-        return cls.JOINTS if value == "sliders" else None
-
     @property
     def instruments(self) -> Array:
         """Which of gauges x, y, z and the encoders of legs 1 to 6 it is noise of: (9,), 1 or 0."""
@@ -84,7 +78,7 @@ class ApproachScatter:
         degrees_of_freedom: of the chi-square.
         ball_mm: how far the ball is from its mean, as the gauges see it (root mean square distance).
         chi_square: of what the encoders do not explain, under the stated noise.
-        source: what does not repeat; none where the stated noise explains everything.
+        source: what does not repeat; None where the stated noise explains everything.
         excess: one standard deviation of it beside the stated noise, of each joint or encoder or of
             the instrument.
     """
@@ -110,7 +104,7 @@ class ApproachScatter:
 def approach_scatter(
     deviations: Array, joints: Array, by_joints: Array, encoders: Array, gauges_mm: Array
 ) -> ApproachScatter | None:
-    """The scatter of visits of one pose; none with fewer than ``FEWEST_VISITS``.
+    """The scatter of visits of one pose; None with fewer than ``FEWEST_VISITS``.
 
     Args:
         deviations: of the ball along base x, y, z (m, 3), mm.
@@ -122,24 +116,23 @@ def approach_scatter(
     if len(deviations) < FEWEST_VISITS:
         return None
     shown = np.concatenate([deviations, joints], axis=1)
-    visits = _Visits.of(shown, by_joints, np.diag(np.concatenate([gauges_mm, encoders]) ** 2))
+    around = shown - shown.mean(axis=0)
+    visits = _Visits(
+        products=around.T @ around,
+        motion=np.concatenate([by_joints, np.eye(LEGS)]),
+        stated=np.diag(np.concatenate([gauges_mm, encoders]) ** 2),
+        freedom=len(shown) - 1,
+    )
     freedom, chi_square = 3 * visits.freedom, visits.unexplained()
     found = ApproachScatter(len(deviations), freedom, visits.ball_mm, chi_square)
     if chi_square_exceedance(freedom, chi_square) >= SIGNIFICANCE:
         return found
     excesses = {source: visits.excess(source) for source in ScatterSource}
-    source = _named(excesses)
-    return ApproachScatter(
-        len(deviations), freedom, visits.ball_mm, chi_square, source, excesses[source][1]
-    )
-
-
-def _named(excesses: Mapping[ScatterSource, tuple[float, float]]) -> ScatterSource:
-    """The source to name, by the log likelihoods of all."""
     together = max(TOGETHER, key=lambda one: excesses[one][0])
     alone = max(ALONE, key=lambda one: excesses[one][0])
-    is_proven = excesses[alone][0] >= excesses[together][0] + np.log(INSTRUMENT_ODDS)
-    return alone if is_proven else together
+    is_alone = excesses[alone][0] >= excesses[together][0] + np.log(INSTRUMENT_ODDS)
+    source = alone if is_alone else together
+    return replace(found, source=source, excess=excesses[source][1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,12 +149,6 @@ class _Visits:
     motion: Array
     stated: Array
     freedom: int
-
-    @classmethod
-    def of(cls, shown: Array, by_joints: Array, stated: Array) -> _Visits:
-        around = shown - shown.mean(axis=0)
-        motion = np.concatenate([by_joints, np.eye(LEGS)])
-        return cls(around.T @ around, motion, stated, len(shown) - 1)
 
     @property
     def ball_mm(self) -> float:

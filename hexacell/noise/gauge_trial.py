@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from hexacell.kinematics.rotations import Array
 
 LEAST_RESPONSE = 0.4
-"""Of the moves: less is no gauge that follows the ball in mm. Healthy ones showed 0.79 of them and more."""
+"""Share of the moves that a gauge in mm must show. Healthy ones showed 0.79 of them and more."""
 
 LEAST_RESPONSE_INCHES = 0.027
-"""Of the moves: a gauge that shows less follows nothing. In inches it shows a 25.4th of what it should."""
+"""Share of the moves below which a gauge follows nothing. In inches it shows a 25.4th of them."""
 
 
 Numbers = dict[int, int]

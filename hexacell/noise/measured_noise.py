@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pydantic import AliasChoices, Field
-
 from hexacell.campaign.budget import TimeModel
 from hexacell.cell.fields import Frozen, Point, SixNumbers
 from hexacell.cell.model import CellSettings
@@ -12,16 +10,11 @@ from hexacell.kinematics.parameters import JointUnit
 from hexacell.noise.approach_scatter import ScatterSource
 
 
-def _once(name: str) -> AliasChoices:
-    """The name of a number, and what it was called in journals up to version 11, when all were in mm."""
-    return AliasChoices(name, f"{name}_mm")
-
-
 class InstrumentNoise(Frozen):
     """The noise of one gauge or encoder, one standard deviation, in its unit.
 
     Attributes:
-        reading: of a single reading at standstill, with its degrees of freedom; none without a series.
+        reading: of a single reading at standstill, with its degrees of freedom; None without a series.
         drift: change over the series, zero unless significant.
         outliers: false readings in the series, which were left out.
         correlation: of successive readings, zero unless significant.
@@ -32,14 +25,14 @@ class InstrumentNoise(Frozen):
 
     name: str
     unit: JointUnit = JointUnit.MM
-    reading: float | None = Field(None, validation_alias=_once("reading"))
+    reading: float | None = None
     degrees_of_freedom: int = 0
-    drift: float = Field(0.0, validation_alias=_once("drift"))
+    drift: float = 0.0
     outliers: int = 0
     correlation: float = 0.0
-    stated: float = Field(validation_alias=_once("stated"))
+    stated: float
     is_noisier: bool = False
-    record: float = Field(validation_alias=_once("record"))
+    record: float
 
 
 class RepeatedApproaches(Frozen):
@@ -49,7 +42,7 @@ class RepeatedApproaches(Frozen):
         visits: of the reference, the first one included.
         ball_mm: how far the ball was from its mean (root mean square distance).
         ratio: of what the encoders do not explain to what the noise explains.
-        source: what does not repeat beyond that, none unless significant; ``excess`` is one standard
+        source: what does not repeat beyond that, None unless significant; ``excess`` is one standard
             deviation of it, in ``unit``.
     """
 
@@ -59,7 +52,7 @@ class RepeatedApproaches(Frozen):
     ratio: float
     source: ScatterSource | None = None
     unit: JointUnit = JointUnit.MM
-    excess: float = Field(0.0, validation_alias=_once("excess"))
+    excess: float = 0.0
 
 
 class AveragingForecast(Frozen):
@@ -79,7 +72,7 @@ class MeasuredNoise(Frozen):
     """The noise of the gauges x, y and z and of the encoders of legs 1 to 6, as measured.
 
     Attributes:
-        approaches: none where the reference was not visited again.
+        approaches: None where the reference was not visited again.
         windows: settled windows that a record is the mean of from now on.
         forecasts: for different numbers of windows; empty where no accuracy is predicted.
         encoders_part_mm: what the encoders contribute to the first of these errors.
@@ -108,7 +101,7 @@ def with_measured_noise(settings: CellSettings, measured: MeasuredNoise) -> Cell
     return settings.model_copy(
         update={
             "noise": noise,
-            "uncertainty": _with_repeatability(settings, measured),
+            "uncertainty": _stated_effects(settings, measured),
             "identification": settings.identification.model_copy(update={"seconds_per_record": seconds}),
         }
     )
@@ -119,7 +112,7 @@ def averaging_seconds(settings: CellSettings, windows: int) -> float:
     return (windows - 1) * settings.timing.window_s
 
 
-def _with_repeatability(settings: CellSettings, measured: MeasuredNoise) -> object:
+def _stated_effects(settings: CellSettings, measured: MeasuredNoise) -> object:
     """The section of systematic effects; stops that were measured are in the noise of the records."""
     stated, approaches = settings.uncertainty, measured.approaches
     if approaches is None or approaches.source is not ScatterSource.JOINTS:

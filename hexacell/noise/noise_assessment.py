@@ -11,7 +11,7 @@ The mean of more readings is better in the part from reading to reading, and in 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -37,6 +37,13 @@ from hexacell.noise.standstill import SIGNIFICANCE, ReadingNoise, reading_noise
 
 INSTRUMENTS = 9
 """Three gauges and six encoders, which share the significance of one test."""
+
+WINDOWS = (1, 2, 4, 8, 16)
+"""Numbers of windows that are compared."""
+WORTHWHILE = 0.9
+"""A larger number is taken if the predicted error is at most such a share of that with half as many."""
+PERFECT = 1e-3
+"""Share of the noise of encoders that count as perfect."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,6 +83,22 @@ class _NoiseAssessment:
     plan: Plan
     readings: NoiseReadings
 
+    def result(self) -> MeasuredNoise:
+        by_windows = {windows: self._of_records(windows) for windows in WINDOWS}
+        noise = {windows: self._noise(sigma) for windows, sigma in by_windows.items()}
+        forecaster = AveragingForecaster(self.plan)
+        forecasts = forecaster.forecasts(noise)
+        windows = worthwhile_windows(forecasts, self.plan.settings.noise.averaged_windows)
+        x, y, z, *encoders = self._instruments(by_windows[windows])
+        return MeasuredNoise(
+            gauges=(x, y, z),
+            encoders=tuple(encoders),
+            approaches=self._approaches(),
+            windows=windows,
+            forecasts=forecasts,
+            encoders_part_mm=forecaster.encoders_part(noise[1]),
+        )
+
     @cached_property
     def stated(self) -> Array:
         """The stated noise of a record (9,), mm."""
@@ -92,24 +115,7 @@ class _NoiseAssessment:
             reading_noise(values, float(step)) for values, step in zip(series.T, steps, strict=True)
         )
 
-    def result(self) -> MeasuredNoise:
-        scatter = self.scatter
-        by_windows = {windows: self._of_records(scatter, windows) for windows in WINDOWS}
-        forecaster = AveragingForecaster(self.plan)
-        forecasts = forecaster.forecasts({windows: self._noise(one) for windows, one in by_windows.items()})
-        windows = worthwhile_windows(forecasts, self.plan.settings.noise.averaged_windows)
-        instruments = self._instruments(by_windows[windows])
-        x, y, z = instruments[:3]
-        return MeasuredNoise(
-            gauges=(x, y, z),
-            encoders=tuple(instruments[3:]),
-            approaches=scatter and _approaches(scatter, self._unit_of(scatter)),
-            windows=windows,
-            forecasts=forecasts,
-            encoders_part_mm=forecaster.encoders_part(self._noise(by_windows[1])),
-        )
-
-    @property
+    @cached_property
     def scatter(self) -> ApproachScatter | None:
         """What the visits show beyond the larger of stated noise and that of the readings."""
         robot, visits, least = self.plan.robot, self.readings.visits, self._at_least(self.stated)
@@ -119,9 +125,11 @@ class _NoiseAssessment:
         in_base = robot.frames.base.T @ by_joints[0]
         return approach_scatter(visits[:, :3], visits[:, 3:], in_base, least[3:], least[:3])
 
-    def _of_records(self, scatter: ApproachScatter | None, windows: int) -> Array:
-        """The noise (9,) of records that are means of some windows."""
-        one = self._with_excess(self._at_least(self._allowed(scatter)), scatter)
+    def _of_records(self, windows: int) -> Array:
+        """The noise (9,) of records that are means of some windows, with what does not repeat."""
+        one = self._at_least(self._allowed())
+        if self.scatter is not None and self.scatter.source is not None:
+            one = np.hypot(one, self.scatter.excess * self.scatter.source.instruments)
         if not self.reading_noise or windows == 1:
             return one
         count = self.readings.window_readings
@@ -144,99 +152,64 @@ class _NoiseAssessment:
         ]
         return np.array(larger)
 
-    def _allowed(self, scatter: ApproachScatter | None) -> Array:
+    def _allowed(self) -> Array:
         """The stated noise (9,), or less where the cell file allows it and the visits prove it."""
         is_allowed = self.plan.settings.noise.figures == "measured"
-        if not is_allowed or scatter is None or scatter.source is not None:
+        if not is_allowed or self.scatter is None or self.scatter.source is not None:
             return self.stated
-        return self.stated * min(scatter.ratio_at_most, 1.0)
-
-    def _with_excess(self, sigma: Array, scatter: ApproachScatter | None) -> Array:
-        """Noise (9,) with what does not repeat."""
-        if scatter is None or scatter.source is None:
-            return sigma
-        return np.asarray(np.hypot(sigma, scatter.excess * scatter.source.instruments))
+        return self.stated * min(self.scatter.ratio_at_most, 1.0)
 
     def _noise(self, sigma: Array) -> Noise:
         return self.plan.robot.noise.with_devices(sigma[3:].tolist(), sigma[:3].tolist())
 
-    @property
-    def joint_unit(self) -> JointUnit:
-        return self.plan.robot.mechanism.words.joint_unit
-
-    def _unit_of(self, scatter: ApproachScatter) -> JointUnit:
-        """That of its excess: gauges show mm."""
-        of_gauge = scatter.source is None or scatter.source.instruments[:3].any()
-        return JointUnit.MM if of_gauge else self.joint_unit
-
-    def _instruments(self, records: Array) -> Sequence[InstrumentNoise]:
+    def _instruments(self, records: Array) -> Iterator[InstrumentNoise]:
         gauges = sorted(self.plan.settings.gauges, key=lambda gauge: gauge.axis)
         names = [*(f"gauge {one.name}" for one in gauges), *(f"encoder {leg}" for leg in range(1, 7))]
+        units = [JointUnit.MM] * 3 + [self.plan.robot.mechanism.words.joint_unit] * 6
         larger = self._at_least(self.stated) > self.stated
-        found = self.reading_noise or (None,) * len(names)
-        units = [JointUnit.MM] * 3 + [self.joint_unit] * 6
-        rows = zip(
-            names, units, found, self.stated.tolist(), larger.tolist(), records.tolist(), strict=True
+        for row, (name, unit) in enumerate(zip(names, units, strict=True)):
+            stated, record = float(self.stated[row]), float(records[row])
+            if not self.reading_noise:
+                yield InstrumentNoise(name=name, unit=unit, stated=stated, record=record)
+                continue
+            found = self.reading_noise[row]
+            yield InstrumentNoise(
+                name=name,
+                unit=unit,
+                reading=found.sigma,
+                degrees_of_freedom=found.degrees_of_freedom,
+                drift=found.drift,
+                outliers=found.outliers,
+                correlation=found.correlation,
+                stated=stated,
+                is_noisier=bool(larger[row]),
+                record=record,
+            )
+
+    def _approaches(self) -> RepeatedApproaches | None:
+        scatter = self.scatter
+        if scatter is None:
+            return None
+        of_gauge = scatter.source is None or scatter.source.instruments[:3].any()
+        return RepeatedApproaches(
+            visits=scatter.visits,
+            degrees_of_freedom=scatter.degrees_of_freedom,
+            ball_mm=scatter.ball_mm,
+            ratio=scatter.ratio,
+            source=scatter.source,
+            unit=JointUnit.MM if of_gauge else self.plan.robot.mechanism.words.joint_unit,
+            excess=scatter.excess,
         )
-        return [
-            _instrument(name, unit, noise, stated, is_noisier=noisier, record=record)
-            for name, unit, noise, stated, noisier, record in rows
-        ]
-
-
-def _instrument(
-    name: str,
-    unit: JointUnit,
-    found: ReadingNoise | None,
-    stated: float,
-    *,
-    is_noisier: bool,
-    record: float,
-) -> InstrumentNoise:
-    if found is None:
-        return InstrumentNoise(name=name, unit=unit, stated=stated, record=record)
-    return InstrumentNoise(
-        name=name,
-        unit=unit,
-        reading=found.sigma,
-        degrees_of_freedom=found.degrees_of_freedom,
-        drift=found.drift,
-        outliers=found.outliers,
-        correlation=found.correlation,
-        stated=stated,
-        is_noisier=is_noisier,
-        record=record,
-    )
-
-
-def _approaches(scatter: ApproachScatter, unit: JointUnit) -> RepeatedApproaches:
-    return RepeatedApproaches(
-        visits=scatter.visits,
-        degrees_of_freedom=scatter.degrees_of_freedom,
-        ball_mm=scatter.ball_mm,
-        ratio=scatter.ratio,
-        source=scatter.source,
-        unit=unit,
-        excess=scatter.excess,
-    )
-
-
-WINDOWS = (1, 2, 4, 8, 16)
-"""Numbers of windows that are compared."""
-WORTHWHILE = 0.9
-"""A larger number is taken if the predicted error is at most such a share of that with half as many."""
-PERFECT = 1e-3
-"""Share of the noise of encoders that count as perfect."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AveragingForecaster:
-    """Forecasts the error of one plan, as nothing is measured yet."""
+    """Forecasts what it gains to take the mean of several settled windows for a record of a plan."""
 
     plan: Plan
 
     def forecasts(self, noise: Mapping[int, Noise]) -> tuple[AveragingForecast, ...]:
-        """For the noise of records of some windows each; empty where no accuracy is predicted."""
+        """Errors by the noise of records of some windows each; empty where no accuracy is predicted."""
         errors = {windows: self.end_error(one) for windows, one in noise.items()}
         records = sum(self.plan.forecaster.planned(CampaignState()).values())
         settings = self.plan.settings
@@ -252,7 +225,8 @@ class AveragingForecaster:
 
     def encoders_part(self, noise: Noise) -> float | None:
         """What the noise of the encoders contributes to the predicted error, mm."""
-        error, other = (self.end_error(one) for one in (noise, perfect_encoders(noise)))
+        perfect = replace(noise, encoder=PERFECT * noise.encoder)
+        error, other = self.end_error(noise), self.end_error(perfect)
         return None if error is None or other is None else max(error**2 - other**2, 0.0) ** 0.5
 
     def end_error(self, noise: Noise) -> float | None:
@@ -260,11 +234,6 @@ class AveragingForecaster:
         belief = replace(self.plan.robot.belief(), noise=noise)
         after = self.plan.forecaster.predicted_belief(belief, CampaignState())
         return self.plan.forecaster.worst_error(CampaignState(), after)
-
-
-def perfect_encoders(noise: Noise) -> Noise:
-    """The same gauges with encoders that are hardly noisy."""
-    return replace(noise, encoder=PERFECT * noise.encoder)
 
 
 def mean_of_independent(noise: Noise, windows: int) -> Noise:

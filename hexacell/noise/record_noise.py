@@ -36,11 +36,20 @@ from hexacell.identification.solver.measurement_model import record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import MeasurementSet
+from hexacell.measurements.records import MeasurementSet, deviation_of
 
 COMMAND_DIGITS = 6
 """Decimal digits, mm and deg, to which commands are compared."""
 CONFIDENCE = 0.95
+
+MAX_STEPS = 60
+MAX_LOG_STEP = 1.5
+TOLERANCE = 1e-5
+MIN_RATIO = 1e-2
+"""Smallest estimated noise, as a share of the stated standard deviation."""
+MAX_RELATIVE_ERROR = 0.4
+MIN_CORRELATION = -0.9
+"""Below this correlation of the two estimates, the residuals do not separate them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +93,9 @@ def repeatability(
     freedom = sum(len(rows) - 1 for rows in groups)
     if not freedom:
         return None
-    squares = sum(_sum_of_squares(measurements.deviations[rows]) for rows in groups)
-    x, y, z = np.sqrt(squares / freedom)
-    return Repeatability((float(x), float(y), float(z)), freedom, len(groups))
+    each = (measurements.deviations[rows] for rows in groups)
+    squares = sum(np.sum((one - one.mean(axis=0)) ** 2, axis=0) for one in each)
+    return Repeatability(deviation_of(np.sqrt(squares / freedom)), freedom, len(groups))
 
 
 def _visits(measurements: MeasurementSet, left_out: Collection[tuple[int, int]]) -> Iterable[list[int]]:
@@ -97,21 +106,6 @@ def _visits(measurements: MeasurementSet, left_out: Collection[tuple[int, int]])
             command = (round(value, COMMAND_DIGITS) for value in record.pose.as_tuple())
             visits[record.point, *command].append(row)
     return visits.values()
-
-
-def _sum_of_squares(deviations: Array) -> Array:
-    squares: Array = np.sum((deviations - deviations.mean(axis=0)) ** 2, axis=0)
-    return squares
-
-
-MAX_STEPS = 60
-MAX_LOG_STEP = 1.5
-TOLERANCE = 1e-5
-MIN_RATIO = 1e-2
-"""Smallest estimated noise, as a share of the stated standard deviation."""
-MAX_RELATIVE_ERROR = 0.4
-MIN_CORRELATION = -0.9
-"""Below this correlation of the two estimates, the residuals do not separate them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,9 +185,12 @@ class _Equations:
 
     @classmethod
     def at(cls, found: Identification, variances: Array) -> _Equations:
-        """At some variances (2,), mm^2, with the parameters refitted under them."""
-        model = _refitted(found, variances)
+        """Evaluate at variances (2,), mm^2, with the parameters refitted under them."""
         by_joints = found.prediction.by_joints
+        encoder_noise, gauge_noise = np.sqrt(variances).tolist()
+        noise = replace(found.problem.noise, encoder=encoder_noise, gauge_mm=gauge_noise)
+        reweighted = replace(found.prediction, weights=record_weights(by_joints, noise))
+        model = LinearizedModel.around(found.problem, reweighted, found.active_prior)
         unit = replace(found.problem.noise, encoder=1.0, gauge_mm=1.0)
         encoder = unit.encoder_covariance(by_joints)
         cofactors = (encoder, np.broadcast_to(unit.gauge_covariance, encoder.shape))
@@ -217,11 +214,3 @@ class _Equations:
         information = np.outer(self.variances, self.variances) * self.information
         step: Array = np.linalg.solve(information, gradient)
         return np.clip(step, -MAX_LOG_STEP, MAX_LOG_STEP)
-
-
-def _refitted(found: Identification, variances: Array) -> LinearizedModel:
-    """The linear model with the parameters that are best under some variances (2,), mm^2."""
-    encoder, gauge = np.sqrt(variances).tolist()
-    noise = replace(found.problem.noise, encoder=encoder, gauge_mm=gauge)
-    reweighted = replace(found.prediction, weights=record_weights(found.prediction.by_joints, noise))
-    return LinearizedModel.around(found.problem, reweighted, found.active_prior)

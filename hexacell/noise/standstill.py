@@ -29,14 +29,14 @@ SMALLEST_SERIES = 8
 SIGNIFICANCE = 1e-3
 """Probability of each test to find what is not there."""
 OUTLIER_SHARE = 0.1
-"""At most such a share of a series can be outliers."""
+"""Largest share of a series that can be outliers."""
 OUTLIER_STEPS = 2.0
 """Steps of the display within which no reading is an outlier."""
 CORRELATION_SIGMAS = 2.33
-"""A correlation below as many of its standard deviations is none (one-sided 1 %)."""
+"""Standard deviations below which a correlation counts as zero (one-sided 1 %)."""
 LARGEST_CORRELATION = 0.95
 USUAL_STEP_MM = 1e-3
-"""Of the display of a dial indicator."""
+"""Step of the display of a dial indicator."""
 
 _DECIMALS = re.compile(r"\.(\d+)")
 
@@ -58,11 +58,6 @@ class ReadingNoise:
     drift: float
     outliers: int
     correlation: float
-
-    @property
-    def are_independent(self) -> bool:
-        """Whether successive readings are independent, as far as the series shows."""
-        return self.correlation == 0.0
 
     def of_mean(self, readings: int) -> float:
         """Standard deviation, mm, of the mean of successive readings."""

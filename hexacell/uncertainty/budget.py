@@ -26,7 +26,7 @@ from hexacell.uncertainty.effects import Effect, Occurrence
 from hexacell.uncertainty.propagation import MeasuredScale, Propagation, ScaleObservation, compressed
 from hexacell.uncertainty.statement import TaskErrors, covariance_factor
 
-TELLING_SIGMAS = 4.0
+VISIBLE_SIGMAS = 4.0
 """Standard deviations by which an effect must raise the chi-square to be seen."""
 
 OF_THE_MACHINE = (Occurrence.CONSTANT, Occurrence.EVERY_STOP, Occurrence.WITH_TOOL)
@@ -104,8 +104,8 @@ class UncertaintyBudget:
                 known = known + effect.value * propagation.columns(effect).combined.sum(axis=-1)
         factor = covariance_factor(covariance)
         noise = propagation.jacobian @ factor + measured.by_parameters(factor)
-        telling = TELLING_SIGMAS * np.sqrt(2.0 * found.goodness.expected)
-        visible = telling / (HARMLESS_ERROR * _largest(noise)) ** 2
+        significant = VISIBLE_SIGMAS * np.sqrt(2.0 * found.goodness.expected)
+        visible = significant / (HARMLESS_ERROR * _largest(noise)) ** 2
         lines = (_line(propagation, effect, visible, measured) for effect in effects)
         acting = tuple(line for line in lines if line.columns.shape[-1])
         return cls(propagation.jacobian, noise, acting, known, has_held=zeros is not None)

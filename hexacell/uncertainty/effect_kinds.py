@@ -29,7 +29,7 @@ THOUSANDTH = 1e-3
 def common_encoder_scale(um_per_m: float, source: str = "") -> Effect:
     """All encoders are wrong by the same share, as of a common temperature or calibration.
 
-    Nothing that the gauges measure tells it from a machine that is larger by the same share.
+    Nothing that the gauges measure distinguishes it from a machine that is larger by the same share.
     """
     return Effect(COMMON_SCALE, um_per_m, "um/m", Occurrence.CONSTANT, _common_scale, source=source)
 
@@ -166,7 +166,7 @@ def _scales(readings: Readings) -> Array:
 
 
 def _oval(readings: Readings) -> Array:
-    """By each spherical harmonic of degree 2, the mean square of all five together being 1/2.
+    """Errors by each spherical harmonic of degree 2, the mean square of all five together being 1/2.
 
     The plate of a gauge touches the ball where its normal is the gauge's direction.
     """
@@ -211,7 +211,7 @@ def rail_waves(um: float, wavelength_mm: float, source: str = "") -> Effect:
 def common_sag(um: float, half_length_mm: float, source: str = "") -> Effect:
     """All rails hang through alike, as a parabola ``um`` deep with its ends ``half_length_mm`` away.
 
-    Nothing that the gauges measure tells it from a slightly different geometry.
+    Nothing that the gauges measure distinguishes it from a slightly different geometry.
     """
 
     def sagging(placement: Placement) -> Array:

@@ -60,7 +60,7 @@ class Placement:
 
     @cached_property
     def derivatives(self) -> ConstraintDerivatives:
-        """Of the constraints."""
+        """Derivatives of the constraints."""
         return self.mechanism.derivatives(self.geometry, self.poses, self.joints)
 
     @cached_property
@@ -141,7 +141,7 @@ class RecordEffects:
     effects: tuple[Effect, ...]
 
     def __call__(self, measured: MeasuredPoses, /) -> SystematicErrors:
-        """Of n records at measured poses."""
+        """The errors of n records at measured poses."""
         placement = Placement(measured.mechanism, measured.geometry, measured.poses, measured.joints)
         readings = Readings(measured.poses.rotations, measured.deviations, measured.gauges)
         common: list[Array] = [np.zeros((len(placement), 3, 0))]

@@ -47,7 +47,7 @@ from hexacell.uncertainty.propagation import ScaleObservation
 from hexacell.uncertainty.statement import COVERAGE_FACTOR, covariance_factor
 
 HARDLY_MM2 = 0.01
-"""A sum of squared displacements below tells nothing of the direction of a gauge."""
+"""Sum of squared displacements below which the direction of a gauge is unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class LengthCheck:
         judged: JudgedGeometry,
         effects: Iterable[Effect] = (),
     ) -> LengthCheck:
-        """The check of a judged geometry; the scale common to all encoders is none of the ``effects``."""
+        """The check of a judged geometry; ``effects`` without the scale common to all encoders."""
         placement = records.placement
         basis = placement.mechanism.convention.basis()
         by_all, by_joints = position_sensitivity(
@@ -109,7 +109,7 @@ class LengthCheck:
 
     @property
     def encoders_long_um_m(self) -> float:
-        """By how much the encoders show more than the certified length."""
+        """How much more than the certified length the encoders show, um/m."""
         return float(self._share(self.length_mm - self.standard.distance_mm))
 
     @property
@@ -161,7 +161,7 @@ class LengthCheck:
         return weights
 
     def following(self) -> Mapping[int, Array]:
-        """By mounting, how far each gauge (3,) followed the ball: 1 as far as it moved, -1 the other way.
+        """How far each gauge (3,) followed the ball, by mounting: 1 as far as it moved, -1 the other way.
 
         A gauge is not a number where the ball hardly moved.
         """
@@ -175,7 +175,7 @@ class LengthCheck:
 
     @property
     def observation(self) -> ScaleObservation:
-        """What the check tells of the error that the encoders have in common, for an uncertainty budget."""
+        """The error that the encoders have in common by this check, for an uncertainty budget."""
         alone = [self._of(error) for error in self.errors if not error.is_shared]
         alone += [*self._of_standard.values(), self._of_noise]
         return ScaleObservation(
@@ -263,7 +263,7 @@ class LengthCheck:
 
 
 def _slope(moved: Array, shown: Array) -> Array:
-    """Of each gauge (3,), by positions and readings (n, 3) along them."""
+    """Slope of each gauge (3,), by positions and readings (n, 3) along them."""
     moved, shown = moved - moved.mean(axis=0), shown - shown.mean(axis=0)
     squares = (moved**2).sum(axis=0)
     undefined = np.full(3, np.nan)

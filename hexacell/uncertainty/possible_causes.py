@@ -46,7 +46,7 @@ from hexacell.uncertainty.effect_kinds import (
 from hexacell.uncertainty.effects import Effect, Placement, Readings, errors_of_records
 
 SMALLEST_SHARE = 0.1
-"""Of the excess, that a cause must explain to be listed."""
+"""Share of the excess that a cause must explain to be listed."""
 
 WAVELENGTHS_MM = (600.0, 1500.0)
 """Waves of the rails that are longer than the travel of a slider at one point."""
@@ -87,7 +87,7 @@ def _of_the_machine(test: ExcessTest) -> Iterator[PossibleCause]:
 
 
 def _of_the_records(test: ExcessTest) -> Iterator[PossibleCause]:
-    """Of each kind of data fault the most likely one, if it is significant."""
+    """The most likely data fault of each kind, if it is significant."""
     model = test.found.linear_model
     kinds: set[type[FaultHypothesis]] = set()
     for hypothesis in rank_hypotheses(model, test.found.noise_test):
@@ -110,7 +110,7 @@ def _name(hypothesis: FaultHypothesis) -> str:
 
 
 SMALLEST_REMAINDER = 1e-4
-"""Of the square of a direction of Z, that stations and parameters must leave: the rest is rounding."""
+"""Share of the square of a direction of Z that stations and parameters must leave: less is rounding."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -201,7 +201,7 @@ def each_alone(errors: Array) -> Array:
 
 
 def compressed(columns: Array) -> Array:
-    """At most as many columns as rows, whose product with their transpose is the same."""
+    """Columns with the same product with their transpose, at most as many as rows."""
     if columns.shape[1] <= columns.shape[0]:
         return columns
     upper: Array = np.linalg.qr(columns.T)[1]
@@ -268,7 +268,7 @@ class MeasuredScale:
 
     @classmethod
     def of(cls, propagation: Propagation, scale: ScaleObservation | None) -> MeasuredScale:
-        """At the task of a propagation."""
+        """Evaluate a measured scale at the task of a propagation."""
         if scale is None:
             return cls(np.zeros(propagation.jacobian.shape[:2]), None)
         return cls(propagation.columns(common_encoder_scale(1.0)).combined[..., 0], scale)

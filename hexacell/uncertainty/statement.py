@@ -63,12 +63,12 @@ class TaskErrors:
 
     @cached_property
     def position(self) -> LargestError:
-        """Of the position, mm."""
+        """Largest position error, mm."""
         return _largest(self.estimated[:, :3], self.effects[:, :3])
 
     @cached_property
     def orientation(self) -> LargestError:
-        """Of the orientation, deg."""
+        """Largest orientation error, deg."""
         return _largest(np.degrees(self.estimated[:, 3:]), np.degrees(self.effects[:, 3:]))
 
     @property
@@ -79,7 +79,7 @@ class TaskErrors:
 
 
 def _largest(estimated: Array, effects: Array) -> LargestError:
-    """From components (n, 3), and the effects (n, 3, k) on them."""
+    """The largest error by components (n, 3), and the effects (n, 3, k) on them."""
     value = float(np.linalg.norm(estimated, axis=-1).max())
     draws = np.random.default_rng(SEED).standard_normal((DRAWS, effects.shape[-1]))
     drawn = estimated + np.tensordot(draws, effects, axes=(1, 2))

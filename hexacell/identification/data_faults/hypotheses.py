@@ -22,14 +22,14 @@ from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import RecordId
 
 PENALTY_PER_UNKNOWN = 10.0
-"""By how much a hypothesis must lower the chi-square for each number that it is free to choose."""
+"""How much a hypothesis must lower the chi-square for each number that it is free to choose."""
 
 SUFFICIENT_DECREASE = 20.0
-"""Of the mean square residual, for a hypothesis to be accepted although the fit is not yet consistent."""
+"""Factor of the mean square residual for a hypothesis to count although the fit is not yet consistent."""
 
 SETTLING_DECREASE = 400.0
 SETTLING_MISFIT = 4.0
-"""Of the mean square residual, and what it must be, for a hypothesis to need no comparison with others."""
+"""Factor and largest mean square residual for a hypothesis to need no comparison with others."""
 
 LARGEST_TRUSTED_RATIO = 10.0
 """Residuals over the stated noise up to which first-order tests around the solution are valid."""

@@ -49,12 +49,12 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.rotations import Array, Mask
 
 LARGEST_REJECTED_SHARE = 0.1
-"""Of all records: if more disagree, they are not single mistakes."""
+"""Share of all records above which those that disagree are not single mistakes."""
 
 TRIED_FROM_EACH_LIST = 3
 
 LARGEST_TRIMMED_SHARE = 0.25
-"""Of all records, that may be outliers around the drawing."""
+"""Largest share of all records that may be outliers around the drawing."""
 
 SIGNIFICANCE = 1e-4
 """Probability that a good record counts as an outlier around the drawing."""

@@ -20,7 +20,7 @@ from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKi
 from hexacell.measurements.records import Deviation, RecordId
 
 NAMED_SHARE = 0.3
-"""Of the largest component of a zero shift: gauges with smaller components are not named."""
+"""Share of the largest component of a zero shift below which a gauge is not named."""
 
 
 def left_out(selected: CorrectedFit, tests: Mapping[RecordId, DeletionTest]) -> tuple[DataFault, ...]:

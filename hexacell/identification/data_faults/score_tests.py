@@ -44,7 +44,7 @@ from hexacell.kinematics.rotations import Array
 
 FALSE_ALARMS_PER_RECORD = 2e-4
 FALSE_ALARMS_PER_FILE = 0.02
-"""The smaller rate applies: a file of 100,000 good records must lose none either."""
+"""The smaller rate applies: a file of 100,000 good records must not lose any either."""
 
 WORTH_TESTING = 0.05
 """Probability of the residuals below which zero shifts and gauge faults are tested too."""
@@ -55,7 +55,7 @@ SMALLEST_GAUGE_FAULT_GAIN = 25.0
 """A likelihood ratio of 270,000, for some dozens of gauge faults tested."""
 
 SMALLEST_REDUNDANCY = 1e-3
-"""Of a record's information: where the others determine less, its residual is no evidence."""
+"""Share of a record's information that the others must determine, or its residual is no evidence."""
 
 MEDIAN_OF_CHI2_3 = 2.366
 SCATTER_OF_MEDIAN = 1.12

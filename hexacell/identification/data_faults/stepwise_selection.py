@@ -58,7 +58,7 @@ from hexacell.identification.solver.result import GaugeFaultError, Identificatio
 from hexacell.measurements.records import RecordId
 
 CONFIRMED_SHARE = 0.5
-"""Of the first-order gain of a gauge fault, what a refit must confirm."""
+"""Share of the first-order gain of a gauge fault that a refit must confirm."""
 
 FEW_RECORDS = 60
 """Up to this number of records the cost may have several minima."""
@@ -67,7 +67,7 @@ OTHER_STARTS = 4
 """With few records, the start points that are tried before a gauge fault is reported."""
 
 LARGEST_MEAN_SQUARE = 3.0
-"""Of the difference from the drawing, in sigma, of a solution found from another start point."""
+"""Largest mean square difference from the drawing, in sigma, of a solution from another start."""
 
 
 def screen(problem: Problem) -> Identification:
@@ -107,7 +107,7 @@ def select_faults(problem: Problem) -> CorrectedFit:
 
 
 def _forward(current: CorrectedFit) -> CorrectedFit:
-    """Correct for the most likely hypothesis until none is significant, or too many were rejected."""
+    """Correct for the most likely hypothesis until nothing is significant, or too many were rejected."""
     while len(current.rejected) < LARGEST_REJECTED_SHARE * current.original.records:
         extended = None if current.is_reliable else search(current)
         if extended is None:
@@ -164,7 +164,7 @@ def _refuse_inches(uncorrected: CorrectedFit) -> None:
 
 
 def _readmitted(selected: CorrectedFit) -> CorrectedFit | None:
-    """The fit with the rejected records that agree with it; None if there are none, or it is unreliable.
+    """The fit with the rejected records that agree with it; None if no record agrees, or it is unreliable.
 
     The fewer disagree, the more significantly a record has to.
     """

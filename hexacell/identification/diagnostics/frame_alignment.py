@@ -117,7 +117,7 @@ class FrameFit:
 
     @property
     def _free(self) -> Array:
-        """From shifts, turns about the free axes and turns of the platform (6 + k) to (t, f, p) (9,)."""
+        """Matrix (9, 6 + k) from shifts, turns about the free axes and turns of the platform to (t, f, p)."""
         free = np.zeros((9, 6 + len(self.turns)))
         free[:3, :3] = free[6:, -3:] = np.eye(3)
         free[3:6, 3:-3] = self.turns.T
@@ -179,7 +179,7 @@ def choose_frames(
         branch: of both.
         taught: the geometry of the time of teaching, in the frames of that time.
         new: the new geometry, in the mechanism's frame convention.
-        poses: in the frames of ``taught``. If both geometries reach none of them, the frames of ``taught``
+        poses: in the frames of ``taught``. If both geometries reach no pose, the frames of ``taught``
             are kept, as the mechanism's convention has them.
     """
     normalized, convention = mechanism.normalize_frames(taught)

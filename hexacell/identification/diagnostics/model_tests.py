@@ -73,7 +73,7 @@ def leave_one_point_out(found: Identification) -> tuple[PointPrediction, ...]:
 
 
 def contradicted_points(points: Sequence[PointPrediction]) -> tuple[PointPrediction, ...]:
-    """Those whose records the others contradict; by chance any of them in 0.1 % of all cases."""
+    """The points whose records the others contradict; by chance any of them in 0.1 % of all cases."""
     return tuple(one for one in points if one.test.probability < SMALLEST_PROBABILITY / len(points))
 
 

@@ -19,7 +19,7 @@ the probability of the test, whose degrees of freedom are the number of toleranc
 less what the frames could give way there (Cox and Shi, Simple Adaptive Size-Exact Testing for Full-Vector
 and Subvector Inference in Moment Inequality Models, Review of Economic Studies 90, 2023).
 
-The joint is named without whose tolerances a robot explains it best; where none alone does, another one
+The joint is named without whose tolerances a robot explains it best; where no single one does, another one
 is added, and so on (forward selection). Joints of which each alone explains it as well are named beside
 it. Small residuals prove nothing here: legs 13 mm too short can explain data perfectly.
 """
@@ -338,7 +338,7 @@ class _Step:
         return change
 
     def without_frame_change(self, values: Array) -> Array:
-        """The same values once the frames are changed."""
+        """Some values once the frames are changed."""
         return np.concatenate([np.zeros(self.frame_count), values[self.frame_count :]])
 
     def result(self, values: Array) -> ToleranceFit:

@@ -100,7 +100,7 @@ class CommandedPoses:
         return len(own) == len(others) and all(map(operator.is_, own, others))
 
     def with_others(self, known: NDArray[np.intp], others: CommandedPoses) -> CommandedPoses:
-        """These and others in one order: ``known`` (n,) are rows of these, and -1 where others are."""
+        """These commands and others in one order: ``known`` (n,) are rows of these, or -1 for others."""
         new = known < 0
         choice, joints = self.choice[known], self.joints[known]
         choice[new], joints[new] = others.choice, others.joints

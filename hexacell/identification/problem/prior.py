@@ -1,4 +1,4 @@
-"""What is known before measuring: the noise of the readings, the drawing with its tolerances, other errors.
+"""What is known before measuring: the noise of the readings, the drawing with its tolerances or an earlier result, other errors.
 
 Systematic errors are no noise: a machine that is as good as is stated of it still has effects that the
 kinematic model leaves out. They make the residuals larger than the noise does, which is no evidence
@@ -186,6 +186,53 @@ class Prior:
         parameters = mechanism.parameters
         largest = [parameters.array(widths, kind.symbol).max() for kind in parameters.kinds]
         return np.repeat(largest, [kind.numbers_per_leg for kind in parameters.kinds])
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedBefore:
+    """A geometry that was identified some time ago, and that may have changed since.
+
+    It is known with the sum of two covariances. How much it changed is known only roughly: the drift's
+    scale, a factor of its standard deviation, is estimated from new records by their marginal likelihood
+    (empirical Bayes; Berger, Statistical Decision Theory and Bayesian Analysis, 1985, section 3.5).
+
+    Attributes:
+        geometry: in the mechanism's frame convention.
+        covariance: of its free parameters then (p, p), mm^2.
+        drift: covariance (p, p) of their changes since, mm^2, where the drift's scale is 1.
+    """
+
+    mechanism: Mechanism
+    geometry: Geometry
+    covariance: Array
+    drift: Array
+
+    def prior(self, scale: float) -> Prior:
+        """What is known of the geometry now, with the drift ``scale`` times as large as usual."""
+        free = self.mechanism.convention.free_parameters(self.geometry)
+        return Prior(self.geometry, free, self.covariance + scale**2 * self.drift, is_estimate=True)
+
+
+def drift_covariance(mechanism: Mechanism, geometry: Geometry, sigma: Array) -> Array:
+    """Covariance (p, p) of the free parameters when all parameters change independently.
+
+    Every parameter (P,) of the machine changes, with standard deviations ``sigma``, those that the frame
+    convention fixes as well: the convention then moves the others. ``geometry`` is in that convention.
+    """
+    factor = sigma[:, None] * free_parameter_derivatives(mechanism, geometry)
+    covariance: Array = factor.T @ factor
+    return covariance
+
+
+def drift_sigma(mechanism: Mechanism, sigma_mm: float, tolerances: Tolerances) -> Array:
+    """Standard deviations (P,) of the drift, that of lengths being given.
+
+    Of other parameters it is the same share of the tolerance as of the largest tolerance of a length.
+    """
+    parameters, widths = mechanism.parameters, tolerances.widths(mechanism.parameters)
+    is_length = np.array([p.kind.unit is ParameterUnit.MM for p in parameters.parameters])
+    share = sigma_mm / widths[is_length].max()
+    return np.where(is_length, sigma_mm, share * widths)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

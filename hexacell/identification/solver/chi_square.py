@@ -72,7 +72,7 @@ class ChiSquareTest:
 
     @property
     def is_explained(self) -> bool:
-        """Whether the noise explains the residuals; not where there is no redundancy to tell."""
+        """Whether the noise explains the residuals; false without redundancy."""
         return self.agreement in {ChiSquareVerdict.AGREES, ChiSquareVerdict.TOO_SMALL}
 
     @property

@@ -48,7 +48,7 @@ def tolerance_draws(problem: Problem) -> Array:
 
 
 def _with_poses(problem: Problem, starts: Array) -> Iterator[tuple[Array, PoseBatch]]:
-    """Those of some free parameters (k, p), mm, for which the poses of all records are found."""
+    """The free parameters, of (k, p), mm, for which the poses of all records are found, with the poses."""
     records = problem.records
     for some in np.array_split(starts, -(-len(starts) * records // BATCH_ROWS)):
         rows = np.tile(np.arange(records), len(some))

@@ -19,7 +19,7 @@ from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import Deviation, RecordId
 
 UNDETERMINED_RATIO = 0.5
-"""Of the prior standard deviation: a parameter with more left was not determined by the data."""
+"""Share of the prior standard deviation above which a parameter was not determined by the data."""
 
 STRONG_CORRELATION = 0.9
 
@@ -265,6 +265,19 @@ class Identification:
             for i, j in zip(rows[order], columns[order], strict=True)
             if abs(correlation[i, j]) > above
         )
+
+    @property
+    def log_marginal_likelihood(self) -> float:
+        """Logarithm of the likelihood of the records under the prior of their problem, but for a constant.
+
+        The integral over the parameters is Laplace's approximation at the estimate: half the sum of the
+        squared residuals, the squared distance from the prior's centre, and ``log det(1 + C I)`` with the
+        prior's covariance C and the information I of the records, all with a minus sign.
+        """
+        prior, information = self.problem.prior, self.solution.information
+        squares = self.chi2 + prior.squared_distance(self.free)
+        volume = np.linalg.slogdet(np.eye(len(information)) + prior.covariance @ information)[1]
+        return -0.5 * float(squares + volume)
 
     @property
     def termination(self) -> Termination:

@@ -13,19 +13,20 @@ from hexacell.design.predicted_records import position_derivatives
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
-from hexacell.identification.problem.prior import Noise, Prior, Tolerances
+from hexacell.identification.problem.prior import (
+    IdentifiedBefore,
+    Noise,
+    Prior,
+    Tolerances,
+    drift_covariance,
+    drift_sigma,
+)
 from hexacell.identification.problem.problem import Assumptions
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.limits.limits import Limits
-from hexacell.uncertainty.geometry_drift import (
-    IdentifiedBefore,
-    drift_covariance,
-    drift_sigma,
-    log_marginal_likelihood,
-)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +73,7 @@ def test_the_marginal_likelihood_is_that_of_a_normal_distribution(
         controller = CommandingGeometry.of(hexaglide, paper.actual)
         arguments = {"controller": controller, "branch": paper.branch, "noise": noise}
         problem = Assumptions(hexaglide, prior=prior, **arguments).problem(records)
-        return log_marginal_likelihood(estimate_online(problem))
+        return estimate_online(problem).log_marginal_likelihood
 
     def directly(scale: float) -> float:
         belief = RobotBelief(hexaglide, geometry, paper.branch, free, covariance, noise, LIMITS)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from hexacell.kinematics.parameters import JointUnit
-from hexacell.noise.approach_scatter import ScatterSource
-from hexacell.noise.measured_noise import InstrumentNoise, RepeatedApproaches
 from procedures.run import events
 
 SIX = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -27,14 +24,3 @@ def test_series_at_standstill() -> None:
     at = {"phase": "P", "point": 1}
     before = {"at": at, "gauges_mm": [], "joints_mm": [SIX], "answers": [], "counts": []}
     assert events.StandstillRead.model_validate(before).joints == (SIX,)
-
-
-def test_noise() -> None:
-    before = {"name": "encoder 1", "reading_mm": 0.1, "drift_mm": 0.2, "stated_mm": 0.3, "record_mm": 0.4}
-    found = InstrumentNoise.model_validate(before)
-    assert (found.reading, found.drift, found.stated, found.record) == (0.1, 0.2, 0.3, 0.4)
-    assert found.unit is JointUnit.MM
-    visits = {"visits": 7, "degrees_of_freedom": 18, "ball_mm": 0.1, "ratio": 2.0, "source": "sliders"}
-    approaches = RepeatedApproaches.model_validate(visits | {"excess_mm": 0.05})
-    assert (approaches.excess, approaches.source) == (0.05, ScatterSource.JOINTS)
-    assert approaches.model_dump(mode="json")["source"] == "joints"

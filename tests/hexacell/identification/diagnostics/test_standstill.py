@@ -49,7 +49,7 @@ def test_the_variance_has_the_distribution_of_its_degrees_of_freedom(found) -> N
 def test_white_noise_shows_no_drift_and_no_outlier_and_hardly_a_correlation(found) -> None:
     assert np.mean([one.drift != 0.0 for one in found]) < 0.004
     assert np.mean([one.outliers > 0 for one in found]) < 0.004
-    assert np.mean([not one.are_independent for one in found]) < 0.02
+    assert np.mean([one.correlation > 0.0 for one in found]) < 0.02
 
 
 @pytest.mark.parametrize("readings", [1, 7])
@@ -88,7 +88,7 @@ def test_two_false_readings_do_not_hide_each_other() -> None:
 def test_a_dead_still_series_has_the_noise_of_its_display() -> None:
     found = reading_noise(np.full(READINGS, 12.345), 1e-3)
     assert found.sigma == pytest.approx(1e-3 / np.sqrt(12.0))
-    assert (found.drift, found.outliers, found.are_independent) == (0.0, 0, True)
+    assert (found.drift, found.outliers, found.correlation) == (0.0, 0, 0.0)
 
 
 def test_the_last_digit_that_flickers_once_is_no_false_reading() -> None:
@@ -109,7 +109,7 @@ def test_the_mean_of_correlated_readings_is_as_noisy_as_drawn(correlation) -> No
 
 
 def test_the_mean_of_independent_readings_is_better_by_the_root_of_their_number(found) -> None:
-    independent = next(one for one in found if one.are_independent)
+    independent = next(one for one in found if one.correlation == 0.0)
     assert independent.of_mean(16) == pytest.approx(independent.sigma / 4.0)
 
 

@@ -117,7 +117,7 @@ class FrameFit:
 
     @property
     def _free(self) -> Array:
-        """Matrix (9, 6 + k) from shifts, turns about the free axes and turns of the platform to (t, f, p)."""
+        """Matrix (9, 6 + k) from shifts, turns about the free axes and of the platform to (t, f, p)."""
         free = np.zeros((9, 6 + len(self.turns)))
         free[:3, :3] = free[6:, -3:] = np.eye(3)
         free[3:6, 3:-3] = self.turns.T

@@ -1,4 +1,4 @@
-"""What is known before measuring: noise, the drawing with its tolerances or an earlier result, other errors.
+"""What is known beforehand: noise, the drawing with its tolerances or an earlier result, other errors.
 
 Systematic errors are no noise: a machine that is as good as is stated of it still has effects that the
 kinematic model leaves out. They make the residuals larger than the noise does, which is no evidence

@@ -16,7 +16,7 @@ from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.design.search_effort import SearchEffort
 from hexacell.services import search_effort
-from procedures.run import events
+from procedures.steps import events
 
 FREE: dict[str, Any] = {
     "identification.provisional": False,

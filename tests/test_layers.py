@@ -39,7 +39,7 @@ FORBIDDEN = [
     ("drivers.interfaces", "drivers.simulated"),
     ("procedures.run", "hexacell.cli"),
     ("procedures.run", "drivers.simulated"),
-    ("procedures.run.steps", "procedures.engine"),
+    ("procedures.run", "procedures.steps"),
     ("procedures.engine", "procedures.replay"),
     ("procedures.calibration", "procedures.journal"),
     ("procedures.guards", "procedures.calibration"),

@@ -14,9 +14,10 @@ from hexacell.cli.console import Console
 from hexacell.text.events import EventFormatter, activity
 from hexacell.text.layout import wrapped
 from hexacell.text.line_face import record_text
-from procedures.run import events
 from procedures.run.state import RunState
-from procedures.run.steps import Compute, Place
+from procedures.steps import events
+from procedures.steps.commit import Commit
+from procedures.steps.place import Place
 
 PLAIN_TERMINALS = {"dumb", "unknown"}
 """Values of TERM: no bar is drawn, and each record has a line."""
@@ -78,7 +79,7 @@ def is_plain_terminal() -> bool:
 def _may_ask(event: events.Event) -> bool:
     """Whether a person may be asked something until the next event."""
     match event:
-        case events.StepBegun(step=Place() | Compute(kind="commit")):
+        case events.StepBegun(step=Place() | Commit()):
             return True
         case _:
             return isinstance(event, events.Paused | events.Interrupted)

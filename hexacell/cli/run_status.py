@@ -6,9 +6,9 @@ from hexacell.campaign.decisions import Forecast
 from hexacell.text.events import activity
 from hexacell.text.line_face import run_status_text
 from procedures.engine.command_loop import Status
-from procedures.run import events
 from procedures.run.state import RunState
-from procedures.run.steps import Move
+from procedures.steps import events
+from procedures.steps.move import Move
 
 
 class RunStatus:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from hexacell.cli.console import Console
 from hexacell.cli.signals import STOP_SIGNALS, handled
 from hexacell.errors import Interruption
-from procedures.run.commands import Abort, CommandQueue, Stop
+from procedures.engine.commands import Abort, CommandQueue, Stop
 
 Result = TypeVar("Result")
 

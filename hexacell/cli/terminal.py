@@ -14,11 +14,11 @@ from hexacell.errors import AnswerNeeded
 from hexacell.text.answers import request_text, typed_answer
 from hexacell.text.line_face import LETTERS
 from hexacell.text.run import question_text
-from procedures.run import events
-from procedures.run.commands import Abort, Command, MeasureAgain, Pause, Resume, Undo
+from procedures.engine.commands import Abort, Command, MeasureAgain, Pause, Resume, Undo
+from procedures.run.keys import SetKey
 from procedures.run.questions import Question
 from procedures.run.state import RunState
-from procedures.run.steps import SetKey
+from procedures.steps import events
 
 Result = TypeVar("Result")
 

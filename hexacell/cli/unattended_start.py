@@ -11,7 +11,7 @@ from hexacell.errors import HexacellError
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.services.schedule.unattended_runs import local_now, refuse_quiet_hours, refused_start
 from hexacell.text.run import next_try_text
-from procedures.run import events
+from procedures.steps import events
 
 
 def begun_in_window(

@@ -25,7 +25,7 @@ from hexacell.run_process.messages import (
 )
 from hexacell.run_process.outbox import STUCK_S, Outbox
 from hexacell.run_process.run_socket import peer_of
-from procedures.run.commands import Command
+from procedures.engine.commands import Command
 
 
 @dataclass(eq=False)

@@ -26,8 +26,8 @@ from hexacell.run_process.messages import (
     message_line,
 )
 from hexacell.run_process.run_socket import peer_of
-from procedures.run import events
-from procedures.run.commands import Command
+from procedures.engine.commands import Command
+from procedures.steps import events
 
 READY = b"ready\n"
 """What a host writes to its stdout when it listens; else it writes why it does not, as a message."""

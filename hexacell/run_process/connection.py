@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from typing import Protocol
 
 from hexacell.run_process.messages import HostMessage
-from procedures.run.commands import Command
+from procedures.engine.commands import Command
 
 
 class RunConnection(Protocol):

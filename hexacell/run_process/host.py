@@ -25,17 +25,17 @@ from hexacell.run_process.messages import (
 from hexacell.run_process.outbox import STUCK_S
 from hexacell.run_process.run_device_watch import RunDeviceWatch
 from hexacell.services.run.calibration_run import RunRequest, calibrate
-from procedures.calibration.expected_records import expected_records
+from procedures.calibration.calibration import expected_records
 from procedures.devices.device_set import Devices
 from procedures.engine.command_loop import Status
+from procedures.engine.commands import Abort, Command, CommandQueue, Pause, Stop
 from procedures.engine.engine import Engine
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import now
-from procedures.run import events
-from procedures.run.commands import Abort, Command, CommandQueue, Pause, Stop
 from procedures.run.questions import Question
 from procedures.run.state import RunState
-from procedures.run.steps import Compute
+from procedures.steps import events
+from procedures.steps.base import Computation
 
 FIRST_CLIENT_S = 30.0
 """How long a host waits for who started it; nothing moves before."""
@@ -45,8 +45,6 @@ ABORT_S = 0.2
 
 
 STOPPED = HostFailed(problem="stopped by who left it", exit_code=int(ExitCode.INTERRUPTED))
-
-_ONLY_COMPUTING = {"assess noise", "identify", "propose", "judge"}
 
 
 class RemoteOperator:
@@ -160,8 +158,8 @@ class RunHost:
 
     def _is_only_computing(self) -> bool:
         match self._last:
-            case events.StepBegun(step=Compute(kind=kind)):
-                return kind in _ONLY_COMPUTING
+            case events.StepBegun(step=step):
+                return isinstance(step, Computation)
             case _:
                 return False
 

@@ -17,9 +17,9 @@ from hexacell.cell.fields import Frozen, first_mistake
 from hexacell.errors import UsageError
 from hexacell.run_process.snapshots import LiveSnapshot
 from procedures.engine.command_loop import Status
-from procedures.run.commands import Command
-from procedures.run.events import Event
+from procedures.engine.commands import Command
 from procedures.run.questions import Question
+from procedures.steps.events import Event
 
 Message = TypeVar("Message")
 
@@ -80,7 +80,7 @@ class StatusChanged(Frozen):
 
 
 class QuestionOpened(Frozen):
-    """A question waits for an :class:`~procedures.run.commands.Answer`."""
+    """A question waits for an :class:`~procedures.engine.commands.Answer`."""
 
     kind: Literal["question"] = "question"
     question: Question

@@ -20,13 +20,13 @@ from hexacell.run_process.messages import (
 )
 from hexacell.runs.run_folder import RunFolder
 from procedures.engine.command_loop import Status
+from procedures.engine.commands import Command
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import Entry
-from procedures.run import events
-from procedures.run.commands import Command
 from procedures.run.questions import ask_placement
 from procedures.run.state import fold
-from procedures.run.steps import Place
+from procedures.steps import events
+from procedures.steps.place import Place
 
 LONGEST_WAIT_S = 60.0
 """Of recorded time between two events: a run that was resumed the next day is not waited for."""

@@ -14,10 +14,10 @@ from procedures.devices.live_polling import poll_for_screens
 from procedures.devices.live_values import SAMPLE_PERIOD_S, LiveValues
 from procedures.engine.command_loop import Status
 from procedures.engine.engine import Engine
-from procedures.run import events
 from procedures.run.questions import Question
 from procedures.run.state import RunState
-from procedures.run.steps import Move
+from procedures.steps import events
+from procedures.steps.move import Move
 
 FRESH_S = 1.0
 """How long a device that does not answer is waited for when somebody asks what it shows, s."""

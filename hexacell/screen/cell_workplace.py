@@ -34,10 +34,10 @@ from hexacell.text.config_changes import applied_text, rollback_text
 from hexacell.text.history import comparison_text, drift_text
 from hexacell.text.screens.reviewing import history_entries
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 from procedures.journal.journal import read_journal
-from procedures.run.events import RunStarted
 from procedures.run.questions import Question
+from procedures.steps.events import RunStarted
 
 
 def _recorded_run(cell: Cell, run: str) -> RecordedRun:

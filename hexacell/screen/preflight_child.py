@@ -14,7 +14,7 @@ from hexacell.services.run.calibration_run import preflight
 from hexacell.text.planning import device_line
 from hexacell.text.screens.live import failed_items, passed_items
 from hexacell.text.screens.views import ChecklistItem
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 
 
 def found_items(path: Path, mode: Mode) -> tuple[tuple[ChecklistItem, ...], bool]:

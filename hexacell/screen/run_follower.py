@@ -10,8 +10,8 @@ from hexacell.run_process.connection import RunConnection
 from hexacell.run_process.messages import HostFailed, HostMessage, StatusChanged
 from hexacell.text.screens.run_picture import RunPicture, picture_after
 from procedures.engine.command_loop import Status
+from procedures.engine.commands import Command
 from procedures.run.cancellation import cancel_and_wait
-from procedures.run.commands import Command
 
 GONE = HostFailed(
     problem="the process of the run is gone without a word; the robot may still move",

@@ -31,7 +31,7 @@ from hexacell.text.screens.views import (
     QuestionView,
     ReviewView,
 )
-from procedures.run.commands import Answer
+from procedures.engine.commands import Answer
 
 
 class ScreenSession:

@@ -18,9 +18,9 @@ from hexacell.screen.workplace import Workplace
 from hexacell.text.config_changes import RELOAD, versions_text
 from hexacell.text.screens.questions import PERSON
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
-from procedures.run.commands import Abort, Command, MeasureAgain, Pause, Resume, Undo
+from procedures.engine.commands import Abort, Command, MeasureAgain, Pause, Resume, Undo
 
 OF_A_RUN = frozenset(
     {

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from hexacell.services.write_back.proposals import AppliedProposal
     from procedures.journal.line_format import Entry
     from procedures.replay.comparison import ReplayReport
-    from procedures.run import events
     from procedures.run.state import RunState
+    from procedures.steps import events
 
 
 def next_document(proposed: NextPose) -> dict[str, Any]:

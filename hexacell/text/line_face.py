@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from hexacell.campaign.decisions import Forecast
 from hexacell.run_process.snapshots import GaugeSnapshot, LiveSnapshot
-from hexacell.text.events import set_name
 from hexacell.text.layout import duration, wrapped
 from procedures.engine.command_loop import Status
-from procedures.run import events
 from procedures.run.state import RunState
+from procedures.steps import events
 
 LETTERS = (
     "Letters, each with Enter: p pause after this record, P at once, r resume,\n"
@@ -39,7 +38,7 @@ def run_status_text(
 def record_text(record: events.RecordTaken) -> str:
     """A record in a line: where, and how far the ball was from the point's reference."""
     x, y, z = record.deviation_mm
-    where = f"{set_name(record.at)}, orientation {record.orientation}"
+    where = f"{record.at.name}, orientation {record.orientation}"
     return f"{where}: x {x:+.3f}, y {y:+.3f}, z {z:+.3f} mm"
 
 

@@ -13,9 +13,8 @@ from hexacell.services.run.calibration_run import RunRequest
 from hexacell.text.answers import request_text
 from hexacell.text.layout import duration, wrapped
 from hexacell.text.verdict import teaching_line, teaching_sentence
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 from procedures.replay.comparison import Aspect, Difference, ReplayReport
-from procedures.run import events
 from procedures.run.questions import (
     GaugePlacement,
     PendingChange,
@@ -24,6 +23,7 @@ from procedures.run.questions import (
     UnreadyController,
     WrittenResult,
 )
+from procedures.steps import events
 
 REPEATED = "The check raised an alarm, which one unchanged machine in 100 does: it is made once more."
 REPEATED_ALARM = "The alarm was raised again: the machine has changed."

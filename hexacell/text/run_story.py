@@ -9,8 +9,8 @@ from hexacell.text.events import EventFormatter
 from hexacell.text.layout import COLUMNS
 from hexacell.text.line_face import record_text
 from procedures.journal.line_format import Entry
-from procedures.run import events
 from procedures.run.state import RunState, apply
+from procedures.steps import events
 
 INDENT = 10
 """Columns of the time."""

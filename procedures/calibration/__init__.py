@@ -1,1 +1,1 @@
-"""The calibration procedure: which step comes next, preflight, paths."""
+"""What a calibration is, and what its run has learnt so far."""

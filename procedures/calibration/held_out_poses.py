@@ -23,7 +23,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot
-from procedures.run.steps import SixNumbers
+from procedures.run.keys import SixNumbers
 
 CONFIRMING_SEED = 1_000_003
 """Added to the seed of the held-out orientations for those that confirm a failure."""

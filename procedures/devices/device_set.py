@@ -23,7 +23,7 @@ from drivers.stop_input import CombinedStopInput
 from hexacell.cell.devices import GaugeAxis
 from hexacell.errors import HexacellError, joined
 from procedures.devices.live_values import LiveValues
-from procedures.run.events import Temperature
+from procedures.run.readings import Temperature
 
 Result = TypeVar("Result")
 

@@ -13,8 +13,7 @@ from functools import reduce
 from typing import Any, TypeVar
 
 from hexacell.errors import UsageError
-from procedures.run.cancellation import cancel_and_wait
-from procedures.run.commands import (
+from procedures.engine.commands import (
     Abort,
     Answer,
     Command,
@@ -23,12 +22,14 @@ from procedures.run.commands import (
     Invalidation,
     MeasureAgain,
     Pause,
+    QuestionBroker,
     Resume,
     Stop,
     Undo,
     invalidation_event,
 )
-from procedures.run.questions import Question, QuestionBroker
+from procedures.run.cancellation import cancel_and_wait
+from procedures.run.questions import Question
 from procedures.run.state import RunState, apply
 
 Result = TypeVar("Result")

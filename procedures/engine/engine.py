@@ -9,17 +9,19 @@ from contextlib import suppress
 from hexacell.errors import ExitCode, HexacellError, Interruption, OutOfTime, SeveralErrors
 from hexacell.verdict.decision import Verdict
 from procedures.engine.command_loop import CommandLoop, Status, StepCancelled
-from procedures.engine.config_transactions import Reversal, revert_at_end, revert_unrecorded
+from procedures.engine.commands import Command, CommandQueue, QuestionBroker, UnattendedOperator
 from procedures.engine.recovery import GIVE_UP, Recovery, RecoveryPolicy
+from procedures.engine.reversal import Reversal, revert_at_end, revert_unrecorded
 from procedures.engine.step_executor import StepExecutor
 from procedures.journal.journal import Journal
-from procedures.run import events
 from procedures.run.cancellation import shielded
-from procedures.run.commands import Command, CommandQueue
-from procedures.run.questions import Question, QuestionBroker, UnattendedOperator
+from procedures.run.keys import Phase
+from procedures.run.questions import Question
 from procedures.run.state import RunState, apply, fold
-from procedures.run.steps import Phase, Step
 from procedures.run.trips import GuardTripped, RobotNotStopped, may_still_move
+from procedures.steps import events
+from procedures.steps.registry import Step
+from procedures.workflow.next_step import next_step
 
 Listener = Callable[[events.Event, RunState], None]
 
@@ -71,7 +73,7 @@ class Engine:
 
     @property
     def question(self) -> Question | None:
-        """The question that waits for an :class:`~procedures.run.commands.Answer`, if one does."""
+        """The question that waits for an :class:`~procedures.engine.commands.Answer`, if one does."""
         return self._broker.open
 
     def watch(self, watcher: Callable[[Status], None]) -> None:
@@ -83,7 +85,7 @@ class Engine:
         self._commands.question_watchers.append(watcher)
 
     def command(self, command: Command) -> None:
-        """Give a command (:mod:`procedures.run.commands`), from any thread."""
+        """Give a command (:mod:`procedures.engine.commands`), from any thread."""
         self._queue.put(command)
 
     async def run(self) -> events.Ended:
@@ -175,7 +177,7 @@ class Engine:
 
     async def _decide(self) -> Step | None:
         """The next step; raises ``OutOfTime`` where the run was recalled and the robot is back."""
-        step = await asyncio.to_thread(self._executor.calibration.next_step, self.state)
+        step = await asyncio.to_thread(next_step, self._executor.calibration, self.state)
         if step is None and (reason := self.state.recalled) is not None:
             raise OutOfTime(f"the run was ended: {reason}", action="Resume it; what was measured is kept")
         return step

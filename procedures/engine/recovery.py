@@ -13,18 +13,21 @@ from drivers import errors as controller
 from drivers import errors as device
 from hexacell.cell.recovery import Action, Escalations, FailureKind, RecoverySettings
 from hexacell.errors import AnswerNeeded, DeviceError, FileError, HexacellError, Interruption
-from procedures.calibration.mounting import MountingError
-from procedures.calibration.path_planning import NoSafePath
-from procedures.calibration.set_steps import TravelError
 from procedures.devices.reconnection import reconnect
 from procedures.devices.settling import NeverSettled
 from procedures.engine.command_loop import CommandLoop, StepCancelled
+from procedures.engine.commands import QuestionBroker
 from procedures.engine.step_executor import StepExecutor
-from procedures.run import events
-from procedures.run.questions import QuestionBroker, ask_recovery
+from procedures.run.keys import SetKey
+from procedures.run.questions import ask_recovery
 from procedures.run.state import RunState
-from procedures.run.steps import Compute, SetKey, Step, StepOfSet
 from procedures.run.trips import Guard, GuardTripped, RobotNotStopped, causes_of, may_still_move
+from procedures.steps import events
+from procedures.steps.base import StepOfSet
+from procedures.steps.place import MountingError
+from procedures.steps.registry import Step
+from procedures.workflow.paths import NoSafePath
+from procedures.workflow.sets import TravelError
 
 KINDS: Mapping[type[HexacellError], FailureKind] = {
     device.GaugeSilent: FailureKind.GAUGE_SILENT,
@@ -121,7 +124,7 @@ def choices(failure: events.Failed) -> tuple[Action, ...]:
     """
     if failure.failure is FailureKind.MOUNTING:
         return Action.REDO_SET, Action.ABORT
-    if isinstance(failure.step, Compute):
+    if failure.step is not None and failure.step.moves_nothing:
         return Action.RETRY, Action.ABORT
     return Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT
 

@@ -23,6 +23,7 @@ from drivers.stop_input import SUBJECT as STOP_LINE
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
+from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.position_agreement import PositionReports, PositionSource
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.stated_limits import gauge_travel_of
@@ -33,17 +34,13 @@ from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity
 from procedures.guards.position_check import PositionCheck
 from procedures.guards.rules import GuardLimits
 from procedures.guards.supervision import MotionSupervisor, Supervised
-from procedures.run.state import RunState
-from procedures.run.steps import Move, ThreeNumbers
-from procedures.run.trips import GuardTripped, Trip
+from procedures.run.keys import ThreeNumbers
+from procedures.run.trips import Trip, WatchedSet
 
 Result = TypeVar("Result")
 
 STOP_GRACE_S = 0.5
 """How long a motion may take to end after a stop before it is cancelled, s of real time."""
-
-STUCK_GAUGE_SIGMAS = 5.0
-"""An expected displacement is reduced by so many standard deviations before a gauge counts as stuck."""
 
 
 class Guards:
@@ -73,22 +70,22 @@ class Guards:
         await self.while_not_ready(order)
 
     async def move(
-        self, step: Move, state: RunState, duration_s: float, commanded: Callable[[], Array]
+        self, target: Pose, duration_s: float, watched: WatchedSet, commanded: Callable[[], Array]
     ) -> None:
-        """Move to the target of a step; ``commanded`` gives the joint variables (6,) at its pose."""
-        gauges = self._watched_gauges(step, state)
+        """Move to a pose; ``commanded`` gives the joint variables (6,) there."""
+        gauges = self._watched_gauges(watched)
         pollers = self._pollers(controller=True, gauges=gauges)
-        limits = self._limits(zero_mm=state.zero_shown(step.at))
+        limits = self._limits(zero_mm=watched.zero_mm)
         try:
             reached = await self.supervisor.supervise(
-                lambda: self._go(step, duration_s), pollers, limits, STOP_GRACE_S
+                lambda: self._go(target, duration_s), pollers, limits, STOP_GRACE_S
             )
         except MotionInterrupted:
             # Where the forward kinematics failed, the robot is not where this error says that it stopped.
             await self.locate()
             raise
         trip = await self._arrival_trip(await asyncio.to_thread(commanded), reached)
-        if trip := trip or _stuck_gauge(step, state, gauges):
+        if trip := trip or _stuck_gauge(watched, gauges):
             raise await self.supervisor.stop(trip)
 
     async def locate(self) -> PositionReports:
@@ -121,11 +118,6 @@ class Guards:
         """Make sure that the controller runs the geometry of its config."""
         await self.locate()
 
-    def drift(self, point: str, drift_mm: ThreeNumbers) -> GuardTripped | None:
-        """The error to raise if the reference of a set drifted too far; not latched, as nothing moved."""
-        trip = rules.reference_drift(point, drift_mm, self._settings.acceptance.drift_mm)
-        return None if trip is None else trip.as_error()
-
     async def _arrival_trip(self, commanded: Array, reached: EncoderSample) -> Trip | None:
         """A joint is not where it was commanded (6,), or the controller is wrong about where it is."""
         limit = self._settings.guards.following
@@ -134,8 +126,8 @@ class Guards:
         found = await self.position.read(reached)
         return following if following and found.odd is PositionSource.ENCODERS else found.trip or following
 
-    async def _go(self, step: Move, duration_s: float) -> EncoderSample:
-        await self._devices.controller.move(step.target, duration_s)
+    async def _go(self, target: Pose, duration_s: float) -> EncoderSample:
+        await self._devices.controller.move(target, duration_s)
         return await self._devices.read_encoders()
 
     def _limits(self, rest: float | None = None, zero_mm: ThreeNumbers | None = None) -> GuardLimits:
@@ -172,13 +164,12 @@ class Guards:
             DevicePoller(gauge.device, gauge.read_deviation, lines[ports[gauge.device]]) for gauge in gauges
         )
 
-    def _watched_gauges(self, step: Move, state: RunState) -> tuple[WatchedGauge, ...]:
-        zero = state.zero(step.at)
-        if zero is None or not state.set(step.at).samples or step.from_elsewhere:
+    def _watched_gauges(self, watched: WatchedSet) -> tuple[WatchedGauge, ...]:
+        zero_mm = watched.zero_mm
+        if zero_mm is None or not watched.is_watched:
             return ()
-        reference = zero.gauges_mm
         return tuple(
-            WatchedGauge(self._devices, mounted, reference[mounted.axis.index])
+            WatchedGauge(self._devices, mounted, zero_mm[mounted.axis.index])
             for mounted in self._devices.gauges
         )
 
@@ -202,15 +193,12 @@ class WatchedGauge:
         return GaugeDeviation(self.axis, deviation_mm)
 
 
-def _stuck_gauge(step: Move, state: RunState, gauges: tuple[WatchedGauge, ...]) -> Trip | None:
+def _stuck_gauge(watched: WatchedSet, gauges: tuple[WatchedGauge, ...]) -> Trip | None:
     """A gauge whose display did not change although its ball must have moved a certain distance."""
-    samples = state.set(step.at).samples
-    if step.expected is None or state.at_pose != (step.at, len(samples)):
+    if watched.moved_mm is None:
         return None
-    for gauge in gauges:
-        expected = step.expected.deviation_mm[gauge.axis] - samples[-1].deviation_mm[gauge.axis]
-        sure = max(0.0, abs(expected) - STUCK_GAUGE_SIGMAS * step.expected.sigma_mm[gauge.axis])
-        trip = rules.stuck_gauge(gauge.device, tuple(gauge.displayed), float(np.copysign(sure, expected)))
-        if trip is not None:
-            return trip
-    return None
+    trips = (
+        rules.stuck_gauge(gauge.device, tuple(gauge.displayed), watched.moved_mm[gauge.axis])
+        for gauge in gauges
+    )
+    return next((trip for trip in trips if trip is not None), None)

@@ -201,19 +201,6 @@ def stuck_gauge(gauge: str, displayed: tuple[str, ...], expected_mm: float) -> T
     )
 
 
-def reference_drift(point: str, drift_mm: tuple[float, ...], limit_mm: float) -> Trip | None:
-    """Back at the reference of a set: the gauge readings changed by more than allowed."""
-    if max(map(abs, drift_mm)) <= limit_mm:
-        return None
-    words = ", ".join(f"{axis} {value:+.3f}" for axis, value in zip("xyz", drift_mm, strict=True))
-    return Trip(
-        Guard.DRIFT,
-        point,
-        f"back at the reference the gauges show {words}, more than {limit_mm:g} mm",
-        "A gauge slipped or the machine does not repeat; resume measures this point again",
-    )
-
-
 def low_disk_space(folder: Path, limit_mb: float) -> Trip | None:
     """The free disk space of a folder, which need not exist yet, is below its limit.
 

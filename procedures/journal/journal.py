@@ -23,7 +23,7 @@ from typing import BinaryIO, Self
 from hexacell.errors import CellBusy, FileError
 from hexacell.storage import atomic_files
 from procedures.journal.line_format import RESTORE, Entry, begins_whole, decode, encode, now, stated_version
-from procedures.run.events import Event
+from procedures.steps.events import Event
 
 _log = logging.getLogger(__name__)
 

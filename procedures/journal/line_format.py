@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from hexacell.cell.fields import first_mistake
 from hexacell.errors import FileError
-from procedures.run.events import Event
+from procedures.steps.events import Event
 
 VERSION = 18
 """What this program writes; it reads this and all before. Version 1 had neither version nor ``s``, and

@@ -15,7 +15,7 @@ from drivers.encoders.bank import joint_variables
 from hexacell import __version__
 from hexacell.cell.devices import EncoderSettings
 from procedures.devices.settling import trimmed_mean
-from procedures.run.events import Reading
+from procedures.run.readings import Reading
 
 TOLERANCE = 1e-9
 """Largest difference that counts as rounding: absolute in the field's unit, above 1 relative."""

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Self, TypeVar
 
+import numpy as np
+
 from drivers.errors import GaugeAtEnd
 from drivers.interfaces import (
     ControllerStatus,
@@ -22,18 +24,20 @@ from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
 from hexacell.errors import AnswerNeeded, DeviceError
 from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.position_agreement import PositionReports
 from hexacell.kinematics.rotations import Array
 from hexacell.runs.run_folder import RunFolder
-from procedures.calibration.workflow import Calibration
+from procedures.calibration.calibration import Calibration
 from procedures.devices.device_set import Devices
 from procedures.engine.step_executor import StepExecutor
 from procedures.guards.guards import Guards
 from procedures.guards.supervision import Supervised
 from procedures.replay.comparison import TOLERANCE
-from procedures.run import events
 from procedures.run.questions import Question
+from procedures.run.readings import Reading, ReadingSeries
 from procedures.run.state import RunState
-from procedures.run.steps import Move, Standstill
+from procedures.run.trips import WatchedSet
+from procedures.steps import events
 
 PROTOCOL = "recorded"
 
@@ -47,9 +51,9 @@ class Recorded:
     outcome: events.Event | None = None
 
     @property
-    def reading(self) -> events.Reading:
+    def reading(self) -> Reading:
         """Its reading; raises ``DeviceError`` if it has none."""
-        reading: events.Reading | None = getattr(self.outcome, "reading", None)
+        reading: Reading | None = getattr(self.outcome, "reading", None)
         if reading is None:
             raise DeviceError("the journal has no reading for this step", subject="the recorded devices")
         return reading
@@ -127,17 +131,17 @@ class RecordedOperator:
 
 
 class InactiveGuards(Guards):
-    """Guards without supervision; the drift of a reference, which needs no device, is still evaluated."""
+    """Guards without supervision."""
 
     async def prepare(self, order: Supervised[None]) -> None:
         """Nothing to do."""
         del order
 
     async def move(
-        self, step: Move, state: RunState, duration_s: float, commanded: Callable[[], Array]
+        self, target: Pose, duration_s: float, watched: WatchedSet, commanded: Callable[[], Array]
     ) -> None:
         """Nothing to do."""
-        del step, state, duration_s, commanded
+        del target, duration_s, watched, commanded
 
     async def at_standstill(self, action: Supervised[Result]) -> Result:
         """Run it."""
@@ -177,21 +181,23 @@ class RecordedStepExecutor(StepExecutor):
     async def require_departure(self, state: RunState) -> None:
         """No robot moves."""
 
-    async def locate(self) -> events.Located:
+    async def locate(self) -> PositionReports:
         """The recorded position, which was checked then."""
         outcome = self.recorded.outcome
         if not isinstance(outcome, events.Located):
             raise DeviceError("the journal has no position for this step", subject="controller")
-        return outcome
+        joints = None if outcome.joints is None else np.array(outcome.joints)
+        return PositionReports(Pose(*outcome.pose), joints, np.array(outcome.encoders))
 
-    async def read_standstill(self, step: Standstill) -> events.StandstillRead:
+    async def read_series(self, count: int) -> ReadingSeries:
         """The recorded series."""
+        del count
         outcome = self.recorded.outcome
-        if not isinstance(outcome, events.StandstillRead) or outcome.at != step.at:
+        if not isinstance(outcome, events.StandstillRead):
             raise DeviceError("the journal has no series", subject="the recorded devices")
-        return outcome
+        return ReadingSeries(**{name: getattr(outcome, name) for name in ReadingSeries.model_fields})
 
-    async def read(self, windows: int = 1) -> events.Reading:
+    async def read(self, windows: int = 1) -> Reading:
         """The recorded reading; raises ``GaugeAtEnd`` where the recorded gauges did."""
         outcome = self.recorded.outcome
         if isinstance(outcome, events.RecordRejected) and outcome.reading is None:

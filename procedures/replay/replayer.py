@@ -1,8 +1,8 @@
 """Replay of a journal: every decision and every outcome is computed again and compared.
 
 Each is computed from the recorded state before it, so that one difference does not cause others.
-``OUTCOME_KINDS`` lists which events are outcomes of which steps; all other events have external
-causes (a person, a fault, a policy) and are taken from the journal.
+A step states which events are its outcomes; all other events have external causes (a person, a fault, a
+policy) and are taken from the journal.
 """
 
 from __future__ import annotations
@@ -29,10 +29,11 @@ from procedures.replay.comparison import (
     is_wording,
 )
 from procedures.replay.recorded_executor import RecordedStepExecutor
-from procedures.run import events
-from procedures.run.events import Event
 from procedures.run.state import RunState, apply
-from procedures.run.steps import Step
+from procedures.steps import events
+from procedures.steps.events import Event
+from procedures.steps.registry import Step
+from procedures.workflow.next_step import next_step
 
 Outcome = TypeVar("Outcome")
 
@@ -102,7 +103,7 @@ class Replayer:
                 self._current_step = None
             case _:
                 self.report.taken += 1
-        if event.kind in CANCELLED:
+        if isinstance(event, CANCELLING):
             self._current_step = None
 
     async def _decision(self, event: events.StepBegun) -> None:
@@ -113,7 +114,7 @@ class Replayer:
         self._compare_with(Aspect.DECISION, event.step.key, event.step, decided)
 
     async def _decided(self) -> Step | Exception | None:
-        deciding = asyncio.to_thread(self._executor.calibration.next_step, self._state)
+        deciding = asyncio.to_thread(next_step, self._executor.calibration, self._state)
         return await _result_or_error(deciding)
 
     async def _outcome(self, step: Step, event: events.Event) -> None:
@@ -134,7 +135,7 @@ class Replayer:
             self.report.taken += 1
         elif self._current_step is None:
             await self._undecided(event)
-        elif self._current_step.kind in COMPUTED_STEPS and self._scope.derives(self._current_step):
+        elif self._current_step.is_reproducible and self._scope.derives(self._current_step):
             await self._outcome(self._current_step, event)
         else:
             self.report.taken += 1
@@ -202,41 +203,14 @@ def _describe(found: object) -> str:
             return str(getattr(found, "key", getattr(found, "kind", found)))
 
 
-OUTCOME_KINDS: dict[str, frozenset[str]] = {
-    "locate": frozenset({"located"}),
-    "move": frozenset({"arrived"}),
-    "place": frozenset({"placed"}),
-    "sample": frozenset({"sampled", "refused"}),
-    "revisit": frozenset({"confirmed", "voided"}),
-    "close": frozenset({"closed"}),
-    "standstill": frozenset({"stood"}),
-    "pilot": frozenset({"piloted", "refused"}),
-    "repeat": frozenset({"repeated"}),
-    "probe": frozenset({"probed"}),
-    "try": frozenset({"tried"}),
-    "assess noise": frozenset({"noise measured"}),
-    "lend": frozenset({"lent"}),
-    "take back": frozenset({"taken back"}),
-    "identify": frozenset({"identified"}),
-    "propose": frozenset({"proposed"}),
-    "commit": frozenset({"committed"}),
-    "judge": frozenset({"judged", "confirmation planned"}),
-    "accept": frozenset({"accepted"}),
-    "roll back": frozenset({"rolled back"}),
-}
-"""The kinds of events that are outcomes, by kind of step."""
-
-MEASURED_KINDS = frozenset({"confirmed", "voided", "closed"})
-"""Kinds that can be computed again only from their reading; journals of version 1 have none."""
-
-CANCELLED = frozenset({"excluded", "interrupted", "failed", "paused"})
-"""Kinds of events that end a step without an outcome."""
-
-COMPUTED_STEPS = frozenset({"assess noise", "lend", "take back", "identify", "propose", "commit", "judge"})
-"""Steps whose failure can be computed again, unless a device or the disk caused it."""
+CANCELLING = (events.PoseExcluded, events.Interrupted, events.Failed, events.Paused)
+"""Events that end a step without an outcome that a replay computes again."""
 
 
 def is_outcome(step: Step, event: Event) -> bool:
     """Whether an event is the outcome of a step, with all of its inputs."""
-    is_complete = event.kind not in MEASURED_KINDS or getattr(event, "reading", None) is not None
-    return is_complete and event.kind in OUTCOME_KINDS.get(step.kind, ())
+    if isinstance(event, CANCELLING) or (
+        isinstance(event, events.SetInvalidated) and event.reading is None
+    ):
+        return False
+    return isinstance(event, step.outcomes)

@@ -9,12 +9,12 @@ import numpy as np
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
-from procedures.run import events
+from procedures.run.readings import Reading
 
 
 def legs_warmer(
     thermometers: Iterable[ThermometerSettings],
-    samples: Sequence[events.RecordTaken],
+    readings: Sequence[Reading],
     before: Sequence[float | None],
 ) -> Array:
     """By how much each leg (n, 6), K, was warmer at n records than ``before``, deg C a leg.
@@ -22,10 +22,10 @@ def legs_warmer(
     0 of a leg without a thermometer. NaN of one whose thermometer never answered, or that has no
     temperature of before. Where a thermometer once did not answer, the mean of what it showed counts.
     """
-    warmer = np.zeros((len(samples), LEGS))
+    warmer = np.zeros((len(readings), LEGS))
     reference = [*before, *[None] * LEGS][:LEGS]
     for thermometer in thermometers:
-        shown = _shown(thermometer.name, samples)
+        shown = _shown(thermometer.name, readings)
         for leg in thermometer.legs:
             at_first = reference[leg - 1]
             warmer[:, leg - 1] = shown - (np.nan if at_first is None else at_first)
@@ -33,29 +33,27 @@ def legs_warmer(
 
 
 def mean_leg_temperatures(
-    thermometers: Iterable[ThermometerSettings], samples: Sequence[events.RecordTaken]
+    thermometers: Iterable[ThermometerSettings], readings: Sequence[Reading]
 ) -> tuple[float | None, ...]:
     """The mean temperature of each leg, deg C; none of a leg that has no thermometer, or a silent one."""
     means: list[float | None] = [None] * LEGS
     for thermometer in thermometers:
-        shown = _shown(thermometer.name, samples)
+        shown = _shown(thermometer.name, readings)
         for leg in thermometer.legs:
             means[leg - 1] = None if np.isnan(shown).any() or not len(shown) else float(shown.mean())
     return tuple(means)
 
 
-def mean_temperature(samples: Iterable[events.RecordTaken]) -> float | None:
+def mean_temperature(readings: Iterable[Reading]) -> float | None:
     """The mean, deg C, of all that thermometers showed at some records; none if there was nothing."""
-    every = [one.celsius for sample in samples for one in sample.reading.temperatures]
+    every = [one.celsius for reading in readings for one in reading.temperatures]
     shown = [celsius for celsius in every if celsius is not None]
     return float(np.mean(shown)) if shown else None
 
 
-def _shown(name: str, samples: Sequence[events.RecordTaken]) -> Array:
+def _shown(name: str, readings: Sequence[Reading]) -> Array:
     """What a thermometer showed at n records, gaps filled with the mean; NaN if it never answered."""
-    by_record = [
-        {one.name: one.celsius for one in sample.reading.temperatures}.get(name) for sample in samples
-    ]
+    by_record = [{one.name: one.celsius for one in reading.temperatures}.get(name) for reading in readings]
     shown = np.array([np.nan if celsius is None else celsius for celsius in by_record])
     if np.isnan(shown).all():
         return shown

@@ -1,23 +1,20 @@
-"""Questions that a run asks a person, as plain data for any user interface, and who answers them."""
+"""Questions that a run asks a person, as plain data for any user interface."""
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
 from drivers.interfaces import StartupAction
 from hexacell.cell.recovery import Action
-from hexacell.errors import AnswerNeeded
 from hexacell.kinematics.pose import Pose
 from hexacell.results.result import ExpectedImprovement
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.verification import Verification
-from procedures.run.cancellation import cancel_and_wait
-from procedures.run.steps import SetKey
+from procedures.run.keys import SetKey
 
 PLACED = "placed"
 """The one answer to a request to place the gauges."""
@@ -203,86 +200,3 @@ class Operator(Protocol):
     async def ask(self, question: Question) -> str | None:
         """The answer; raises ``AnswerNeeded`` if there is none."""
         ...
-
-
-class QuestionBroker:
-    """Passes questions on to an operator; the first answer counts, its own or one given to :meth:`answer`.
-
-    Attributes:
-        open: the question that waits for an answer, if one does.
-        on_change: called whenever a question is opened or closed.
-    """
-
-    def __init__(self, operator: Operator) -> None:
-        self._operator = operator
-        self._answer: asyncio.Future[str | None] | None = None
-        self.open: Question | None = None
-        self.on_change: Callable[[], None] = lambda: None
-
-    def answer(self, answer: str | None) -> bool:
-        """Answer the open question; False if none is open or this is no answer to it."""
-        if self.open is None or self._answer is None or self._answer.done():
-            return False
-        answer = self.open.default if answer is None else answer
-        if self.open.choices and answer not in self.open.choices:
-            return False
-        self._answer.set_result(answer)
-        return True
-
-    async def ask(self, question: Question) -> str | None:
-        """See :meth:`Operator.ask`."""
-        asked = asyncio.ensure_future(self._operator.ask(question))
-        self._answer = asyncio.get_running_loop().create_future()
-        self._set_open(question)
-        try:
-            await asyncio.wait([asked, self._answer], return_when=asyncio.FIRST_COMPLETED)
-            return self._answer.result() if self._answer.done() else asked.result()
-        finally:
-            self._answer.cancel()
-            self._set_open(None)
-            await cancel_and_wait(asked)
-
-    def _set_open(self, question: Question | None) -> None:
-        self.open = question
-        self.on_change()
-
-
-class UnattendedOperator:
-    """No person is present: every question ends the run."""
-
-    async def ask(self, question: Question) -> str | None:
-        """Raise ``AnswerNeeded``: what is needed, and how to run without it where that is possible."""
-        match question.subject:
-            case GaugePlacement(pose=pose, seat=int(seat)):
-                raise AnswerNeeded(
-                    f"the gauges must be mounted in seat {seat} of the fixture ({pose}), but the run is "
-                    "unattended",
-                    action='Run it attended, or set mounting = "fixed" in [length_check] if no person is '
-                    "needed",
-                )
-            case GaugePlacement(station=station, pose=pose):
-                raise AnswerNeeded(
-                    f"the gauges must be put around the ball at {station} ({pose}), but the run is "
-                    "unattended",
-                    action='Run it attended, or use fixed stations (placement = "fixed" in [stations])',
-                )
-            case PendingChange(gates=gates):
-                reasons = " ".join(gate.sentence for gate in gates if not gate.passed)
-                raise AnswerNeeded(
-                    f"the new geometry waits for approval: {reasons or 'the cell file says to ask'}"
-                )
-            case WrittenResult(line=line):
-                raise AnswerNeeded(f"{line}: a person must decide whether the new geometry stays")
-            case UnreadyController(problem=problem, word=None):
-                raise AnswerNeeded(
-                    f"{problem}, and the run is unattended",
-                    action="Find out why, release it and reset it at the controller, then begin or resume",
-                )
-            case UnreadyController(problem=problem, word=word):
-                raise AnswerNeeded(
-                    f"{problem}, and the run is unattended",
-                    action=f'Add "{word}" to startup in [controller] if the program may do that by itself, '
-                    "do it at the controller, or run it attended",
-                )
-            case StepFailure(problem=problem):
-                raise AnswerNeeded(f"{problem} A person must choose: {', '.join(question.choices)}")

@@ -1,30 +1,117 @@
-"""The state of a run: a fold over its events, and nothing else."""
+"""The state of a run, derived from its events and from nothing else.
+
+What an event changes is in its own file (:mod:`procedures.steps`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import reduce
+from typing import TYPE_CHECKING, TypeVar
 
-import numpy as np
-
-from hexacell.cell.recovery import Action, FailureKind
-from hexacell.kinematics.pose import Pose
+from hexacell.cell.recovery import FailureKind
 from hexacell.kinematics.refused_commands import RefusedCommand, RefusedCommands
-from hexacell.measurements.records import MeasurementSet, Record, deviation_of
-from procedures.run import events
-from procedures.run.set_state import SetState
-from procedures.run.steps import (
-    Compute,
-    Move,
-    Phase,
-    SetKey,
-    SixNumbers,
-    Step,
-    StepOfSet,
-    ThreeNumbers,
-)
-from procedures.run.trips import Guard
+from hexacell.measurements.records import MeasurementSet, Record
+from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
+from procedures.run.readings import Reading
+
+if TYPE_CHECKING:  # a state keeps events whole, and needs their names in its annotations alone
+    from procedures.steps.accept import ResultAccepted
+    from procedures.steps.assess_noise import NoiseMeasured
+    from procedures.steps.base import BaseEvent, BaseStep
+    from procedures.steps.commit import Committed
+    from procedures.steps.course import Ended, RunStarted
+    from procedures.steps.identify import Identified
+    from procedures.steps.judge import ConfirmationPlanned, ResultValidated
+    from procedures.steps.lend import ProvisionalApplied
+    from procedures.steps.move import PoseExcluded
+    from procedures.steps.pilot import PilotTaken
+    from procedures.steps.probe import GaugesProbed
+    from procedures.steps.propose import Proposed
+    from procedures.steps.repeat import ReferenceRepeated
+    from procedures.steps.sample import RecordTaken
+    from procedures.steps.standstill import StandstillRead
+
+EventT = TypeVar("EventT", bound="BaseEvent")
+
+
+@dataclass(frozen=True, slots=True)
+class SetState:
+    """One set as far as it is measured.
+
+    Attributes:
+        samples: those that count, in the order taken; the first is the reference.
+        again: orientations and poses of discarded records, which are taken again.
+        reference_unverified: the gauges were unwatched; their zero must be verified at the reference.
+        standstill: readings at the reference without moving, and ``visits`` of it.
+        has_left: the robot has been elsewhere since it was read last.
+        pilots: readings elsewhere, which steer the choice of poses; ``piloted`` of them since the reference
+            was read last.
+        probes: readings beside the reference, which try the gauges; ``tried`` once they have passed, until
+            the gauges are unwatched.
+    """
+
+    samples: tuple[RecordTaken, ...] = ()
+    placed: bool = False
+    rejections: int = 0
+    drift_mm: tuple[float, float, float] | None = None
+    again: tuple[tuple[int, SixNumbers], ...] = ()
+    reference_unverified: bool = False
+    standstill: StandstillRead | None = None
+    visits: tuple[ReferenceRepeated, ...] = ()
+    has_left: bool = False
+    pilots: tuple[PilotTaken, ...] = ()
+    piloted: int = 0
+    probes: tuple[GaugesProbed, ...] = ()
+    tried: bool = False
+
+    @property
+    def closed(self) -> bool:
+        """Whether its reference was read again at the end."""
+        return self.drift_mm is not None
+
+    @property
+    def next_orientation(self) -> int:
+        """The lowest orientation without a record."""
+        taken = {sample.orientation for sample in self.samples}
+        return next(number for number in range(1, len(taken) + 2) if number not in taken)
+
+    def pose(self, orientation: int) -> SixNumbers | None:
+        """The pose of a record taken or to be taken again; None if it is not decided."""
+        found = [sample.pose for sample in self.samples if sample.orientation == orientation]
+        return found[0] if found else dict(self.again).get(orientation)
+
+    def unverified(self) -> SetState:
+        """The same after the gauges were unwatched; a closed set is not affected."""
+        if self.closed or not self.samples:
+            return self
+        return replace(self, reference_unverified=True, probes=(), tried=False)
+
+    def with_sample(self, sample: RecordTaken) -> SetState:
+        """One more record."""
+        again = tuple(pair for pair in self.again if pair[0] != sample.orientation)
+        return replace(self, samples=(*self.samples, sample), again=again, has_left=False)
+
+    def with_visit(self, visit: ReferenceRepeated) -> SetState:
+        """One more visit of the reference."""
+        return replace(self, visits=(*self.visits, visit), has_left=False, piloted=0)
+
+    def with_pilot(self, pilot: PilotTaken) -> SetState:
+        """One more pilot reading."""
+        return replace(self, pilots=(*self.pilots, pilot), piloted=self.piloted + 1)
+
+    def with_rejection(self, orientation: int) -> SetState:
+        """One more rejected record; its orientation is chosen again."""
+        again = tuple(pair for pair in self.again if pair[0] != orientation)
+        return replace(self, rejections=self.rejections + 1, again=again)
+
+    def without(self, orientation: int) -> SetState:
+        """One record less; a closed set is open again with its reference unverified."""
+        kept = tuple(sample for sample in self.samples if sample.orientation != orientation)
+        undone = [(s.orientation, s.pose) for s in self.samples if s.orientation == orientation]
+        less = replace(self, samples=kept, again=(*self.again, *undone), drift_mm=None)
+        return less.unverified() if self.closed else less
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +135,11 @@ class RunState:
         provisional_active: the controller has it now.
         is_in_estop: the controller came into emergency stop, and has not moved since.
         config_write_pending: it is being applied or reverted, and how far that got is unknown.
+        recalled: why the run is to end at the reference of the set in which the robot is.
+        others: the last event of each class that has no field here.
     """
 
-    started: events.RunStarted | None = None
+    started: RunStarted | None = None
     sets: dict[SetKey, SetState] = field(default_factory=dict)
     at_pose: tuple[SetKey, int] | None = None
     target: SixNumbers | None = None
@@ -58,23 +147,45 @@ class RunState:
     path_from_reference: tuple[tuple[int, SixNumbers], ...] = ()
     position_unknown: bool = False
     invalidated: int = 0
-    noise: events.NoiseMeasured | None = None
-    identified: events.Identified | None = None
-    proposed: events.Proposed | None = None
-    committed: events.Committed | None = None
-    confirmation: events.ConfirmationPlanned | None = None
-    judged: events.ResultValidated | None = None
-    accepted: events.ResultAccepted | None = None
+    noise: NoiseMeasured | None = None
+    identified: Identified | None = None
+    proposed: Proposed | None = None
+    committed: Committed | None = None
+    confirmation: ConfirmationPlanned | None = None
+    judged: ResultValidated | None = None
+    accepted: ResultAccepted | None = None
     rolled_back: bool = False
     rolling_back: bool = False
-    provisional: events.ProvisionalApplied | None = None
+    provisional: ProvisionalApplied | None = None
     provisional_active: bool = False
     config_write_pending: bool = False
-    excluded: tuple[events.PoseExcluded, ...] = ()
+    excluded: tuple[PoseExcluded, ...] = ()
     failures: dict[tuple[FailureKind, str], int] = field(default_factory=dict)
     is_in_estop: bool = False
     recalled: str | None = None
-    ended: events.Ended | None = None
+    ended: Ended | None = None
+    others: Mapping[type[BaseEvent], BaseEvent] = field(default_factory=dict)
+
+    def latest(self, kind: type[EventT]) -> EventT | None:
+        """The last event of a class that has no field here; None if there was none."""
+        found = self.others.get(kind)
+        return found if isinstance(found, kind) else None
+
+    def with_latest(self, event: BaseEvent) -> RunState:
+        """The state in which an event is the last of its class."""
+        return replace(self, others={**self.others, type(event): event})
+
+    def with_set(self, key: SetKey, value: SetState) -> RunState:
+        """The state with another content of one set."""
+        return replace(self, sets={**self.sets, key: value})
+
+    def without_position(self) -> RunState:
+        """The state in which nobody knows where the robot is."""
+        return replace(self, at_pose=None, position_unknown=True)
+
+    def unverified(self, but: SetKey | None = None) -> RunState:
+        """The state in which the gauges of all open sets but one may have been moved or switched off."""
+        return replace(self, sets={k: v if k == but else v.unverified() for k, v in self.sets.items()})
 
     @property
     def is_unverified(self) -> bool:
@@ -91,9 +202,9 @@ class RunState:
         """Number of records and closed sets, of which a run is made."""
         return sum(len(measured.samples) + measured.closed for measured in self.sets.values())
 
-    def attempts(self, kind: FailureKind, step: Step | None) -> int:
+    def attempts(self, kind: FailureKind, step: BaseStep | None) -> int:
         """How often a step, or another one of its set, failed in this way."""
-        return self.failures.get((kind, _place_of(step)), 0)
+        return self.failures.get((kind, place_of(step)), 0)
 
     def set(self, key: SetKey) -> SetState:
         """One set; an empty one where nothing was measured yet."""
@@ -109,7 +220,7 @@ class RunState:
         is_checking = first in self.sets and self.judged is None
         return [*self.open_sets, *([first] if is_checking and first not in self.open_sets else [])]
 
-    def zero(self, key: SetKey) -> events.Reading | None:
+    def zero(self, key: SetKey) -> Reading | None:
         """The reading that the deviations of a set are measured from; none before it is taken."""
         of_zero = SetKey(phase=Phase.LENGTH, point=1) if key.phase is Phase.LENGTH else key
         samples = self.set(of_zero).samples
@@ -132,21 +243,21 @@ class RunState:
         zero = self.zero(key)
         return None if zero is None else zero.gauges_mm
 
-    def samples(self, phase: Phase) -> tuple[events.RecordTaken, ...]:
+    def samples(self, phase: Phase) -> tuple[RecordTaken, ...]:
         """All records of a phase, in the order of their points."""
         keys = sorted((key for key in self.sets if key.phase is phase), key=lambda key: key.point)
         return tuple(sample for key in keys for sample in self.sets[key].samples)
 
     def measurements(self) -> MeasurementSet:
         """The records that the geometry is identified from."""
-        return MeasurementSet(tuple(record(sample) for sample in self.samples(Phase.IDENTIFY)))
+        return MeasurementSet(tuple(sample.record for sample in self.samples(Phase.IDENTIFY)))
 
     @property
     def pilots(self) -> tuple[Record, ...]:
         """The pilot records, in the order taken."""
         sets = [(key, measured) for key, measured in self.sets.items() if key.phase is Phase.IDENTIFY]
         return tuple(
-            _pilot_record(pilot, zero)
+            pilot.record(zero)
             for key, measured in sets
             for pilot in measured.pilots
             if (zero := self.zero(key)) is not None
@@ -172,7 +283,7 @@ class RunState:
         """Deviations, mm, at the held-out poses that are measured before and after; no references."""
         return [sample.deviation_mm for sample in self.samples(phase) if self._is_compared(sample)]
 
-    def _is_compared(self, sample: events.RecordTaken) -> bool:
+    def _is_compared(self, sample: RecordTaken) -> bool:
         if sample.orientation == 1 or self.identified is None:
             return sample.orientation > 1
         if not self.refused.allows(sample.pose):
@@ -180,213 +291,16 @@ class RunState:
         return sample.orientation <= len(self.identified.held_out[sample.at.point - 1])
 
 
-def fold(history: Iterable[events.Event]) -> RunState:
+def fold(history: Iterable[BaseEvent]) -> RunState:
     """The state after these events."""
     return reduce(apply, history, RunState())
 
 
-def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0911, PLR0912 - a case an event
+def apply(state: RunState, event: BaseEvent) -> RunState:
     """The state after one more event."""
-    match event:
-        case events.RunStarted():
-            return replace(state, started=event, position_unknown=True)
-        case events.StepBegun(step=Compute(kind="roll back")):
-            return replace(state, rolling_back=True)
-        case events.StepBegun(step=Compute(kind="lend" | "take back")):
-            return replace(state, config_write_pending=True)
-        case events.ProvisionalApplied():
-            applied = replace(state, provisional=event, provisional_active=True, config_write_pending=False)
-            return _without_position(applied)
-        case events.ProvisionalReverted():
-            return _without_position(replace(state, provisional_active=False, config_write_pending=False))
-        case events.Located():
-            return replace(state, at_pose=None, off_plan=True, target=event.pose, position_unknown=False)
-        case events.Arrived():
-            return _unverified(_arrived(state, event), but=event.at)
-        case events.PoseExcluded():
-            return _excluded(state, event)
-        case events.GaugesPlaced():
-            return _with_set(state, event.at, replace(state.set(event.at), placed=True))
-        case events.RecordTaken():
-            return _with_set(state, event.at, state.set(event.at).with_sample(event))
-        case events.RecordRejected():
-            return _rejected(state, event)
-        case events.RecordDiscarded():
-            return _with_set(state, event.at, state.set(event.at).without(event.orientation))
-        case events.ReferenceConfirmed():
-            return _with_set(state, event.at, replace(state.set(event.at), reference_unverified=False))
-        case events.StandstillRead():
-            return _with_set(state, event.at, replace(state.set(event.at), standstill=event))
-        case events.PilotTaken():
-            return _with_set(state, event.at, state.set(event.at).with_pilot(event))
-        case events.ReferenceRepeated():
-            return _with_set(state, event.at, state.set(event.at).with_visit(event))
-        case events.GaugesProbed():
-            probes = (*state.set(event.at).probes, event)
-            return _with_set(state, event.at, replace(state.set(event.at), probes=probes))
-        case events.GaugesTried():
-            return _with_set(state, event.at, replace(state.set(event.at), tried=True, has_left=False))
-        case events.NoiseMeasured():
-            return _noise_measured(state, event)
-        case events.SetClosed():
-            return _with_set(state, event.at, replace(state.set(event.at), drift_mm=event.drift_mm))
-        case events.SetInvalidated():
-            return _invalidated(state, event.at)
-        case events.Identified():
-            return replace(state, identified=event)
-        case events.Proposed():
-            return replace(state, proposed=event)
-        case events.Committed():
-            # The same sliders are another pose under another geometry.
-            return _without_position(replace(state, committed=event))
-        case events.ConfirmationPlanned():
-            return replace(state, confirmation=event)
-        case events.ResultValidated():
-            return replace(state, judged=event)
-        case events.ResultAccepted():
-            return replace(state, accepted=event)
-        case events.RolledBack():
-            return _rolled_back(_without_position(replace(state, rolling_back=False)))
-        case events.Paused(at_once=True):
-            return _unverified(_without_position(state))
-        case events.Tripped(guard=Guard.EMERGENCY_STOP):
-            return replace(state, is_in_estop=True)
-        case events.Failed():
-            return _failed(_without_position(state), event)
-        case events.Interrupted():
-            return _unverified(replace(_without_position(state), failures={}, recalled=None))
-        case events.RunRecalled():
-            return replace(state, recalled=event.reason)
-        case events.Ended():
-            return replace(state, ended=event)
-        case _:
-            return state
+    return event.applied_to(state)
 
 
-def _arrived(state: RunState, event: events.Arrived) -> RunState:
-    is_waypoint = event.orientation == 0
-    if event.orientation != 1 and event.at in state.sets:
-        state = _with_set(state, event.at, replace(state.set(event.at), has_left=True))
-    at_pose = None if is_waypoint else (event.at, event.orientation)
-    return replace(
-        state,
-        at_pose=at_pose,
-        off_plan=is_waypoint,
-        target=event.pose,
-        path_from_reference=_path(state, event),
-        position_unknown=False,
-        is_in_estop=False,
-    )
-
-
-def _excluded(state: RunState, event: events.PoseExcluded) -> RunState:
-    """The robot is where it was; a record that was to be taken again there is chosen anew."""
-    left = replace(state, excluded=(*state.excluded, event), identified=_with_replacements(state, event))
-    if event.at not in state.sets:
-        return left
-    measured = state.set(event.at)
-    again = tuple(pair for pair in measured.again if pair[1] != event.pose)
-    return _with_set(left, event.at, replace(measured, again=again))
-
-
-def _with_replacements(state: RunState, event: events.PoseExcluded) -> events.Identified | None:
-    """The identification with other held-out poses in the place of those that cannot be commanded."""
-    found, place = state.identified, dict(event.replacements)
-    if found is None or not place:
-        return found
-    lists = {
-        name: tuple(tuple(place.get(pose, pose) for pose in poses) for poses in getattr(found, name))
-        for name in ("held_out", "held_out_after")
-    }
-    return found.model_copy(update=lists)
-
-
-def _noise_measured(state: RunState, event: events.NoiseMeasured) -> RunState:
-    """The reference is recorded again where later records are means of more windows."""
-    measured = state.set(event.at)
-    again = () if event.noise.windows > 1 else measured.samples
-    return _with_set(replace(state, noise=event), event.at, replace(measured, samples=again))
-
-
-def _rejected(state: RunState, event: events.RecordRejected) -> RunState:
-    """At the pose the ball was outside the travel; before it, a guard stopped the robot on the way."""
-    rejected = state.set(event.at).with_rejection(event.orientation)
-    is_on_the_way = event.at.phase.has_new_geometry and state.at_pose != (event.at, event.orientation)
-    left = _without_position(state) if is_on_the_way else replace(state, at_pose=None)
-    # With the new geometry it may be a verdict, so it is verified first that the gauges are as they were.
-    is_verified = not event.at.phase.has_new_geometry or rejected.rejections > 1
-    return _with_set(left, event.at, rejected if is_verified else rejected.unverified())
-
-
-def _invalidated(state: RunState, at: SetKey) -> RunState:
-    """Without a set; a mounting of a length check whose zero is in doubt takes all of them with it."""
-    takes_all = at.phase is Phase.LENGTH and bool(state.set(at).samples)
-    lost = {key for key in state.sets if key == at or (takes_all and key.phase is Phase.LENGTH)}
-    kept = {key: value for key, value in state.sets.items() if key not in lost}
-    return replace(state, sets=kept, at_pose=None, invalidated=state.invalidated + 1)
-
-
-def _path(state: RunState, event: events.Arrived) -> tuple[tuple[int, SixNumbers], ...]:
-    """The path without loops; empty if the robot did not start from its end."""
-    poses = [pose for _, pose in state.path_from_reference]
-    if event.orientation == 1:
-        return ((1, event.pose),)
-    if event.pose in poses:
-        return state.path_from_reference[: poses.index(event.pose) + 1]
-    is_at_its_end = not state.position_unknown and bool(poses) and state.target == poses[-1]
-    return (*state.path_from_reference, (event.orientation, event.pose)) if is_at_its_end else ()
-
-
-def _without_position(state: RunState) -> RunState:
-    return replace(state, at_pose=None, position_unknown=True)
-
-
-def _unverified(state: RunState, but: SetKey | None = None) -> RunState:
-    """All open sets but one become unverified: gauges are carried away, slip, or are switched off."""
-    return replace(state, sets={k: v if k == but else v.unverified() for k, v in state.sets.items()})
-
-
-def _failed(state: RunState, event: events.Failed) -> RunState:
-    where = (event.failure, _place_of(event.step))
-    counted = replace(state, failures={**state.failures, where: event.attempt})
-    is_off_plate = event.failure is FailureKind.GAUGE_AT_END and event.action is not Action.REDO_SET
-    match event.step:
-        # The ball left its plate on the move to a chosen pose: another pose is chosen.
-        case Move(at=at, orientation=orientation) if is_off_plate and at.phase is Phase.IDENTIFY:
-            counted = _with_set(counted, at, counted.set(at).with_rejection(orientation))
-    return _unverified(counted) if event.action is Action.MEASURE_AGAIN else counted
-
-
-def _rolled_back(state: RunState) -> RunState:
-    """Without a verdict the proposal is open again, and the sets measured after it do not count."""
-    if state.judged is not None:
-        return replace(state, rolled_back=True)
-    kept = {key: value for key, value in state.sets.items() if not key.phase.has_new_geometry}
-    return replace(state, committed=None, confirmation=None, sets=kept)
-
-
-def _place_of(step: Step | None) -> str:
+def place_of(step: BaseStep | None) -> str:
     """Where failures are counted: the set of a step, or the key of a step that belongs to none."""
-    if step is None:
-        return "deciding"
-    return str(step.at) if isinstance(step, StepOfSet) else step.key
-
-
-def _with_set(state: RunState, key: SetKey, value: SetState) -> RunState:
-    return replace(state, sets={**state.sets, key: value})
-
-
-def _pilot_record(pilot: events.PilotTaken, zero: events.Reading) -> Record:
-    deviation = deviation_of(np.subtract(pilot.reading.gauges_mm, zero.gauges_mm))
-    return Record(pilot.at.point, pilot.orientation, Pose(*pilot.pose), pilot.reading.joints, deviation)
-
-
-def record(sample: events.RecordTaken) -> Record:
-    """The record for the identification."""
-    return Record(
-        sample.at.point,
-        sample.orientation,
-        Pose(*sample.pose),
-        sample.reading.joints,
-        sample.deviation_mm,
-    )
+    return "deciding" if step is None else step.place

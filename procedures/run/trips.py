@@ -113,3 +113,18 @@ def causes_of(error: HexacellError) -> list[HexacellError]:
     for one in flatten_errors(error):
         found += one.trip.causes if isinstance(one, GuardTripped) and one.trip.causes else (one,)
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class WatchedSet:
+    """What the gauges of a set must show during a move within it.
+
+    Attributes:
+        zero_mm: what they showed along base x, y, z when they were zeroed; None before that.
+        is_watched: whether they stay around the ball; otherwise their readings are not used.
+        moved_mm: by how much the ball surely moves along x, y, z; None where nothing is expected.
+    """
+
+    zero_mm: tuple[float, float, float] | None
+    is_watched: bool
+    moved_mm: tuple[float, ...] | None = None

@@ -46,12 +46,13 @@ from hexacell.verdict.acceptance_gates import gates
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.outcome import outcome_line
 from hexacell.verdict.verification import verify
-from procedures.calibration.workflow import Calibration, Mode
+from procedures.calibration.calibration import Calibration, Mode
 from procedures.journal import line_format
 from procedures.journal.line_format import Entry, encode
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
+from procedures.run.readings import Reading
 from procedures.run.state import RunState, apply, fold
-from procedures.run.steps import Phase, SetKey
+from procedures.steps import events
 from tests.benchmarks.virtual_calibration import measured_held_out
 from tests.small_cell import FEW_CHOICES, SMALL, changed, few_candidates, write_small_cell
 
@@ -270,7 +271,7 @@ class VirtualNight:
     def _checked(self, measured: MeasurementSet) -> events.ResultValidated:
         calibration = self.calibration
         effects = calibration.robot.effects
-        found = check_result(calibration.check, measured, calibration.accepted, effects)
+        found = check_result(calibration.at_start.check, measured, calibration.accepted, effects)
         return events.ResultValidated(verdict=found.verdict, line=check_line(found), check=found)
 
     def _calibrated(
@@ -305,7 +306,7 @@ class VirtualNight:
         committed = events.Committed(approved_by="the cell file: within its limits")
         yield committed
         state = fold_on(state, identified, proposed, committed)
-        after = calibration.written_robot(state)
+        after = calibration.known(state).written_robot(state)
         held_out = measured_held_out(settings, found, after, VirtualRobot(after, self.truth, random))
         verified = verify(settings, after, found, held_out)
         line = outcome_line(result, len(found.free), verified)
@@ -322,12 +323,13 @@ def fold_on(state: RunState, *further: events.Event) -> RunState:
 
 
 def taken(record: Record) -> events.RecordTaken:
-    reading = events.Reading(
+    reading = Reading(
         gauges_mm=record.deviation,
         spread_mm=(0.0, 0.0, 0.0),
         joints=record.joints,
         answers=(),
         counts=((0,) * 6,),
+        skews_s=(),
         temperatures=(),
     )
     return events.RecordTaken(

@@ -23,8 +23,11 @@ from hexacell.run_process.run_socket import socket_path
 from hexacell.run_process.snapshots import LiveSnapshot
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.journal.journal import read_entries
-from procedures.run import events
-from procedures.run.steps import Compute, Move, Sample
+from procedures.steps import events
+from procedures.steps.identify import Identify
+from procedures.steps.judge import Judge
+from procedures.steps.move import Move
+from procedures.steps.sample import Sample
 from tests.cli.test_host import hosts_of
 from tests.waiting import until
 
@@ -65,8 +68,8 @@ STAGES: dict[str, Callable[[HostMessage], bool]] = {
     "connecting": lambda _: True,
     "moving": is_step(Move),
     "taking a record": is_step(Sample),
-    "identifying": is_step(Compute, "identify"),
-    "judging": is_step(Compute, "judge"),
+    "identifying": is_step(Identify),
+    "judging": is_step(Judge),
 }
 
 
@@ -88,7 +91,7 @@ async def test_leaving_leaves_nothing_within_half_a_second(cell, say, stage: str
 async def test_attaching_shows_a_running_run_at_once(cell, say) -> None:
     first = await begun(cell)
     async for message in first.messages():
-        if is_step(Compute, "identify")(message):
+        if is_step(Identify)(message):
             break
     begin = time.perf_counter()
     second = await connect_to_run(socket_path(cell))

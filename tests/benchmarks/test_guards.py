@@ -28,13 +28,15 @@ from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.pose import Pose
 from hexacell.services.devices.device_setup import devices_of
 from procedures.devices.device_set import Devices
 from procedures.guards.guards import Guards
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
+from procedures.run.readings import Reading
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Move, Phase, SetKey
-from procedures.run.trips import Guard, GuardTripped
+from procedures.run.trips import Guard, GuardTripped, WatchedSet
+from procedures.steps import events
 from tests.injection_times import injection_times
 from tests.native_config import NATIVE
 
@@ -69,9 +71,10 @@ class Watched:
     state: RunState
 
     async def slow_move(self, orientation: int) -> None:
-        step = Move(at=P1, orientation=orientation, pose=(0.0, 0.0, 550.0, 0.0, 0.0, 2.0 * orientation))
+        watched = WatchedSet(self.state.zero_shown(P1), is_watched=True)
+        target = Pose(0.0, 0.0, 550.0, 0.0, 0.0, 2.0 * orientation)
         await self.guards.move(
-            step, self.state, 1.3, lambda: np.array(self.simulated.physics.encoder_positions())
+            target, 1.3, watched, lambda: np.array(self.simulated.physics.encoder_positions())
         )
 
 
@@ -129,12 +132,13 @@ async def reference(devices: Devices) -> RunState:
     on_axes = [0.0, 0.0, 0.0]
     for mounted, answer in zip(devices.gauges, shown, strict=True):
         on_axes[mounted.axis.index] = mounted.axis.coordinate(answer.value_mm)
-    reading = events.Reading(
+    reading = Reading(
         gauges_mm=(on_axes[0], on_axes[1], on_axes[2]),
         spread_mm=(0.0, 0.0, 0.0),
         joints=(0.0,) * 6,
         answers=(),
         counts=(),
+        skews_s=(),
     )
     pose = (0.0, 0.0, 550.0, 0.0, 0.0, 0.0)
     zero = (0.0, 0.0, 0.0)

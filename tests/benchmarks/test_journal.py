@@ -14,9 +14,10 @@ import pytest
 from procedures.journal import line_format
 from procedures.journal.journal import Journal, read_journal
 from procedures.journal.line_format import Entry, encode
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
+from procedures.run.readings import Reading
 from procedures.run.state import fold
-from procedures.run.steps import Phase, SetKey
+from procedures.steps import events
 
 RECORDS = 10_000
 APPENDED = 400
@@ -27,12 +28,13 @@ WINDOW = 7
 def sampled(number: int, per_set: int) -> events.RecordTaken:
     """A record such as a run has, in a set of ``per_set``."""
     value = number / 7
-    reading = events.Reading(
+    reading = Reading(
         gauges_mm=(0.123, 1.2345, value),
         spread_mm=(0.001, 0.002, 0.003),
         joints=(value, 2 * value, 3 * value, 4 * value, 5 * value, 6 * value),
         answers=(("+1.234\r", "01A+00001.234\r", "1.234\r"),) * WINDOW,
         counts=((123456, 123457, 123458, -123459, 123460, 123461),) * WINDOW,
+        skews_s=(0.002,) * WINDOW,
     )
     place, orientation = divmod(number, per_set)
     return events.RecordTaken(

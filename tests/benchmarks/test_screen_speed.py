@@ -25,7 +25,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.run_process.client import connect_to_run
 from hexacell.run_process.run_socket import socket_path
 from procedures.journal.journal import read_journal
-from procedures.run import events
+from procedures.steps import events
 from tests.benchmarks.conftest import Say
 from tests.waiting import wait_until
 

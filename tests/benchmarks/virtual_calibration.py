@@ -23,7 +23,7 @@ from hexacell.robot.model import Robot, make_robot
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
 from hexacell.verdict.verification import HeldOut, Verification, verify
 from procedures.calibration.held_out_poses import HeldOutPoses
-from procedures.run.steps import SixNumbers
+from procedures.run.keys import SixNumbers
 
 HELD_OUT_FROM, AFTER_FROM, CONFIRMING_FROM = 100, 200, 300
 """Points of the held-out records before and after, and of the confirming ones: of no other records."""

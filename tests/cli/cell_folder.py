@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hexacell.config.write_record import RECORDS
 from procedures.journal.journal import Journal, read_journal
-from procedures.run import events
+from procedures.steps import events
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CELL = "simulated-hexaglide.toml"

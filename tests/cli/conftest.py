@@ -14,7 +14,7 @@ import pytest
 from hexacell.cli.app import main
 from hexacell.services import search_effort
 from procedures.journal.journal import read_journal
-from procedures.run import events
+from procedures.steps import events
 from tests.cli.cell_folder import QUICK, SHORT, CellFolder, copy_cell
 from tests.cli.commands import Outcome, Start, run_command, started_in
 from tests.cli.terminal import Terminal

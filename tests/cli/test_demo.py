@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from hexacell.runs.cell_lock import cell_lock
-from procedures.run import events
-from procedures.run.steps import Phase
+from procedures.run.keys import Phase
+from procedures.steps import events
 
 # An independent reading of TOML, good enough for a config: what is text, remark, number, or neither.
 TOKEN = re.compile(

@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.robot.model import robot_of
-from procedures.run import events
+from procedures.steps import events
 from tests.cli.commands import run_command
 from tests.cli.conftest import Demo
 

@@ -23,9 +23,9 @@ from hexacell.run_process.run_socket import socket_path
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.engine.command_loop import Status
+from procedures.engine.commands import Resume
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.commands import Resume
+from procedures.steps import events
 from tests.waiting import until, wait_until
 
 NOON = datetime(2026, 11, 20, 12, 0, tzinfo=UTC)

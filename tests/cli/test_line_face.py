@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 
 from procedures.journal.journal import read_journal
-from procedures.run import events
+from procedures.steps import events
 from tests.cli.cell_folder import ASK, BY_HAND
 from tests.cli.commands import Process
 from tests.cli.terminal import ended, start_at

@@ -14,7 +14,7 @@ from hexacell.services.run.calibration_run import RunRequest
 from hexacell.text.run import NOT_REPEATED_ALARM, REPEATED, REPEATED_ALARM
 from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import Journal
-from procedures.run import events
+from procedures.steps import events
 
 ALARM: dict[str, Any] = {
     "records": 8, "limit": 3.5, "leg": 4, "parameter": "l4", "unit": "mm", "change": 0.05, "sigma": 0.01,

@@ -9,7 +9,7 @@ import pytest
 from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode
-from procedures.run import events
+from procedures.steps import events
 
 
 @pytest.fixture

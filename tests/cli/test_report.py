@@ -12,7 +12,7 @@ import pytest
 
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode
-from procedures.run import events
+from procedures.steps import events
 from tests.mutations.journals import with_checksum
 
 CHAPTERS = [

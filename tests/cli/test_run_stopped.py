@@ -16,8 +16,8 @@ from collections import Counter
 import pytest
 
 from procedures.journal.journal import read_entries, read_journal
-from procedures.run import events
-from procedures.run.steps import Phase
+from procedures.run.keys import Phase
+from procedures.steps import events
 from tests.signals import terminal_signals
 
 STEPS_TO_STOP = 2  # that begin at most after a signal: it ends a run of dozens between two steps

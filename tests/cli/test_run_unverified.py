@@ -11,14 +11,14 @@ from hexacell.errors import CellBusy
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.run.calibration_run import RunRequest
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
+from procedures.engine.commands import UnattendedOperator
 from procedures.journal.journal import Journal
-from procedures.run import events
-from procedures.run.questions import UnattendedOperator
-from procedures.run.steps import Compute
+from procedures.steps import events
+from procedures.steps.roll_back import RollBack
 
 COMMITTED = events.Committed(approved_by="a tester")
-WITHDRAWN = [events.StepBegun(step=Compute(kind="roll back")), events.RolledBack()]
+WITHDRAWN = [events.StepBegun(step=RollBack()), events.RolledBack()]
 UNVERIFIED = "The controller's config holds the new geometry, which is not verified yet"
 
 

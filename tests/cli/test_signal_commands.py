@@ -13,8 +13,8 @@ import pytest
 from hexacell.cli.console import Console
 from hexacell.cli.signal_commands import ENDING_SIGNALS, SignalCommands
 from hexacell.errors import Interruption
+from procedures.engine.commands import Abort, Command, Stop
 from procedures.run.cancellation import shielded
-from procedures.run.commands import Abort, Command, Stop
 from tests.signals import terminal_signals
 
 

@@ -17,9 +17,9 @@ import pytest
 
 from hexacell.config.receipt import AFTER
 from hexacell.runs.run_folder import RunFolder
-from procedures.engine.config_edits import PROVISIONAL_FOLDER
 from procedures.journal.journal import read_journal
-from procedures.run import events
+from procedures.resources.config_changes import PROVISIONAL_FOLDER
+from procedures.steps import events
 from tests.faults.cell import MEASURED, NEVER_GOOD_ENOUGH, PROVISIONAL, Site, make_site
 from tests.faults.driver import UNEXPECTED, Order
 from tests.faults.interception import Call

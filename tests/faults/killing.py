@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from procedures.journal.journal import read_journal
-from procedures.run import events
+from procedures.steps import events
 from tests.faults.cell import Site
 from tests.faults.matrix import step_of
 from tests.faults.promises import require_tidy, require_valid, whole_lines

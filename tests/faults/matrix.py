@@ -7,23 +7,20 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import astuple, dataclass
 
-from procedures.run import events
-from procedures.run.steps import (
-    CloseSet,
-    Compute,
-    Locate,
-    Move,
-    Phase,
-    Pilot,
-    Place,
-    Probe,
-    Repeat,
-    Revisit,
-    Sample,
-    Standstill,
-    Step,
-    Try,
-)
+from procedures.run.keys import Phase
+from procedures.steps import events
+from procedures.steps.base import StepOfSet, StepWithoutMotion
+from procedures.steps.locate import Locate
+from procedures.steps.move import Move
+from procedures.steps.pilot import Pilot
+from procedures.steps.place import Place
+from procedures.steps.probe import Probe
+from procedures.steps.registry import Step
+from procedures.steps.repeat import Repeat
+from procedures.steps.revisit import Revisit
+from procedures.steps.sample import Sample
+from procedures.steps.standstill import Standstill
+from procedures.steps.try_gauges import Try
 
 PROPERTY = "fault-matrix"
 STEPS = (
@@ -97,17 +94,15 @@ def _name(step: Step) -> str:
     match step:
         case Locate():
             return "locating"
-        case Compute():
+        case StepWithoutMotion():
             return COMPUTING[step.kind]
-        case _ if step.at.phase is not Phase.IDENTIFY:
-            return OF_PHASES[step.at.phase]
+        case StepOfSet(at=at) if at.phase is not Phase.IDENTIFY:
+            return OF_PHASES[at.phase]
         case _:
             return _of_a_set(step)
 
 
-def _of_a_set(  # noqa: PLR0911 - a case a step
-    step: Move | Place | Sample | Revisit | CloseSet | Standstill | Pilot | Repeat | Probe | Try,
-) -> str:
+def _of_a_set(step: Step) -> str:  # noqa: PLR0911 - a case a step
     match step:
         case Standstill() | Pilot() | Repeat():
             return "measuring noise"
@@ -121,7 +116,7 @@ def _of_a_set(  # noqa: PLR0911 - a case a step
             return "placing"
         case Revisit():
             return "revisiting"
-        case CloseSet():
+        case _:
             return "closing"
 
 

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.runs.run_folder import RunFolder
 from procedures.journal.journal import read_journal
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Phase, SetKey
+from procedures.steps import events
 from tests.faults.cell import HELD_OUT_ORIENTATIONS, ORIENTATIONS, POINTS, Site
 
 

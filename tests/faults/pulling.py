@@ -6,7 +6,7 @@ from typing import Any
 
 from drivers.simulated import cell as simulated_cell
 from procedures.journal import journal
-from procedures.run import events
+from procedures.steps import events
 from tests.faults.matrix import step_of
 
 DEVICES = ("gauge x", "gauge y", "gauge z", "encoder 3", "all encoders", "controller")

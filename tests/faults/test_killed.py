@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from procedures.run import events
+from procedures.steps import events
 from tests.faults.killing import KILLED, after, finish, history_of, places, within
 from tests.faults.matrix import step_of
 from tests.faults.promises import require_identical

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from procedures.run import events
+from procedures.steps import events
 from tests.faults.cell import Site
 from tests.faults.killing import KILLED, after, finish, history_of, places
 from tests.faults.matrix import STEPS

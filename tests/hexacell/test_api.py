@@ -49,7 +49,7 @@ def test_what_is_no_run_is_refused(tmp_path) -> None:
         api.reported_run(tmp_path)
 
 
-EVENTS = {"procedures.run.events", "procedures.steps"}
+EVENTS = {"procedures.steps.events", "procedures.steps"}
 HEAVY = {"textual", "matplotlib", "sqlalchemy", "canopen", "rich", *EVENTS}
 FIT = """
 from pathlib import Path

@@ -19,7 +19,7 @@ from hexacell.cell.operation import NotificationSettings, OpcUaSettings, ReportS
 from hexacell.cli.app import main
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode
-from procedures.run import events
+from procedures.steps import events
 from tests.mutations.trials import CELL, CONFIG, RECORDS, RUN, Templates
 from tests.small_cell import SMALL, changed, choose_among_few
 

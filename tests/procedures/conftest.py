@@ -16,8 +16,8 @@ import pytest
 
 from hexacell.config.change import ConfigChange
 from hexacell.config.write_back import commit
-from procedures.run import events
-from procedures.run.steps import Phase, SetKey
+from procedures.run.keys import Phase, SetKey
+from procedures.steps import events
 from tests.made_once import made_once
 from tests.procedures.fakes import Bench
 from tests.procedures.rig import MakeRig, Recording, Rig, new_rig

@@ -22,13 +22,13 @@ from hexacell.results.result import AcceptedResult
 from hexacell.robot.model import robot_of
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.run.calibration_run import run_started
-from procedures.calibration.workflow import Calibration, Mode
+from procedures.calibration.calibration import Calibration, Mode
+from procedures.engine.commands import QuestionBroker
 from procedures.engine.engine import Engine, Listener
 from procedures.engine.recovery import GIVE_UP, RecoveryPolicy
 from procedures.engine.step_executor import StepExecutor
 from procedures.journal.journal import Journal
-from procedures.run import events
-from procedures.run.questions import QuestionBroker
+from procedures.steps import events
 from tests.native_config import NATIVE
 from tests.procedures.fakes import Approver, Bench
 from tests.small_cell import FEW_CHOICES, SMALL, changed, history_until

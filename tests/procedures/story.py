@@ -3,11 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from procedures.run import events
-from procedures.run.steps import SetKey, SixNumbers, ThreeNumbers
+from procedures.run.keys import SetKey, SixNumbers, ThreeNumbers
+from procedures.run.readings import Reading
+from procedures.run.state import RunState
+from procedures.steps import events
+from procedures.workflow import next_step as workflow
 
 NOTHING_IS_ZERO = (0.0, 0.0, 0.0)
+READING = Reading(
+    gauges_mm=NOTHING_IS_ZERO,
+    spread_mm=NOTHING_IS_ZERO,
+    joints=(0.0,) * 6,
+    answers=(),
+    counts=(),
+    skews_s=(),
+)
+
+
+def next_step(calibration: Any, state: RunState) -> Any:
+    """The next step, of whatever kind."""
+    return workflow.next_step(calibration, state)
+
+
+def located(pose: SixNumbers) -> events.Located:
+    return events.Located(pose=pose, joints=(0.0,) * 6, encoders=(0.0,) * 6)
 
 
 @dataclass(frozen=True)
@@ -29,8 +50,13 @@ class Story:
         deviation: ThreeNumbers = NOTHING_IS_ZERO,
         pose: SixNumbers | None = None,
     ) -> events.Event:
-        reading = events.Reading(
-            gauges_mm=deviation, spread_mm=NOTHING_IS_ZERO, joints=(0.0,) * 6, answers=(), counts=()
+        reading = Reading(
+            gauges_mm=deviation,
+            spread_mm=NOTHING_IS_ZERO,
+            joints=(0.0,) * 6,
+            answers=(),
+            counts=(),
+            skews_s=(),
         )
         where = self.arrived(orientation, pose).model_dump(exclude={"kind"})
         return events.RecordTaken(**where, reading=reading, deviation_mm=deviation)
@@ -45,13 +71,13 @@ class Story:
         return events.PoseExcluded(**where, reason="would exceed joint 3's positive limit")
 
     def closed(self) -> events.Event:
-        return events.SetClosed(at=self.key, drift_mm=NOTHING_IS_ZERO)
+        return events.SetClosed(at=self.key, drift_mm=NOTHING_IS_ZERO, reading=READING)
 
     def undone(self, orientation: int) -> events.Event:
         return events.RecordDiscarded(at=self.key, orientation=orientation)
 
     def confirmed(self) -> events.Event:
-        return events.ReferenceConfirmed(at=self.key, change_mm=NOTHING_IS_ZERO)
+        return events.ReferenceConfirmed(at=self.key, change_mm=NOTHING_IS_ZERO, reading=READING)
 
     def voided(self) -> events.Event:
         return events.SetInvalidated(at=self.key, reason="interrupted")

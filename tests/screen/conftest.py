@@ -19,7 +19,7 @@ from hexacell.screen.app import TechnicianApp
 from hexacell.screen.key_map import ScreenPreferences
 from hexacell.screen.session import ScreenSession
 from hexacell.screen.widgets.text_panel import TextList
-from procedures.run.events import Event
+from procedures.steps.events import Event
 from tests.screen.drawing import is_all_drawn
 from tests.screen.told_run import ToldWorkplace
 from tests.waiting import until

@@ -17,8 +17,8 @@ from hexacell.screen.assistant_screen import AssistantScreen
 from hexacell.screen.overlays.question_overlay import QuestionOverlay
 from hexacell.screen.overlays.quit_overlay import QuitOverlay
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from procedures.run import events
 from procedures.run.questions import ask_approval
+from procedures.steps import events
 from tests.screen.conftest import Opened, settled
 from tests.screen.test_job import press, shown, until_shown, workplace_of
 from tests.screen.test_plan_screen import tried

@@ -20,11 +20,11 @@ from hexacell.screen.workplace import Preflight
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.command_loop import Status
-from procedures.run import events
-from procedures.run.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo
+from procedures.engine.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo
+from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import PLACED, ask_approval, ask_placement, ask_recovery, ask_startup
-from procedures.run.steps import Phase, SetKey
 from procedures.run.trips import Guard
+from procedures.steps import events
 from tests.screen.conftest import Opened, settled
 from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot
 from tests.waiting import until

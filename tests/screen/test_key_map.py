@@ -9,8 +9,8 @@ import pytest
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError
 from hexacell.screen.key_map import KEYS, ScreenPreferences, preferences_path, read_preferences
-from procedures.run.commands import Pause
-from procedures.run.events import Event
+from procedures.engine.commands import Pause
+from procedures.steps.events import Event
 from tests.screen.conftest import Opened, settled
 from tests.screen.told_run import ToldRun, ToldWorkplace
 from tests.waiting import until

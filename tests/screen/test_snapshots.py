@@ -21,10 +21,10 @@ from hexacell.screen.workplace import Preflight, TriedPlan
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.command_loop import Status
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import ask_approval, ask_placement
-from procedures.run.steps import Phase, SetKey
 from procedures.run.trips import Guard
+from procedures.steps import events
 from tests.screen.conftest import SNAPSHOTS, UPDATE, Opened, compare_with_snapshot, settled
 from tests.screen.test_job import until_shown
 from tests.screen.test_plan_screen import tried

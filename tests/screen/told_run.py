@@ -29,9 +29,9 @@ from hexacell.run_process.snapshots import (
 from hexacell.screen.workplace import Preflight, TriedPlan
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
 from procedures.engine.command_loop import Status
-from procedures.run.commands import Command
-from procedures.run.events import Event
+from procedures.engine.commands import Command
 from procedures.run.questions import Question
+from procedures.steps.events import Event
 
 BEGUN = datetime(2026, 3, 2, 8, 0, tzinfo=UTC)
 

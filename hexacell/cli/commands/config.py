@@ -18,7 +18,7 @@ from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, read_proposal
 from hexacell.text.config_changes import applied_text, rollback_text, versions_text
 from hexacell.text.documents import applied_document, rollback_document
-from procedures.run.questions import UnattendedOperator
+from procedures.engine.commands import UnattendedOperator
 
 
 def apply_run(options: argparse.Namespace) -> ExitCode:

@@ -23,7 +23,7 @@ from hexacell.run_process.messages import message_line
 from hexacell.run_process.run_socket import listening_socket, socket_path
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.run.calibration_run import RunRequest
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 
 
 def main(options: argparse.Namespace) -> ExitCode:

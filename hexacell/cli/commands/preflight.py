@@ -15,7 +15,7 @@ from hexacell.services.run.calibration_run import new_calibration, preflight
 from hexacell.text.documents import preflight_document, quick_preflight_document
 from hexacell.text.layout import wrapped
 from hexacell.text.planning import plan_trial_lines, preflight_lines, quick_trial_text
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 
 MISSING = (PortLost, GaugeSilent, WrongAnswer, BusError, SilentNodeError, ConnectionLost)
 SEARCH = (
@@ -38,7 +38,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     for line in preflight_lines(devices):
         console.print(wrapped(line, indent=6))
     if mode is Mode.QUICK:
-        tried = try_quick_level(new_calibration(cell, mode).quick)
+        tried = try_quick_level(new_calibration(cell, mode).at_start.quick)
         console.document(quick_preflight_document(devices, tried))
         console.print(wrapped(quick_trial_text(tried)))
         return ExitCode.DONE

@@ -45,15 +45,13 @@ from hexacell.text.run import (
     demo_opening,
     resume_hint,
 )
-from procedures.calibration.expected_records import expected_records
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode, expected_records
+from procedures.engine.commands import CommandQueue, UnattendedOperator
 from procedures.engine.engine import Listener
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.commands import CommandQueue
-from procedures.run.questions import UnattendedOperator
 from procedures.run.state import fold
 from procedures.run.trips import may_still_move
+from procedures.steps import events
 
 
 def main(options: argparse.Namespace) -> ExitCode:

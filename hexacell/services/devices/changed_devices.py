@@ -15,7 +15,7 @@ from hexacell.cell.loader import Cell
 from hexacell.errors import HexacellError
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.journal.line_format import decode
-from procedures.run import events
+from procedures.steps import events
 
 COMPARED = {
     "protocol": "protocol",

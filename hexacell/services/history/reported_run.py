@@ -19,8 +19,8 @@ from hexacell.services.recorded.journal_soundness import require_sound
 from hexacell.services.recorded.recorded_robot import geometry_before
 from hexacell.storage import atomic_files
 from procedures.journal.journal import read_entries
-from procedures.run import events
 from procedures.run.state import RunState
+from procedures.steps import events
 
 FINGERPRINTED = (JOURNAL, CELL_FILE, MEASUREMENTS, RESULT, BEFORE, AFTER)
 """Files of a run folder that the report vouches for, where they are there; of a config every file."""

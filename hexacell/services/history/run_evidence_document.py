@@ -16,11 +16,11 @@ from hexacell.runs.run_folder import RunFolder
 from hexacell.services.history.run_index import EvidenceDocument
 from hexacell.services.recorded.journal_soundness import require_sound
 from hexacell.services.recorded.recorded_robot import started_robot
-from procedures.calibration.workflow import Calibration, Mode
+from procedures.calibration.calibration import Calibration, Mode
 from procedures.journal.journal import read_entries
+from procedures.run.keys import Phase
 from procedures.run.leg_temperatures import legs_warmer, mean_temperature
-from procedures.run.state import RunState, record
-from procedures.run.steps import Phase
+from procedures.run.state import RunState
 
 REFERENCE_C = 20.0
 """Temperature at which legs with thermometers have the lengths that runs are compared by, deg C."""
@@ -45,16 +45,17 @@ def evidence_document(settings: CellSettings, folder: RunFolder) -> EvidenceDocu
         )
         if not samples:
             return None
-        warmer = legs_warmer(settings.thermometers, samples, [REFERENCE_C] * LEGS)
+        readings = [one.reading for one in samples]
+        warmer = legs_warmer(settings.thermometers, readings, [REFERENCE_C] * LEGS)
         geometry = settings.mechanism.convention.geometry(free)
         expansion = leg_expansion(geometry, settings.uncertainty.expansion_legs_um_m_k, warmer)
         if np.isnan(expansion).any():
             return None
-        measurements = MeasurementSet(tuple(map(record, samples)))
+        measurements = MeasurementSet(tuple(one.record for one in samples))
         records = machine_records(calibration.robot_of(state), measurements, free, expansion)
     except (HexacellError, np.linalg.LinAlgError):  # records that fit no robot near this one
         return None
-    return EvidenceDocument.of(entries[-1].at, mean_temperature(samples), len(free), records.evidence)
+    return EvidenceDocument.of(entries[-1].at, mean_temperature(readings), len(free), records.evidence)
 
 
 def _counted(

@@ -13,8 +13,8 @@ from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import VerifiedAccuracy
 from procedures.journal.journal import read_entries, read_journal
 from procedures.journal.line_format import Entry
-from procedures.run import events
 from procedures.run.state import RunState, fold
+from procedures.steps import events
 
 
 def run_summary(folder: RunFolder) -> RunSummary:

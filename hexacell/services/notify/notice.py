@@ -18,8 +18,8 @@ from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.services.schedule.unattended_runs import raised_alarm
 from hexacell.verdict.decision import Verdict
-from procedures.run import events
 from procedures.run.state import RunState
+from procedures.steps import events
 
 
 class Notice(Frozen):

@@ -25,9 +25,14 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import AXES
 from procedures.journal.line_format import RESTORE
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, apply
-from procedures.run.steps import Move, Phase, Pilot, Place, Sample, SetKey, StepOfSet
+from procedures.steps import events
+from procedures.steps.base import StepOfSet
+from procedures.steps.move import Move
+from procedures.steps.pilot import Pilot
+from procedures.steps.place import Place
+from procedures.steps.sample import Sample
 
 LARGEST_COUNT = 2**63 - 1
 LARGEST_VARIANCE = 1e12

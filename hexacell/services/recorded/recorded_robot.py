@@ -12,8 +12,8 @@ from hexacell.robot.model import Robot, robot_of_start
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.recorded.journal_soundness import require_sound
 from procedures.journal.journal import read_journal
-from procedures.run.events import RunStarted
 from procedures.run.state import RunState
+from procedures.steps.events import RunStarted
 
 
 def started_robot(settings: CellSettings, started: RunStarted) -> Robot:

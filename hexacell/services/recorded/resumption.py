@@ -26,12 +26,12 @@ from hexacell.robot.model import Robot, controller_geometry
 from hexacell.robot.stated_limits import stated_limits
 from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
 from hexacell.services.recorded.recorded_robot import started_robot
-from procedures.engine.config_edits import PROVISIONAL_FOLDER
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import RESTORE
-from procedures.run import events
+from procedures.resources.config_changes import PROVISIONAL_FOLDER
+from procedures.run.keys import SixNumbers
 from procedures.run.state import RunState
-from procedures.run.steps import SixNumbers
+from procedures.steps import events
 
 LATEST = "latest"
 """Stands for the name of the run that was interrupted last."""

@@ -20,12 +20,12 @@ from hexacell.services.recorded.recorded_robot import started_robot
 from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import with_measured_scale
-from procedures.calibration.workflow import Calibration, Mode
+from procedures.calibration.calibration import Calibration, Mode
 from procedures.journal.journal import read_entries
-from procedures.run import events
+from procedures.run.keys import Phase
 from procedures.run.leg_temperatures import mean_leg_temperatures
 from procedures.run.state import RunState
-from procedures.run.steps import Phase
+from procedures.steps import events
 
 
 def last_accepted_result(cell: Cell) -> AcceptedResult | None:
@@ -96,7 +96,8 @@ def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
         effects=_effects(cell, accepted.state),
         length=_length(accepted.state),
         leg_temperatures_c=mean_leg_temperatures(
-            cell.settings.thermometers, accepted.state.samples(Phase.IDENTIFY)
+            cell.settings.thermometers,
+            [sample.reading for sample in accepted.state.samples(Phase.IDENTIFY)],
         ),
     )
 

@@ -25,28 +25,28 @@ from hexacell.services.recorded.recorded_robot import started_robot
 from hexacell.services.recorded.resumption import require_own_run
 from hexacell.services.run.accepted_results import last_accepted_result
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
-from procedures.calibration.preflight import (
-    device_failures,
-    plan_failures,
-    position_failures,
-    raise_all,
-    start_failures,
-)
-from procedures.calibration.workflow import Calibration, Mode
+from procedures.calibration.calibration import Calibration, Mode
 from procedures.devices.device_set import Devices
 from procedures.devices.live_values import LiveValues
 from procedures.devices.reconnection import require_known
-from procedures.engine.config_transactions import holds_provisional
+from procedures.engine.commands import CommandQueue, QuestionBroker
 from procedures.engine.engine import Engine, Listener
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.engine.step_executor import StepExecutor
 from procedures.guards.position_check import PositionCheck
 from procedures.journal.journal import Journal, read_journal, read_version
 from procedures.journal.line_format import RULES_SINCE
-from procedures.run import events
-from procedures.run.commands import CommandQueue
-from procedures.run.questions import Operator, QuestionBroker
+from procedures.resources.config_changes import holds_provisional
+from procedures.run.questions import Operator
 from procedures.run.state import fold
+from procedures.steps import events
+from procedures.workflow.preflight import (
+    device_failures,
+    plan_failures,
+    position_failures,
+    raise_all,
+    start_failures,
+)
 
 EngineWatcher = Callable[[Engine, Devices], None]
 
@@ -97,7 +97,7 @@ async def calibrate(
     Args:
         request: the run.
         listeners: called with every event.
-        queue: commands for the engine (:mod:`procedures.run.commands`).
+        queue: commands for the engine (:mod:`procedures.engine.commands`).
         live: gets what the devices show during the run.
         on_engine: called with the engine before it begins, and with the devices that it uses.
 

@@ -20,8 +20,8 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.devices.device_setup import device_addresses
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.storage.atomic_files import create_folder_durably, os_error_to_file_error, write_atomically
-from procedures.calibration.workflow import Mode
-from procedures.run.questions import UnattendedOperator
+from procedures.calibration.calibration import Mode
+from procedures.engine.commands import UnattendedOperator
 
 MARKER = ".hexacell-demo"
 """Name of the file that marks a folder as a demo's, which the next demo may replace."""

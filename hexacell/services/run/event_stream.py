@@ -14,8 +14,8 @@ from pathlib import Path
 from hexacell.errors import FileError, UsageError
 from hexacell.storage.atomic_files import os_error_to_file_error
 from procedures.engine.engine import Listener
-from procedures.run import events
 from procedures.run.state import RunState
+from procedures.steps import events
 
 CHUNK = 1 << 16
 

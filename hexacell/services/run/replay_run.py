@@ -24,7 +24,7 @@ from procedures.journal.line_format import RESTORE, RULES_SINCE, Entry
 from procedures.replay.comparison import TOLERANCE, ReplayReport
 from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Replayer, Scope
-from procedures.run.events import RunStarted
+from procedures.steps.events import RunStarted
 
 CONFIG = "controller-config"
 POSES = "poses.csv"

@@ -23,8 +23,8 @@ from hexacell.runs.run_folder import (
 )
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.verdict.decision import Verdict
-from procedures.calibration.workflow import Mode
-from procedures.run.commands import CommandQueue, EndAtReference
+from procedures.calibration.calibration import Mode
+from procedures.engine.commands import CommandQueue, EndAtReference
 from procedures.run.state import RunState
 
 MAY_PASS = frozenset({ExitCode.HARDWARE, ExitCode.BUSY, ExitCode.OUT_OF_TIME})

@@ -23,8 +23,8 @@ from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
 from hexacell.services.write_back.proposals import COMMAND
-from procedures.engine.config_transactions import holds_provisional
 from procedures.journal.line_format import RESTORE
+from procedures.resources.config_changes import holds_provisional
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,12 +22,12 @@ from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
-from procedures.engine.config_transactions import holds_provisional
 from procedures.journal.journal import read_journal
 from procedures.journal.line_format import RESTORE, now
-from procedures.run import events
+from procedures.resources.config_changes import holds_provisional
 from procedures.run.questions import Operator, Question, ask_approval
 from procedures.run.state import RunState, fold
+from procedures.steps import events
 
 COMMAND = "the command"
 """Who approves what needs no person: who typed ``apply``."""
@@ -220,11 +220,11 @@ def _require_together(
     files = tuple(Path(name) for name in (started.config, *started.further_configs))
     is_same_config = are_same_files(change.paths, files)
     is_same_text = change.sha256_before == started.config_sha256
-    if folder.proposal.is_symlink() or not (is_same_config and is_same_text) or _differs(proposed, change):
+    if (
+        folder.proposal.is_symlink()
+        or not (is_same_config and is_same_text)
+        or proposed.written != change.after
+    ):
         raise FileError(
             "this proposal is not the one of its journal", subject=folder.proposal, action=RESTORE
         )
-
-
-def _differs(proposed: events.Proposed, change: ConfigChange) -> bool:
-    return proposed.written is not None and proposed.written != change.after

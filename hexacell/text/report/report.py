@@ -7,7 +7,6 @@ from datetime import date
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.fields import CertificateSettings
 from hexacell.services.history.reported_run import ReportedRun
-from hexacell.text.events import set_name
 from hexacell.text.measured_noise import measured_noise_lines
 from hexacell.text.report.pages import Chapter, Facts, Paragraph, Report, Table, Tone
 from hexacell.text.report.results import (
@@ -88,7 +87,7 @@ def _sets_table(run: ReportedRun) -> tuple[Table, ...]:
     columns = ("Set of records", "records", "largest deviation, mm", "drift of the gauges, mm")
     rows = tuple(
         (
-            set_name(key),
+            key.name,
             str(len(measured.samples)),
             f"{max(abs(value) for one in measured.samples for value in one.deviation_mm):.3f}",
             f"{max(map(abs, measured.drift_mm)):.3f}",

@@ -20,7 +20,7 @@ from hexacell.text.parameters import ParameterRow, rows_of_changes, rows_of_run
 from hexacell.text.planning import quick_accuracy_sentences
 from hexacell.text.report.pages import Chapter, Paragraph, Picture, Table
 from hexacell.text.svg_drawing import AFTER, BEFORE, INK, SMALLEST_MM, as_svg, new_figure
-from procedures.run.steps import Phase
+from procedures.run.keys import Phase
 
 AXES_PLACE = (0.12, 0.17, 0.87, 0.72)
 """Place of the axes in a figure; to find the best one would draw each figure twice."""

@@ -12,7 +12,7 @@ from hexacell.text.report.pages import Block, Chapter, Facts, Paragraph, Table, 
 from hexacell.text.verdict import VERDICT_MEANINGS, not_checked, scale_lines, teaching_sentence
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy
-from procedures.run.steps import Phase
+from procedures.run.keys import Phase
 
 NO_VERDICT = "NOT EVALUATED"
 

@@ -21,7 +21,7 @@ from hexacell.text.screens.views import (
     Mark,
     Urgency,
 )
-from procedures.run.steps import ThreeNumbers
+from procedures.run.keys import ThreeNumbers
 
 BAR_COLUMNS = 17
 """Columns of the picture of a plunger in its travel; odd, so that the middle has a place."""

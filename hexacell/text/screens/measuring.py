@@ -8,15 +8,17 @@ from statistics import median
 
 from hexacell.cell.model import CellSettings
 from hexacell.run_process.messages import HostFailed
-from hexacell.text.events import activity, pose_name, set_name
 from hexacell.text.layout import duration
 from hexacell.text.screens.live import live_view
 from hexacell.text.screens.run_picture import RunPicture, Setback
 from hexacell.text.screens.views import FaultView, Guidance, MeasureView, PlotView, Series
 from procedures.engine.command_loop import Status
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
-from procedures.run.steps import Compute, Expectation, Locate, Move, Phase, Place, SetKey, StepOfSet
+from procedures.steps import events
+from procedures.steps.base import BaseStep, StepOfSet
+from procedures.steps.move import Expectation, Move
+from procedures.steps.place import Place
 
 NO_RUN = Guidance(
     now="no run is being measured here",
@@ -92,30 +94,18 @@ def _doing(picture: RunPicture) -> str:
     step = picture.step
     if step is None:
         return "choosing the next pose"
-    if isinstance(step, Locate):
-        return "asking the controller where the robot is"
     if isinstance(step, Move):
         return f"moving to {_pose_name(step)}"
-    if isinstance(step, StepOfSet):
-        said = activity(events.StepBegun(step=step))
-        return said or f"{set_name(step.at)}: {STEP_WORDS.get(step.kind, step.kind)}"
-    return activity(events.StepBegun(step=step)) or step.kind
-
-
-STEP_WORDS = {
-    "place": "the gauges are to be placed",
-    "sample": "reading, once the gauges have settled",
-    "revisit": "reading the reference again, after an interruption",
-    "close": "reading the reference again, for the drift",
-}
+    doing = step.doing or step.kind
+    return step.activity() or (f"{step.at.name}: {doing}" if isinstance(step, StepOfSet) else doing)
 
 
 def _pose_name(step: Move) -> str:
     if step.orientation == 0:
-        return f"a waypoint on the way to {set_name(step.at)}"
+        return f"a waypoint on the way to {step.at.name}"
     if step.orientation == 1:
-        return f"the reference of {set_name(step.at)}"
-    return pose_name(step.at, step.orientation)
+        return f"the reference of {step.at.name}"
+    return step.at.pose_name(step.orientation)
 
 
 def _following(picture: RunPicture, settings: CellSettings | None) -> str:
@@ -126,22 +116,21 @@ def _following(picture: RunPicture, settings: CellSettings | None) -> str:
         return "2 Preflight resumes it with r; what was measured is kept"
     if picture.status is Status.PAUSED:
         return "it goes on where it was when you press p"
-    if isinstance(step, Compute) or at is None:
+    if at is None or (step is not None and step.moves_nothing):
         return _after_computing(step)
     if isinstance(step, Place):
         return "the reference is read, then the gauges are tried by small moves"
     return _after_set(picture.state, at, settings)
 
 
-def _after_computing(step: object) -> str:
-    kind = step.kind if isinstance(step, Compute) else ""
+def _after_computing(step: BaseStep | None) -> str:
     words = {
         "identify": "the held-out poses are measured with the old geometry",
         "propose": "the change is shown in 4 Review and waits for approval",
         "commit": "the held-out poses are measured with the new geometry",
         "judge": "the verdict is shown in 4 Review",
     }
-    return words.get(kind, "the next pose")
+    return words.get("" if step is None else step.kind, "the next pose")
 
 
 def _after_set(state: RunState, at: SetKey, settings: CellSettings | None) -> str:

@@ -27,9 +27,9 @@ from hexacell.text.screens.views import (
 from hexacell.text.verdict import VERDICT_MEANINGS
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import DeviationStatistics
+from procedures.run.keys import Phase
 from procedures.run.questions import PendingChange, QuestionKind
 from procedures.run.state import RunState
-from procedures.run.steps import Phase
 
 PROPOSAL_WAITS = "Its proposal can still be written: w asks for it, with the change."
 READING = "Reading the runs of this cell ..."

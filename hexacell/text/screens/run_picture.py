@@ -20,10 +20,12 @@ from hexacell.run_process.messages import (
 )
 from hexacell.run_process.snapshots import LiveSnapshot
 from procedures.engine.command_loop import Status
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import Question
 from procedures.run.state import RunState, apply
-from procedures.run.steps import Expectation, Move, Phase, SetKey, Step
+from procedures.steps import events
+from procedures.steps.move import Expectation, Move
+from procedures.steps.registry import Step
 
 Setback = events.Tripped | events.Failed | events.Interrupted | HostFailed
 """What a fault is shown from."""

@@ -19,8 +19,8 @@ from hexacell.run_process.messages import (
 )
 from hexacell.run_process.snapshots import GaugeSnapshot, LiveSnapshot
 from procedures.engine.command_loop import Status
-from procedures.run.commands import MeasureAgain, Pause, Resume, Undo
-from procedures.run.steps import Phase, SetKey
+from procedures.engine.commands import MeasureAgain, Pause, Resume, Undo
+from procedures.run.keys import Phase, SetKey
 from tests.hexacell.run_process.conftest import FIRST
 from tests.waiting import until
 

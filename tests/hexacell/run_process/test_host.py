@@ -27,12 +27,12 @@ from hexacell.run_process.run_socket import listening_socket
 from hexacell.run_process.snapshots import LiveSnapshot
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.run.calibration_run import RunRequest
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
+from procedures.engine.commands import Answer, CommandQueue, Pause, Resume
 from procedures.journal.journal import read_entries, read_journal
-from procedures.run import events
-from procedures.run.commands import Answer, CommandQueue, Pause, Resume
 from procedures.run.questions import QuestionKind
+from procedures.steps import events
 from tests.hexacell.run_process.conftest import Client
 from tests.hexacell.services.conftest import maker
 from tests.small_cell import few_candidates

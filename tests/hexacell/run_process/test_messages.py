@@ -24,9 +24,9 @@ from hexacell.run_process.messages import (
     host_message,
     message_line,
 )
-from procedures.run import events
-from procedures.run.commands import Command, Undo
+from procedures.engine.commands import Command, Undo
 from procedures.run.questions import Question
+from procedures.steps import events
 
 NOON = TypeAdapter(datetime).validate_json('"2026-11-20T12:00:00.123Z"')
 EVENTS: tuple[Any, ...] = get_args(get_args(events.Event)[0])

@@ -23,10 +23,11 @@ from hexacell.run_process.messages import (
 from hexacell.run_process.recorded import LONGEST_WAIT_S, RecordedRun
 from hexacell.runs.run_folder import RunFolder
 from procedures.engine.command_loop import Status
+from procedures.engine.commands import Undo
 from procedures.journal.line_format import Entry, encode
-from procedures.run import events
-from procedures.run.commands import Undo
-from procedures.run.steps import Phase, Place, SetKey
+from procedures.run.keys import Phase, SetKey
+from procedures.steps import events
+from procedures.steps.place import Place
 from tests.procedures.fakes import ManualClock
 from tests.procedures.story import Story
 

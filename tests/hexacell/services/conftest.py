@@ -15,11 +15,12 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.run.calibration_run import RunRequest, calibrate
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
+from procedures.engine.commands import UnattendedOperator
 from procedures.engine.engine import Listener
 from procedures.journal.journal import Journal, read_journal
-from procedures.run import events
-from procedures.run.questions import Question, UnattendedOperator
+from procedures.run.questions import Question
+from procedures.steps import events
 from tests.made_once import made_once
 from tests.native_config import NATIVE
 from tests.small_cell import SMALL, few_candidates, history_until, write_small_cell

@@ -17,9 +17,9 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
-from procedures.calibration.workflow import Calibration, Mode
+from procedures.calibration.calibration import Calibration, Mode
 from procedures.journal.journal import Journal
-from procedures.run import events
+from procedures.steps import events
 from tests.small_cell import FEW_CHOICES
 
 MET = AcceptanceGate(name="converged", passed=True, sentence="It converged.")

@@ -21,8 +21,9 @@ from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.verdict.decision import Verdict
 from procedures.journal.line_format import Entry, encode
-from procedures.run import events
-from procedures.run.steps import Phase, SetKey
+from procedures.run.keys import Phase, SetKey
+from procedures.run.readings import Reading, Temperature
+from procedures.steps import events
 
 FIRST_NIGHT = datetime(2026, 3, 1, 2, 30, tzinfo=UTC)
 TILTS = [(0, 0, 0), (20, 5, 0), (-15, 15, 10), (5, -20, -10), (-20, -5, 15), (12, 18, -20)]
@@ -115,13 +116,14 @@ class Nights:
 
     def taken(self, record: Record) -> events.RecordTaken:
         pose = record.pose.as_tuple()
-        reading = events.Reading(
+        reading = Reading(
             gauges_mm=record.deviation,
             spread_mm=(0.0, 0.0, 0.0),
             joints=record.joints,
             answers=(),
             counts=((0,) * 6,),
-            temperatures=tuple(events.Temperature(name=n, celsius=c) for n, c in self.celsius.items()),
+            skews_s=(),
+            temperatures=tuple(Temperature(name=n, celsius=c) for n, c in self.celsius.items()),
         )
         return events.RecordTaken(
             at=SetKey(phase=Phase.IDENTIFY, point=record.point),

@@ -18,7 +18,7 @@ from hexacell.verdict.decision import Verdict
 from hexacell.verdict.model_evidence import ModelTest
 from hexacell.verdict.verification import Verification
 from procedures.journal.journal import Journal
-from procedures.run import events
+from procedures.steps import events
 from tests.hexacell.services.recorded_nights import Nights
 from tests.procedures.identified import an_identification
 

@@ -21,11 +21,11 @@ from hexacell.services.run.accepted_results import last_accepted_result
 from hexacell.services.run.calibration_run import calibrate
 from hexacell.services.run.replay_run import replay
 from hexacell.verdict.decision import Verdict
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 from procedures.journal.journal import Journal, read_journal
-from procedures.run import events
+from procedures.run.keys import Phase
 from procedures.run.state import fold
-from procedures.run.steps import Phase
+from procedures.steps import events
 
 
 def test_a_calibration_passes(finished) -> None:

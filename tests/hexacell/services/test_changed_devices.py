@@ -10,7 +10,7 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.devices.changed_devices import with_changes
 from hexacell.services.run.calibration_run import new_calibration, preflight, run_started
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 from procedures.journal.journal import Journal
 
 GAUGE = DeviceIdentity("x", "mux10", "MUX-10F 1.0", port="1-1.2")

@@ -18,7 +18,7 @@ from hexacell.config.write_record import RECORDS
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, read_proposal
-from procedures.run.questions import UnattendedOperator
+from procedures.engine.commands import UnattendedOperator
 from tests.hexacell.config.conftest import Faults
 from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
 

@@ -29,10 +29,10 @@ from hexacell.services.write_back.config_history import config_history
 from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import COMMAND, apply_proposal, read_proposal
 from hexacell.verdict.decision import Verdict
+from procedures.engine.commands import UnattendedOperator
 from procedures.journal import journal as journals
 from procedures.journal.journal import Journal
-from procedures.run import events
-from procedures.run.questions import UnattendedOperator
+from procedures.steps import events
 from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
 
 

@@ -17,11 +17,12 @@ from hexacell.services.preflight.exclusions import toggle_exclusion
 from hexacell.services.run.calibration_run import calibrate
 from hexacell.services.run.replay_run import replay
 from hexacell.text.screens.planned_poses import exclusions_text, plan_view
+from procedures.engine.commands import Abort, CommandQueue
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.commands import Abort, CommandQueue
+from procedures.run.keys import Phase
 from procedures.run.state import fold
-from procedures.run.steps import Move, Phase
+from procedures.steps import events
+from procedures.steps.move import Move
 from tests.hexacell.services.conftest import Approver, Finished, Site
 
 THREE_POINTS = ((100.0, -100.0, 500.0), (0.0, 150.0, 520.0), (-100.0, 100.0, 500.0))

@@ -12,8 +12,8 @@ from hexacell.config.interface import ControllerLimits
 from hexacell.errors import FileError, HexacellError
 from hexacell.services.run.replay_run import replay
 from procedures.journal.journal import Journal
-from procedures.run import events
-from procedures.run.steps import Phase, SetKey
+from procedures.run.keys import Phase, SetKey
+from procedures.steps import events
 
 History = list[Any]
 

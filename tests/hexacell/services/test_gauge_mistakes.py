@@ -8,7 +8,7 @@ import pytest
 
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.errors import ExitCode, HexacellError
-from procedures.run import events
+from procedures.steps import events
 
 MISTAKES: list[tuple[FaultKind, str, str, int]] = [
     ("reversed", "x", "gauge x: counts the wrong way", 1),

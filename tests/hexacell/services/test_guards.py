@@ -11,9 +11,9 @@ from hexacell.cell.recovery import UnattendedRecovery
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.errors import ExitCode, HexacellError
 from hexacell.services.run.calibration_run import preflight
-from procedures.calibration.workflow import Mode
-from procedures.run import events
+from procedures.calibration.calibration import Mode
 from procedures.run.trips import Guard, GuardTripped
+from procedures.steps import events
 from tests.injection_times import injection_times
 
 GIVES_UP = UnattendedRecovery(**dict.fromkeys(UnattendedRecovery.model_fields, ("abort",)))

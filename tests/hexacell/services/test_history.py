@@ -22,7 +22,7 @@ from hexacell.text.history import (
 )
 from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import Journal, read_journal
-from procedures.run import events
+from procedures.steps import events
 from tests.hexacell.results.test_run_comparison import covariance, result
 from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
 

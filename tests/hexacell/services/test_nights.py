@@ -8,7 +8,7 @@ from hexacell.errors import ExitCode
 from hexacell.services.history.cell_status import cell_status
 from hexacell.services.history.drift_history import drift_history
 from hexacell.verdict.decision import Verdict
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 from tests.benchmarks.simulated_year import DEAD_GAUGE, FULL_DISK, Year
 
 pytestmark = pytest.mark.slow

@@ -19,9 +19,9 @@ from hexacell.robot.model import robot_of
 from hexacell.services.run.calibration_run import run_started
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
-from procedures.calibration.workflow import Calibration, Mode
-from procedures.run import events
-from procedures.run.steps import Phase
+from procedures.calibration.calibration import Calibration, Mode
+from procedures.run.keys import Phase
+from procedures.steps import events
 from tests.small_cell import FEW_CHOICES
 
 DOUBTFUL = AcceptanceGate(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
@@ -48,7 +48,7 @@ def proposed(finished, make_site) -> Callable[..., Any]:
         site = make_site(**changes)
         history = list(finished.until(events.Proposed))
         if gates is not None:
-            history[-1] = events.Proposed(gates=tuple(gates))
+            history[-1] = events.Proposed(gates=tuple(gates), written={})
         site.write(history, finished)
         return site
 

@@ -15,9 +15,9 @@ from hexacell.errors import DeviceError, ExitCode, WriteBackUndone
 from hexacell.services.devices.device_setup import open_devices
 from hexacell.services.run.calibration_run import preflight
 from hexacell.verdict.model_evidence import ZEROS_DOUBTED
-from procedures.calibration.workflow import Mode
-from procedures.run import events
+from procedures.calibration.calibration import Mode
 from procedures.run.trips import Guard, GuardTripped
+from procedures.steps import events
 from tests.small_cell import changed
 
 

@@ -20,7 +20,7 @@ from hexacell.errors import (
 )
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.services.run.calibration_run import preflight
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 
 FAR = (0.0, 0.0, 2000.0)
 HASTY = {"encoders__timeout_s": 0.3}

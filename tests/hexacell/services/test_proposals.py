@@ -24,7 +24,8 @@ from hexacell.services.write_back.proposals import COMMAND, apply_proposal, late
 from hexacell.storage import atomic_files
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
-from procedures.run.questions import PendingChange, Question, UnattendedOperator
+from procedures.engine.commands import UnattendedOperator
+from procedures.run.questions import PendingChange, Question
 from tests.hexacell.services.proposed_runs import MET, ProposedRun, a_cell, propose_run
 
 DOUBTFUL = AcceptanceGate(

@@ -22,11 +22,11 @@ from hexacell.services.run.accepted_results import last_accepted_result
 from hexacell.services.run.calibration_run import calibrate
 from hexacell.services.run.replay_run import replay
 from hexacell.verdict.decision import Verdict
-from procedures.calibration.workflow import Calibration, Mode
+from procedures.calibration.calibration import Calibration, Mode
+from procedures.engine.commands import CommandQueue, EndAtReference
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.commands import CommandQueue, EndAtReference
 from procedures.run.state import RunState, fold
+from procedures.steps import events
 from tests.hexacell.services.conftest import Finished, maker, order_of
 from tests.small_cell import FEW_CHOICES, few_candidates
 

@@ -24,8 +24,8 @@ from hexacell.services.offline import fit_measurements
 from hexacell.services.recorded.recorded_robot import commanding_geometries, noise_of_run
 from hexacell.text.identification import identification_report
 from procedures.journal.journal import Journal
-from procedures.run import events
-from procedures.run.steps import Phase, SetKey
+from procedures.run.keys import Phase, SetKey
+from procedures.steps import events
 
 ON_FLOOR = FrameTransform(
     base=Rotation.from_rotvec([-0.7, 0.0, 0.0]).as_matrix(),

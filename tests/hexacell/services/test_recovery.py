@@ -11,8 +11,8 @@ from hexacell.cell.recovery import Action
 from hexacell.cell.simulation import FaultKind
 from hexacell.errors import DeviceError, ExitCode
 from procedures.devices.reconnection import DeviceReplaced
-from procedures.run import events
 from procedures.run.trips import RobotNotStopped
+from procedures.steps import events
 
 UNPLUGGED: FaultKind = "unplugged"
 

@@ -7,7 +7,7 @@ import pytest
 from hexacell.cell.simulation import SoftLimits
 from hexacell.errors import ExitCode
 from hexacell.services.run.replay_run import replay
-from procedures.run import events
+from procedures.steps import events
 
 LIMITS = SoftLimits(
     lowest=(-500.0, -500.0, 300.0, -10.0, -10.0, -12.0), highest=(500.0, 500.0, 700.0, 10.0, 10.0, 12.0)

@@ -20,7 +20,7 @@ from procedures.journal.journal import read_entries, read_journal
 from procedures.journal.line_format import Entry, encode
 from procedures.replay.comparison import Aspect
 from procedures.replay.replayer import Scope
-from procedures.run import events
+from procedures.steps import events
 from tests.hexacell.services.conftest import order_of
 
 

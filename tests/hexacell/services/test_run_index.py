@@ -17,7 +17,7 @@ from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.run_index import PastRun, RunIndex
 from procedures.journal.journal import Journal, read_entries
 from procedures.journal.line_format import Entry
-from procedures.run import events
+from procedures.steps import events
 from tests.hexacell.services.proposed_runs import a_cell, propose_run
 
 SUMMARY = DocumentKind.SUMMARY

@@ -12,9 +12,9 @@ from hexacell.cell.loader import require_plugins
 from hexacell.errors import FileError
 from hexacell.services.run.calibration_run import preflight
 from hexacell.services.run.replay_run import replay
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 from procedures.replay.replayer import Scope
-from procedures.run import events
+from procedures.steps import events
 
 
 def in_the_room(tmp_path: Path) -> ThermometerSettings:

@@ -31,11 +31,11 @@ from hexacell.services.schedule.unattended_runs import (
     refused_start,
     time_limit,
 )
+from procedures.engine.commands import CommandQueue, EndAtReference
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.commands import CommandQueue, EndAtReference
+from procedures.run.keys import Phase
 from procedures.run.state import fold
-from procedures.run.steps import Phase
+from procedures.steps import events
 from tests.hexacell.services.conftest import order_of
 
 NIGHT = datetime(2026, 3, 3, 2, 30, tzinfo=UTC)

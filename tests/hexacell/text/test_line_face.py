@@ -6,9 +6,9 @@ from hexacell.campaign.decisions import Forecast
 from hexacell.run_process.snapshots import EncoderSnapshot, GaugeSnapshot, LiveSnapshot
 from hexacell.text.line_face import gauges_text, record_text, run_status_text
 from procedures.engine.command_loop import Status
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
-from procedures.run.steps import Phase, SetKey
+from procedures.steps import events
 from tests.procedures.story import Story
 
 RECORD = Story(SetKey(phase=Phase.IDENTIFY, point=2)).sampled(3, (0.1234, -0.5, 2.0))

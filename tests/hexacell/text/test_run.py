@@ -15,10 +15,10 @@ from hexacell.services.run.calibration_run import RunRequest
 from hexacell.text.documents import run_document
 from hexacell.text.run import closing_lines, resume_command, resume_hint
 from hexacell.text.verdict import teaching_line, teaching_sentence
-from procedures.calibration.workflow import Mode
-from procedures.run import events
-from procedures.run.questions import UnattendedOperator
+from procedures.calibration.calibration import Mode
+from procedures.engine.commands import UnattendedOperator
 from procedures.run.state import RunState
+from procedures.steps import events
 
 
 @pytest.fixture

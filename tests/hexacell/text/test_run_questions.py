@@ -15,6 +15,7 @@ from hexacell.text.verdict import teaching_sentence
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
+from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import (
     NO,
     YES,
@@ -25,7 +26,6 @@ from procedures.run.questions import (
     ask_recovery,
     ask_startup,
 )
-from procedures.run.steps import Phase, SetKey
 
 CHOICES = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)
 FAILURE = ask_recovery("It broke.", CHOICES)

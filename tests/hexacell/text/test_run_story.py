@@ -6,8 +6,8 @@ from datetime import UTC, datetime, timedelta
 
 from hexacell.text.run_story import run_story, story_text
 from procedures.journal.line_format import Entry
-from procedures.run import events
-from procedures.run.steps import Phase, SetKey
+from procedures.run.keys import Phase, SetKey
+from procedures.steps import events
 from tests.procedures.story import Story
 
 NOON = datetime(2026, 11, 20, 12, 0, tzinfo=UTC)

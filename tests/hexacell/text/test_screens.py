@@ -32,10 +32,11 @@ from hexacell.text.screens.views import Urgency
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
 from procedures.engine.command_loop import Status
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import ask_acceptance, ask_mounting, ask_startup
 from procedures.run.state import fold
-from procedures.run.steps import Expectation, Move, Phase, SetKey
+from procedures.steps import events
+from procedures.steps.move import Expectation, Move
 from tests.procedures.story import Story
 
 POINT = SetKey(phase=Phase.IDENTIFY, point=2)

@@ -20,17 +20,17 @@ from hexacell.kinematics.pose import Pose
 from hexacell.results.result import AcceptedResult
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import LengthStatement
-from procedures.calibration.expected_records import expected_records
-from procedures.calibration.length_steps import BESIDE_MM
-from procedures.calibration.preflight import plan_failures
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode, expected_records
 from procedures.devices.device_set import Thermometers
+from procedures.engine.commands import MeasureAgain, UnattendedOperator
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.commands import MeasureAgain
-from procedures.run.questions import GaugePlacement, Question, UnattendedOperator, ask_mounting
+from procedures.run.keys import Phase, SetKey
+from procedures.run.questions import GaugePlacement, Question, ask_mounting
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Move, Phase, SetKey
+from procedures.steps import events
+from procedures.steps.move import Move
+from procedures.workflow.length import BESIDE_MM
+from procedures.workflow.preflight import plan_failures
 from tests.procedures.fakes import Approver
 from tests.procedures.rig import Rig
 

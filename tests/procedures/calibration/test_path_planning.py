@@ -8,20 +8,21 @@ import pytest
 
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion import paths as route_module
-from procedures.calibration import path_planning
-from procedures.calibration.path_planning import NoSafePath
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
-from procedures.run import events
 from procedures.run.state import fold
-from procedures.run.steps import Move
+from procedures.steps import events
+from procedures.steps.move import Move
+from procedures.workflow import paths as path_planning
+from procedures.workflow.paths import NoSafePath
+from tests.procedures.story import located, next_step
 
 ELSEWHERE = (-60.0, 80.0, 520.0, 12.0, -8.0, 5.0)
 INTERRUPTED = events.Interrupted(reason="a power cut", exit_code=130)
 
 
 def found_at(pose: Any) -> events.Event:
-    return events.Located(pose=pose)
+    return located(pose)
 
 
 def spy(monkeypatch: pytest.MonkeyPatch, *blocked: tuple[float, ...]) -> list[tuple[Any, Any, Any]]:
@@ -39,8 +40,8 @@ def spy(monkeypatch: pytest.MonkeyPatch, *blocked: tuple[float, ...]) -> list[tu
 def test_a_run_begins_by_locating_the_robot(make_rig) -> None:
     rig = make_rig()
     beginning = [rig.started()]
-    assert rig.calibration.next_step(fold(beginning)).key == "locate"
-    step = rig.calibration.next_step(fold([*beginning, found_at(ELSEWHERE)]))
+    assert next_step(rig.calibration, fold(beginning)).key == "locate"
+    step = next_step(rig.calibration, fold([*beginning, found_at(ELSEWHERE)]))
     assert step.key == "P1/o01/move"
 
 
@@ -51,27 +52,27 @@ def test_a_blocked_straight_line_is_replaced_by_a_route_over_a_waypoint(make_rig
     asked = spy(monkeypatch, blocked)
     state = fold([rig.started(), found_at(ELSEWHERE)])
     with pytest.raises(NoSafePath, match="it was not moved"):
-        rig.calibration.next_step(state)
+        next_step(rig.calibration, state)
     asked.clear()
 
     def only_from_level(_: Any, start: PoseBatch, end: PoseBatch, reference: Any = None) -> bool:
         return end.pose(0).as_tuple() != pytest.approx(blocked) or start.pose(0).a == pytest.approx(0.0)
 
     monkeypatch.setattr(route_module, "is_clear", only_from_level)
-    step = rig.calibration.next_step(state)
+    step = next_step(rig.calibration, state)
     assert isinstance(step, Move)
     assert (step.key, step.pose) == ("P1/o00/move", (*ELSEWHERE[:3], 0.0, 0.0, 0.0))
     passed = events.Arrived(at=step.at, orientation=0, pose=step.pose)
     after = fold([rig.started(), found_at(ELSEWHERE), passed])
     assert after.at_pose is None
-    assert rig.calibration.next_step(after).key == "P1/o01/move"
+    assert next_step(rig.calibration, after).key == "P1/o01/move"
 
 
 def test_a_return_to_the_reference_is_checked_against_the_travel(recording, make_rig, monkeypatch) -> None:
     sampled = recording.until(events.RecordTaken, count=5)
     here = sampled[-1].pose
     asked = spy(monkeypatch)
-    step = make_rig().calibration.next_step(fold([*sampled, INTERRUPTED, found_at(here)]))
+    step = next_step(make_rig().calibration, fold([*sampled, INTERRUPTED, found_at(here)]))
     assert step.key == "P1/o01/move"
     ((start, end, reference),) = asked
     assert start.as_tuple() == pytest.approx(here)
@@ -85,7 +86,7 @@ def test_a_robot_away_from_the_ball_returns_on_a_line_checked_without_the_travel
     """The gauges' travel cannot be required of a ball that is outside already."""
     sampled = recording.until(events.RecordTaken, count=5)
     asked = spy(monkeypatch)
-    step = make_rig().calibration.next_step(fold([*sampled, INTERRUPTED, found_at(ELSEWHERE)]))
+    step = next_step(make_rig().calibration, fold([*sampled, INTERRUPTED, found_at(ELSEWHERE)]))
     assert step.key == "P1/o01/move"
     assert [reference for *_, reference in asked] == [None]
 
@@ -100,7 +101,7 @@ def test_visited_poses_serve_as_waypoints(recording, make_rig, monkeypatch) -> N
         return second.pose in (pytest.approx(here), pytest.approx(there))
 
     monkeypatch.setattr(route_module, "is_clear", over_the_second)
-    step = make_rig().calibration.next_step(state)
+    step = next_step(make_rig().calibration, state)
     assert (step.key, step.pose) == ("P1/o02/move", second.pose)
 
 

@@ -10,11 +10,13 @@ import pytest
 
 from hexacell.campaign.pose_list import PoseList
 from hexacell.kinematics.pose import Pose
-from procedures.calibration.campaign_state import campaign_state
-from procedures.calibration.expected_records import expected_records
-from procedures.run import events
+from procedures.calibration.calibration import campaign_state, expected_records
+from procedures.run.keys import Phase
 from procedures.run.state import fold
-from procedures.run.steps import CloseSet, Expectation, Move, Phase
+from procedures.steps import events
+from procedures.steps.close import CloseSet
+from procedures.steps.move import Expectation, Move
+from tests.procedures.story import next_step
 
 
 def moves(recording):
@@ -44,22 +46,22 @@ def test_with_the_target_reached_the_set_is_closed_and_the_geometry_identified(
 ) -> None:
     step, before = [*moves(recording)][-2]
     now = step.expected.forecast.now_mm
-    assert make_rig(identification__target_mm=0.99 * now).calibration.next_step(fold(before)) is not None
+    assert next_step(make_rig(identification__target_mm=0.99 * now).calibration, fold(before)) is not None
     rig = make_rig(identification__target_mm=1.01 * now)
-    back = rig.calibration.next_step(fold(before))
+    back = next_step(rig.calibration, fold(before))
     assert isinstance(back, Move)
     assert back.expected is None
     assert back.orientation < step.orientation
     at_reference = [*before, story(point=2).arrived(1)]
-    closing = rig.calibration.next_step(fold(at_reference))
+    closing = next_step(rig.calibration, fold(at_reference))
     assert closing == CloseSet(at=step.at, reason=closing.reason)
     assert closing.reason.startswith("the predicted error at the task poses is")
-    assert rig.calibration.next_step(fold([*at_reference, story(point=2).closed()])).key == "identify"
+    assert next_step(rig.calibration, fold([*at_reference, story(point=2).closed()])).key == "identify"
 
 
 def test_the_budget_of_records_ends_the_measurements_between_points(make_rig, story) -> None:
     rig = make_rig(identification__budget_records=10)
-    assert rig.calibration.next_step(fold(story().whole(9))).key == "identify"
+    assert next_step(rig.calibration, fold(story().whole(9))).key == "identify"
     assert expected_records(rig.cell.settings, rig.calibration.mode) == 10 + 2 + 2 * 2 * 4 + 2 * 2
 
 
@@ -69,7 +71,7 @@ def test_chosen_points_keep_their_numbers(make_rig) -> None:
     openings = set()
     for points in ((far, near), (near, far)):
         rig = make_rig(identification__points=points, identification__choose_points=True)
-        step = rig.calibration.next_step(fold([]))
+        step = next_step(rig.calibration, fold([]))
         assert isinstance(step, Move)
         assert step.pose[:3] == points[step.at.point - 1]
         openings.add(step.pose)
@@ -81,11 +83,11 @@ def test_listed_poses_are_run(make_rig, story) -> None:
     here = tuple(tuple(Pose(*point, n) for n in (0.5, 0.9, 1.2)) for point in ((1.0, 2.0, 500.0),) * 2)
     listed = PoseList(Path("list.csv"), here)
     calibration = replace(rig.calibration, listed=listed)
-    step = calibration.next_step(fold([]))
+    step = next_step(calibration, fold([]))
     assert isinstance(step, Move)
     assert step.pose == here[0][0].as_tuple()
     assert expected_records(rig.cell.settings, rig.calibration.mode, listed) == 6 + 2 + 2 * 2 * 4 + 2 * 2
-    back = calibration.next_step(fold(story().whole(3)[:-2]))
+    back = next_step(calibration, fold(story().whole(3)[:-2]))
     assert isinstance(back, Move)
     assert back.orientation < 3
     assert back.expected is None

@@ -10,7 +10,7 @@ import pytest
 from drivers.errors import GaugeSilent, GaugeUnsteady, NotHomedError
 from hexacell.campaign import feasibility
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, ReachError, SeveralErrors
-from procedures.calibration.preflight import device_failures, plan_failures, raise_all
+from procedures.workflow.preflight import device_failures, plan_failures, raise_all
 
 FAR = (0.0, 0.0, 2000.0)
 

@@ -11,11 +11,10 @@ from hexacell.config.toml_format import NativeToml
 from hexacell.errors import DeviceError, ExitCode, HexacellError, Interruption
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
+from procedures.engine.commands import Abort
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.commands import Abort
 from procedures.run.state import fold
-from procedures.run.steps import Compute
+from procedures.steps import events
 from tests.procedures.rig import failure_without_record
 
 
@@ -44,7 +43,7 @@ def at(kind: type[Any], action: Any, count: int = 1) -> Any:
 
 def began(kind: str, action: Any) -> Any:
     def listener(event: events.Event, _: Any) -> None:
-        if isinstance(event, events.StepBegun) and event.step == Compute(kind=kind):
+        if isinstance(event, events.StepBegun) and event.step.kind == kind:
             action()
 
     return listener

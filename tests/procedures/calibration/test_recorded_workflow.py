@@ -10,11 +10,12 @@ import pytest
 
 from hexacell.campaign import pose_chooser
 from hexacell.motion.paths import find_route
-from procedures.calibration.expected_records import expected_records
-from procedures.calibration.workflow import Mode
-from procedures.run import events
+from procedures.calibration.calibration import Mode, expected_records
 from procedures.run.state import apply, fold
-from procedures.run.steps import Move, Sample
+from procedures.steps import events
+from procedures.steps.move import Move
+from procedures.steps.sample import Sample
+from tests.procedures.story import next_step
 
 POINTS, ORIENTATIONS, HELD_OUT = 2, 9, 3
 
@@ -55,7 +56,7 @@ def test_the_next_step_depends_on_the_state_only(recording, make_rig) -> None:
     for place in places[3::9]:
         event = history[place]
         assert isinstance(event, events.StepBegun)
-        assert calibration.next_step(fold(history[:place])) == event.step
+        assert next_step(calibration, fold(history[:place])) == event.step
 
 
 @pytest.mark.parametrize("undone", [(4, 2), (2, 4), (3, 4, 2)])
@@ -68,7 +69,7 @@ def test_several_records_are_taken_again_one_after_the_other(recording, make_rig
     state = fold([*sampled, *(events.RecordDiscarded(at=at, orientation=number) for number in undone)])
     again = []
     for _ in range(4 * len(undone)):
-        match calibration.next_step(state):
+        match next_step(calibration, state):
             case Move(expected=None, orientation=orientation, pose=pose):
                 state = apply(state, events.Arrived(at=at, orientation=orientation, pose=pose))
             case Sample(orientation=orientation, pose=pose):
@@ -84,11 +85,11 @@ def test_several_records_are_taken_again_one_after_the_other(recording, make_rig
 def test_after_a_refusal_another_pose_is_chosen(recording, make_rig) -> None:
     sampled = recording.until(events.RecordTaken, count=6)
     calibration = make_rig().calibration
-    first = calibration.next_step(fold(sampled))
+    first = next_step(calibration, fold(sampled))
     assert isinstance(first, Move)
     arrived = events.Arrived(at=first.at, orientation=first.orientation, pose=first.pose)
     refused = events.RecordRejected(at=first.at, orientation=first.orientation, reason="outside")
-    second = calibration.next_step(fold([*sampled, arrived, refused]))
+    second = next_step(calibration, fold([*sampled, arrived, refused]))
     assert isinstance(second, Move)
     assert second.at == first.at
     assert second.orientation in {0, first.orientation}, "there, or on the way there"
@@ -112,7 +113,7 @@ def test_the_path_after_a_refusal_begins_at_the_present_pose(recording, make_rig
         events.Arrived(at=key, orientation=5, pose=refused_at),
         events.RecordRejected(at=key, orientation=5, reason="outside"),
     ]
-    make_rig().calibration.next_step(fold(happened))
+    next_step(make_rig().calibration, fold(happened))
     assert starts[0] == pytest.approx(refused_at)
 
 

@@ -15,10 +15,12 @@ from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion import paths
 from hexacell.motion.trajectory import interpolate_line
-from procedures.calibration.identification_steps import IdentificationSteps
-from procedures.run import events
+from procedures.run.keys import Phase
 from procedures.run.state import fold
-from procedures.run.steps import Move, Phase
+from procedures.steps import events
+from procedures.steps.move import Move
+from procedures.workflow.points import IdentificationSteps
+from tests.procedures.story import next_step
 
 ORIENTATIONS = 9
 
@@ -60,7 +62,7 @@ def test_the_return_to_the_reference_uses_clear_lines_or_visited_poses(
     ClearLines(monkeypatch, *clear_to)
     calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
     visited: list[int] = []
-    while isinstance(step := calibration.next_step(fold(happened)), Move):
+    while isinstance(step := next_step(calibration, fold(happened)), Move):
         visited.append(step.orientation)
         happened.append(story().arrived(step.orientation, step.pose))
     assert visited == way
@@ -71,11 +73,11 @@ def test_a_return_path_over_waypoints_visits_each_of_them(make_rig, story, monke
     stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
     ClearLines(monkeypatch, 1, stops=(stop,))
     calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
-    step = calibration.next_step(fold(happened))
+    step = next_step(calibration, fold(happened))
     assert isinstance(step, Move)
     assert step.key == "P1/o00/move"
     assert step.pose == pytest.approx(stop.as_tuple())
-    step = calibration.next_step(fold([*happened, story().arrived(0, step.pose)]))
+    step = next_step(calibration, fold([*happened, story().arrived(0, step.pose)]))
     assert step.key == "P1/o01/move"
 
 
@@ -84,7 +86,7 @@ def test_a_return_path_is_not_planned_again_at_its_waypoint(make_rig, story, mon
     stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
     stands_in = ClearLines(monkeypatch, 1, stops=(stop,))
     calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
-    to_stop = calibration.next_step(fold(happened))
+    to_stop = next_step(calibration, fold(happened))
     assert isinstance(to_stop, Move)
     asked: list[float] = []
 
@@ -94,7 +96,7 @@ def test_a_return_path_is_not_planned_again_at_its_waypoint(make_rig, story, mon
 
     monkeypatch.setattr(paths, "PathPlanner", from_the_last_record_only)
     monkeypatch.setattr(paths, "is_clear", lambda *_: False)
-    step = calibration.next_step(fold([*happened, story().arrived(0, to_stop.pose)]))
+    step = next_step(calibration, fold([*happened, story().arrived(0, to_stop.pose)]))
     assert step.key == "P1/o01/move"
     assert asked == pytest.approx([ORIENTATIONS - 1.0])
 
@@ -106,8 +108,8 @@ def test_without_a_clear_line_the_return_visits_the_waypoints_passed_before(
     stop = (100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
     s = story()
     led = [s.arrived(0, stop), s.arrived(3), s.sampled(3)]
-    step = make_rig().calibration.next_step(
-        fold([*s.whole(2)[:-2], *led, *[s.refused(4)] * (REFUSALS + 1)])
+    step = next_step(
+        make_rig().calibration, fold([*s.whole(2)[:-2], *led, *[s.refused(4)] * (REFUSALS + 1)])
     )
     assert isinstance(step, Move)
     assert (step.key, step.pose) == ("P1/o00/move", stop)
@@ -116,7 +118,7 @@ def test_without_a_clear_line_the_return_visits_the_waypoints_passed_before(
 def test_the_return_from_a_refused_pose_begins_at_the_last_record(make_rig, story, monkeypatch) -> None:
     ClearLines(monkeypatch)
     refusals = [story().arrived(5), story().refused(5)] * (REFUSALS + 1)
-    step = make_rig().calibration.next_step(fold([*story().whole(4)[:-2], *refusals]))
+    step = next_step(make_rig().calibration, fold([*story().whole(4)[:-2], *refusals]))
     assert step.key == "P1/o04/move"
 
 
@@ -125,7 +127,7 @@ def test_without_an_estimate_the_return_visits_every_previous_pose(make_rig, sto
         raise IdentifiabilityError("the records cannot be followed")
 
     monkeypatch.setattr(IdentificationSteps, "_estimated", unknown)
-    step = make_rig().calibration.next_step(fold(story().whole(ORIENTATIONS)[:-2]))
+    step = next_step(make_rig().calibration, fold(story().whole(ORIENTATIONS)[:-2]))
     assert step.key == f"P1/o{ORIENTATIONS - 1:02d}/move"
 
 

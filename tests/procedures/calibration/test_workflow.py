@@ -15,20 +15,25 @@ from hexacell.errors import LimitError
 from hexacell.kinematics.pose import Pose
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
-from procedures.calibration import path_planning
-from procedures.calibration.identification_steps import IdentificationSteps
-from procedures.calibration.workflow import Mode
-from procedures.run import events
+from procedures.calibration.calibration import Mode
+from procedures.run.keys import Phase
 from procedures.run.state import fold
-from procedures.run.steps import Compute, Move, Phase, Place, Sample
+from procedures.steps import events
+from procedures.steps.move import Move
+from procedures.steps.place import Place
+from procedures.steps.roll_back import RollBack
+from procedures.steps.sample import Sample
+from procedures.workflow import paths as path_planning
+from procedures.workflow.points import IdentificationSteps
 from tests.procedures.identified import an_identification
+from tests.procedures.story import located, next_step
 
 POINTS, ORIENTATIONS, HELD_OUT = 2, 9, 3
 HELD_OUT_POSES = tuple(
     tuple((float(point), 0.0, 500.0, float(n), 0.0, 0.0) for n in range(HELD_OUT)) for point in (1, 2)
 )
 IDENTIFIED = events.Identified(result=an_identification(), held_out=HELD_OUT_POSES)
-PROPOSED = events.Proposed(gates=())
+PROPOSED = events.Proposed(gates=(), written=an_identification().geometry)
 COMMITTED = events.Committed(approved_by="a tester")
 ENDED = events.Ended(exit_code=0, line="over")
 PASS, WORSE, OUT, UNKNOWN = (
@@ -45,8 +50,8 @@ OFFERED = events.ResultValidated(
     line="so it is",
     verification=Verification(verdict=Verdict.CONDITIONAL_FAIL, before_mm=3.0, after_mm=0.2),
 )
-LOCATED = events.Located(pose=(100.0, -100.0, 500.0, 0.0, 0.0, 0.0))
-WITHDRAWING = events.StepBegun(step=Compute(kind="roll back"))
+LOCATED = located((100.0, -100.0, 500.0, 0.0, 0.0, 0.0))
+WITHDRAWING = events.StepBegun(step=RollBack())
 INTERRUPTED = events.Interrupted(reason="a power cut", exit_code=130)
 
 
@@ -205,7 +210,7 @@ def test_the_next_step_of_a_calibration(name: str, make_rig, story, told, monkey
     happened, key = TABLE[name]
     rig = make_rig()
     choices = Choices(monkeypatch)
-    step = rig.calibration.next_step(fold(happened(story, told)))
+    step = next_step(rig.calibration, fold(happened(story, told)))
     assert (step.key if step else None) == key
     chosen = {"P1/o02/move", "P1/o03/move", "P1/o04/move"}
     assert choices.made == (1 if key in chosen and "undone" not in name else 0)
@@ -222,7 +227,7 @@ CHECKS: Table = {
 @pytest.mark.parametrize("name", CHECKS)
 def test_the_next_step_of_a_check(name: str, make_rig, story, told) -> None:
     happened, key = CHECKS[name]
-    step = make_rig(Mode.CHECK).calibration.next_step(fold(happened(story, told)))
+    step = next_step(make_rig(Mode.CHECK).calibration, fold(happened(story, told)))
     assert (step.key if step else None) == key
 
 
@@ -255,7 +260,7 @@ class Choices:
 
 def test_references_are_the_cells_points_untilted(make_rig) -> None:
     rig = make_rig()
-    step = rig.calibration.next_step(fold([]))
+    step = next_step(rig.calibration, fold([]))
     assert step.pose == (*rig.cell.settings.identification.points[0], 0.0, 0.0, 0.0)
     assert step.expected is None
 
@@ -263,10 +268,10 @@ def test_references_are_the_cells_points_untilted(make_rig) -> None:
 def test_placing_and_sampling_happen_at_the_pose_commanded(make_rig, story) -> None:
     pose = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
     calibration = make_rig().calibration
-    place = calibration.next_step(fold([story().arrived(1, pose)]))
+    place = next_step(calibration, fold([story().arrived(1, pose)]))
     assert isinstance(place, Place)
     assert place.pose == pose
-    sample = calibration.next_step(fold([story().arrived(1, pose), story().placed()]))
+    sample = next_step(calibration, fold([story().arrived(1, pose), story().placed()]))
     assert isinstance(sample, Sample)
     assert sample.pose == pose
 
@@ -277,14 +282,14 @@ def test_a_set_is_closed_at_the_pose_of_its_reference(make_rig, story, monkeypat
     happened = [story().arrived(1, pose), story().placed(), story().sampled(1, pose=pose)]
     for orientation in range(2, ORIENTATIONS + 1):
         happened += [story().arrived(orientation), story().sampled(orientation)]
-    step = make_rig().calibration.next_step(fold(happened))
+    step = next_step(make_rig().calibration, fold(happened))
     assert isinstance(step, Move)
     assert step.pose == pose
 
 
 def test_a_set_without_a_pose_worth_visiting_is_closed(make_rig, story, monkeypatch) -> None:
     Choices(monkeypatch, LimitError("no orientation surely keeps the ball inside"))
-    step = make_rig().calibration.next_step(fold(story().whole(3)[:-2]))
+    step = next_step(make_rig().calibration, fold(story().whole(3)[:-2]))
     assert step.key == "P1/o01/move"
 
 
@@ -293,7 +298,7 @@ def test_held_out_poses_are_those_chosen_when_identified_before_and_after(make_r
     for stage, phase in (("identified", Phase.BEFORE), ("committed", Phase.AFTER)):
         happened = [*told[stage], LOCATED]
         for orientation in range(1, HELD_OUT + 1):
-            step = calibration.next_step(fold(happened))
+            step = next_step(calibration, fold(happened))
             assert step.pose == HELD_OUT_POSES[0][orientation - 1]
             happened += [story(phase).arrived(orientation), story(phase).placed()]
             happened += [story(phase).sampled(orientation)]
@@ -305,7 +310,7 @@ def test_gauges_that_cannot_be_zeroed_end_the_run(make_rig, story, told, phase: 
     happened = [] if before is None else told[before]
     refused = [*happened, story(phase).arrived(), story(phase).placed(), story(phase).refused(1)]
     with pytest.raises(LimitError, match=f"{phase.value}1: the gauges cannot be zeroed"):
-        make_rig().calibration.next_step(fold(refused))
+        next_step(make_rig().calibration, fold(refused))
 
 
 def test_a_held_out_pose_outside_the_travel_ends_the_run_before_anything_is_written(
@@ -313,4 +318,4 @@ def test_a_held_out_pose_outside_the_travel_ends_the_run_before_anything_is_writ
 ) -> None:
     refused = [*told["identified"], *story(Phase.BEFORE).whole(1)[:3], story(Phase.BEFORE).refused()]
     with pytest.raises(LimitError, match="before-V1: the ball left the gauges' travel"):
-        make_rig().calibration.next_step(fold(refused))
+        next_step(make_rig().calibration, fold(refused))

@@ -9,11 +9,11 @@ import pytest
 
 from drivers.interfaces import DeviceIdentity, TemperatureReading
 from hexacell.errors import DeviceError
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 from procedures.devices.device_set import Thermometers
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.events import Temperature
+from procedures.run.readings import Temperature
+from procedures.steps import events
 
 
 class FakeThermometer:

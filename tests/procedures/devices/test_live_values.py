@@ -15,9 +15,9 @@ from procedures.devices.device_set import Devices
 from procedures.devices.live_values import LiveValues
 from procedures.devices.settling import settle
 from procedures.guards.guards import Guards
-from procedures.run import events
 from procedures.run.state import fold
-from procedures.run.steps import Compute
+from procedures.steps import events
+from procedures.steps.commit import Commit
 
 
 @pytest.fixture
@@ -110,5 +110,5 @@ async def test_a_run_can_be_watched(recording, replayed) -> None:
     live = LiveValues(rig.clock.now)
     object.__setattr__(rig.performer, "devices", replace(rig.bench.devices, live=live))
     state = fold(recording.until(events.Proposed))
-    await rig.performer.perform(Compute(kind="commit"), state)
+    await rig.performer.perform(Commit(), state)
     assert live.encoders.value is not None, "guards watch while the controller reloads"

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from procedures.run import events
+from procedures.steps import events
 
 
 @pytest.fixture

@@ -14,12 +14,12 @@ from hexacell.cell.recovery import RecoverySettings
 from hexacell.errors import (
     Interruption,
 )
+from procedures.engine.commands import Stop
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.commands import Stop
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Phase, SetKey
+from procedures.steps import events
 
 UNATTENDED = RecoveryPolicy.of(RecoverySettings(), attended=False)
 ATTENDED = RecoveryPolicy.of(RecoverySettings(), attended=True)

@@ -16,8 +16,8 @@ from hexacell.errors import (
     Interruption,
 )
 from procedures.engine.command_loop import Status
-from procedures.run import events
-from procedures.run.commands import Abort, Answer, Pause, Resume
+from procedures.engine.commands import Abort, Answer, Pause, Resume
+from procedures.steps import events
 from tests.procedures.engine.injected_failures import (
     ATTENDED,
     KEY,

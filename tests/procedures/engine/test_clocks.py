@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 from procedures.journal import line_format
 from procedures.journal.journal import read_entries
-from procedures.run import events
+from procedures.steps import events
 
 CHECKOUT = Path(__file__).parents[3]
 WALL_CLOCKS = {

@@ -12,18 +12,22 @@ import pytest
 
 from hexacell.errors import ExitCode, Interruption
 from procedures.engine.command_loop import Status
+from procedures.engine.commands import Abort, Answer, CommandQueue, MeasureAgain, Pause, Resume, Stop, Undo
 from procedures.engine.engine import Engine
 from procedures.journal.journal import Journal, read_journal
-from procedures.run import events
-from procedures.run.commands import Abort, Answer, CommandQueue, MeasureAgain, Pause, Resume, Stop, Undo
+from procedures.run.keys import Phase, SetKey
+from procedures.run.readings import Reading
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Move, Phase, Sample, SetKey, Step
+from procedures.steps import events
+from procedures.steps.move import Move
+from procedures.steps.registry import Step
+from procedures.steps.sample import Sample
 from tests.procedures.fakes import SilentOperator
 from tests.waiting import until
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
-READING = events.Reading(
-    gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints=(0.0,) * 6, answers=(), counts=()
+READING = Reading(
+    gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints=(0.0,) * 6, answers=(), counts=(), skews_s=()
 )
 
 

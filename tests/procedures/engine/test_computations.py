@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from hexacell.errors import ExitCode, LimitError
-from procedures.run import events
+from procedures.steps import events
 
 FAR_AWAY = ((0.0, 0.0, 9000.0), (100.0, 100.0, 9000.0))
 STATED_TOO_SMALL = {"noise__encoder": 2e-4, "noise__gauge_mm": 2e-4}

@@ -8,10 +8,10 @@ import pytest
 
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.errors import ExitCode, FileError, HexacellError
+from procedures.engine.commands import UnattendedOperator
 from procedures.engine.recovery import RecoveryPolicy
-from procedures.run import events
-from procedures.run.questions import UnattendedOperator
-from procedures.run.steps import Move
+from procedures.steps import events
+from procedures.steps.move import Move
 from tests.procedures.runs.listening import happened, on
 
 

@@ -7,17 +7,16 @@ from typing import Any
 import pytest
 
 from hexacell.errors import DeviceError, Interruption
-from procedures.engine.config_transactions import (
-    ROLL_BACK,
-    TAKE_BACK,
-    Reversal,
-    revert_at_end,
-    revert_unrecorded,
-)
-from procedures.run import events
+from procedures.engine.reversal import Reversal, revert_at_end, revert_unrecorded
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Compute, Phase, SetKey
+from procedures.steps import events
+from procedures.steps.base import BaseStep
+from procedures.steps.lend import Lend
+from procedures.steps.roll_back import RollBack
+from procedures.steps.take_back import TakeBack
 
+ROLL_BACK, TAKE_BACK = RollBack(), TakeBack()
 ZERO = (0.0, 0.0, 0.0)
 APPLIED = events.ProvisionalApplied(
     geometry={"S": (ZERO,) * 6, "B": (ZERO,) * 6, "l": (0.0,) * 6}, folder="lent"
@@ -31,7 +30,7 @@ def arrived(orientation: int) -> events.Event:
     return events.Arrived(at=at, orientation=orientation, pose=(0.0,) * 6)
 
 
-def step_at_end(history: list[events.Event], error: BaseException) -> Compute | None:
+def step_at_end(history: list[events.Event], error: BaseException) -> BaseStep | None:
     reversal = revert_at_end(fold(history), error)
     return None if reversal is None else reversal.step
 
@@ -43,7 +42,7 @@ def step_at_end(history: list[events.Event], error: BaseException) -> Compute | 
         ([COMMITTED], FAILURE, ROLL_BACK),
         ([COMMITTED], Interruption("aborted"), None),
         ([COMMITTED], KeyboardInterrupt(), None),
-        ([events.StepBegun(step=Compute(kind="lend"))], Interruption("aborted"), TAKE_BACK),
+        ([events.StepBegun(step=Lend())], Interruption("aborted"), TAKE_BACK),
         ([APPLIED], FAILURE, None),
         ([APPLIED, arrived(1)], FAILURE, TAKE_BACK),
         ([APPLIED, arrived(1)], KeyboardInterrupt(), TAKE_BACK),
@@ -53,7 +52,7 @@ def step_at_end(history: list[events.Event], error: BaseException) -> Compute | 
     ],
 )
 def test_an_early_end_reverts_unverified_and_provisional_geometries(
-    history: Any, error: BaseException, step: Compute | None
+    history: Any, error: BaseException, step: BaseStep | None
 ) -> None:
     assert step_at_end(history, error) == step
 
@@ -72,7 +71,7 @@ def test_only_a_result_that_stays_in_the_controller_is_reported() -> None:
 
 
 @pytest.mark.parametrize(("event", "step"), [(COMMITTED, ROLL_BACK), (APPLIED, TAKE_BACK)])
-def test_a_change_that_could_not_be_journalled_is_reverted(event: events.Event, step: Compute) -> None:
+def test_a_change_that_could_not_be_journalled_is_reverted(event: events.Event, step: BaseStep) -> None:
     reversal = revert_unrecorded(event, RunState())
     assert isinstance(reversal, Reversal)
     assert (reversal.step, reversal.is_recorded) == (step, False)

@@ -25,10 +25,12 @@ from hexacell.errors import (
 from hexacell.verdict.decision import Verdict
 from procedures.engine.engine import Engine
 from procedures.journal.journal import Journal, read_journal
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Move, Phase, SetKey, Step
 from procedures.run.trips import RobotNotStopped
+from procedures.steps import events
+from procedures.steps.move import Move
+from procedures.steps.registry import Step
 from tests.procedures.rig import failure_without_record
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)

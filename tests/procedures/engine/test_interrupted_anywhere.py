@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from hexacell.errors import ExitCode, Interruption
+from procedures.engine.commands import Abort
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.commands import Abort
 from procedures.run.state import RunState, fold
+from procedures.steps import events
 
 TELLING = 125
 """Events of a whole run of the small cell, and a few more."""

@@ -9,10 +9,11 @@ import pytest
 
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.duration import SHORTEST_S
-from procedures.engine.move_durations import gauges_are_at_ball
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Move, Phase, SetKey
+from procedures.steps import events
+from procedures.steps.move import Move, gauges_are_at_ball
+from tests.procedures.story import READING, located
 
 P1, P2 = (SetKey(phase=Phase.IDENTIFY, point=point) for point in (1, 2))
 L1 = SetKey(phase=Phase.LENGTH, point=1)
@@ -32,7 +33,7 @@ def placed(at: SetKey) -> events.GaugesPlaced:
     return events.GaugesPlaced(at=at)
 
 
-CLOSED = events.SetClosed(at=P1, drift_mm=(0.0, 0.0, 0.0))
+CLOSED = events.SetClosed(at=P1, drift_mm=(0.0, 0.0, 0.0), reading=READING)
 
 
 @pytest.mark.parametrize(
@@ -44,21 +45,21 @@ CLOSED = events.SetClosed(at=P1, drift_mm=(0.0, 0.0, 0.0))
         ([arrived(P1), placed(P1), arrived(P1, 0)], move(P1), True),
         ([arrived(P1), placed(P1), CLOSED], move(P2, 1), True),
         ([arrived(P1), placed(P1), CLOSED, arrived(P2, 0)], move(P2, 1), False),
-        ([arrived(P1), placed(P1), events.Located(pose=POSE)], move(P2, 1), True),
+        ([arrived(P1), placed(P1), located(POSE)], move(P2, 1), True),
     ],
 )
 def test_gauges_placed_by_hand_are_at_the_ball_from_then_until_the_robot_has_left(
     make_rig: Any, history: Any, step: Move, there: bool
 ) -> None:
     settings = make_rig(stations__placement="by-hand").cell.settings
-    assert gauges_are_at_ball(settings, step, fold(history)) is there
+    assert gauges_are_at_ball(settings, step.at, fold(history)) is there
 
 
 def test_fixed_gauges_are_everywhere(make_rig: Any) -> None:
     fixed = make_rig().cell.settings
-    assert gauges_are_at_ball(fixed, move(P1, 1), RunState())
+    assert gauges_are_at_ball(fixed, P1, RunState())
     by_hand = make_rig(stations__placement="by-hand").cell.settings
-    assert gauges_are_at_ball(by_hand, move(L1, 1), RunState()), "the seats of the fixture are fixed ones"
+    assert gauges_are_at_ball(by_hand, L1, RunState()), "the seats of the fixture are fixed ones"
 
 
 async def test_a_move_with_gauges_at_the_ball_is_as_much_slower_as_stated(make_rig: Any) -> None:

@@ -21,7 +21,7 @@ from hexacell.errors import (
 )
 from procedures.engine.command_loop import Status
 from procedures.journal.journal import read_journal
-from procedures.run import events
+from procedures.steps import events
 from tests.procedures.engine.injected_failures import (
     KEY,
     SILENT,

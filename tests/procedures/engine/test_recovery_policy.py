@@ -31,14 +31,15 @@ from hexacell.errors import (
     UsageError,
     WriteBackUndone,
 )
-from procedures.calibration.path_planning import NoSafePath
-from procedures.calibration.set_steps import TravelError
 from procedures.devices.settling import NeverSettled
 from procedures.engine.recovery import GIVE_UP, RecoveryPolicy, failed, kind_of
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Phase, Sample, SetKey
 from procedures.run.trips import DriftTripped, Guard, Trip
+from procedures.steps import events
+from procedures.steps.sample import Sample
+from procedures.workflow.paths import NoSafePath
+from procedures.workflow.sets import TravelError
 from tests.procedures.engine.injected_failures import ATTENDED, UNATTENDED
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)

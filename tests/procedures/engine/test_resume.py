@@ -13,10 +13,10 @@ from hexacell.config.change import ConfigChange
 from hexacell.config.write_back import commit
 from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
-from procedures.engine import config_transactions
 from procedures.journal.journal import read_journal
-from procedures.run import events
+from procedures.resources import config_changes
 from procedures.run.state import RunState, fold
+from procedures.steps import events
 
 INTERRUPTED = events.Interrupted(reason="a power cut", exit_code=130)
 
@@ -159,7 +159,7 @@ async def test_a_write_back_in_progress_is_completed_despite_cancellation(
         cancelled.wait()
         return commit(*order)
 
-    monkeypatch.setattr(config_transactions, "commit", slow_commit)
+    monkeypatch.setattr(config_changes, "commit", slow_commit)
     with pytest.raises(asyncio.CancelledError):
         await running
     assert rig.config == recording.config_after

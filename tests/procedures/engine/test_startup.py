@@ -8,13 +8,13 @@ import pytest
 
 from drivers.interfaces import StartupAction, StartupActions
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, Interruption
-from procedures.engine.startup import Startup
+from procedures.engine.commands import UnattendedOperator
 from procedures.guards.guards import Guards
-from procedures.run import events
-from procedures.run.questions import UnattendedOperator
+from procedures.resources.startup import Startup
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, apply, fold
-from procedures.run.steps import Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
+from procedures.steps import events
 from tests.procedures.fakes import Approver, Bench
 
 EVERYTHING = frozenset(StartupAction(word) for word in ("reset-estop", "switch-on", "home"))

@@ -12,9 +12,13 @@ from hexacell.cell.devices import GaugeAxis
 from hexacell.errors import DeviceError, HexacellError, LimitError, SeveralErrors
 from hexacell.kinematics.pose import Pose
 from procedures.devices.device_set import Devices, MountedGauge
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
-from procedures.run.steps import CloseSet, Move, Phase, Place, Sample, SetKey
+from procedures.steps import events
+from procedures.steps.close import CloseSet
+from procedures.steps.move import Move
+from procedures.steps.place import Place
+from procedures.steps.sample import Sample
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 POSE = (100.0, -100.0, 500.0, 0.0, 0.0, 0.0)

@@ -13,11 +13,11 @@ from hexacell.errors import (
     SeveralErrors,
     WriteBackUndone,
 )
+from procedures.engine.commands import Abort
 from procedures.engine.recovery import GIVE_UP, RecoveryPolicy
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.commands import Abort
 from procedures.run.state import RunState, fold
+from procedures.steps import events
 from tests.procedures.engine.injected_failures import (
     UNATTENDED,
     failing,

@@ -19,10 +19,10 @@ from drivers.errors import GaugeSilent, MotionInterrupted, WrongSetting
 from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading, StartupActions
 from hexacell.cell.measuring import GuardSettings
 from hexacell.errors import DeviceError
-from procedures.run import events
 from procedures.run.questions import Question
 from procedures.run.state import RunState, apply
-from procedures.run.steps import Step
+from procedures.steps import events
+from procedures.steps.registry import Step
 
 QUIET = 12
 """So many turns of the event loop without a new sleeper: everybody waits for time to pass."""

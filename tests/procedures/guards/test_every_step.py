@@ -14,9 +14,14 @@ import pytest
 
 from hexacell.errors import ExitCode, HexacellError
 from procedures.guards import rules
-from procedures.run import events
-from procedures.run.steps import CloseSet, Compute, Move, Phase, Place, Sample, SetKey
+from procedures.run.keys import Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
+from procedures.steps import events
+from procedures.steps.close import CloseSet
+from procedures.steps.commit import Commit
+from procedures.steps.move import Move
+from procedures.steps.place import Place
+from procedures.steps.sample import Sample
 
 MUST_S = 0.2
 STRIKES_S = 0.3
@@ -76,7 +81,7 @@ async def close(scene: Any) -> Step:
 
 
 async def reload(scene: Any) -> Step:
-    return lambda: scene.do(Compute(kind="commit"))
+    return lambda: scene.do(Commit())
 
 
 async def move_afterwards(scene: Any) -> Step:

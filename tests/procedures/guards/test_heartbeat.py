@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 
 from drivers.interfaces import ControllerStatus, EncoderSample
-from procedures.run.steps import Move, Phase, SetKey
+from procedures.run.keys import Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
+from procedures.steps.move import Move
 
 P1, V1 = SetKey(phase=Phase.IDENTIFY, point=1), SetKey(phase=Phase.BEFORE, point=1)
 STALE_S = 0.12

@@ -18,8 +18,9 @@ from hexacell.limits.gauge_travel import GaugeRoom
 from procedures.guards import rules
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
 from procedures.guards.rules import GuardLimits
-from procedures.run import events
 from procedures.run.trips import DriftTripped, Guard, GuardTripped, Trip
+from procedures.steps import events
+from procedures.steps.close import reference_drift
 
 PLATE = GaugeRoom.symmetric(5.5)
 LIMITS = GuardLimits(stale_s=0.12, plate=PLATE)
@@ -242,8 +243,8 @@ def test_an_unchanged_gauge_trips_if_the_ball_should_have_moved(
 
 
 def test_drift_has_its_own_exit_code() -> None:
-    assert rules.reference_drift("P2", (0.1, -0.1, 0.0), 0.1) is None
-    trip = rules.reference_drift("P2", (0.0, -0.101, 0.0), 0.1)
+    assert reference_drift("P2", (0.1, -0.1, 0.0), 0.1) is None
+    trip = reference_drift("P2", (0.0, -0.101, 0.0), 0.1)
     assert trip is not None
     error = trip.as_error()
     assert isinstance(error, DriftTripped)

@@ -16,9 +16,12 @@ from procedures.guards.polling import DevicePoller, LineActivity, PolledDevices
 from procedures.guards.rules import GuardLimits
 from procedures.guards.supervision import GuardMonitor
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.steps import CloseSet, Expectation, Move, Phase, Sample, SetKey
+from procedures.run.keys import Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
+from procedures.steps import events
+from procedures.steps.close import CloseSet
+from procedures.steps.move import Expectation, Move
+from procedures.steps.sample import Sample
 
 LIMITS = GuardLimits(0.12, GaugeRoom.symmetric(5.5))
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
@@ -279,8 +282,8 @@ async def test_a_trip_is_journalled(scene) -> None:
         await stage.rig.run(press)
     history = read_journal(stage.rig.folder.journal)
     assert [event.kind for event in history[-2:]] == ["tripped", "interrupted"]
-    assert history[-2].guard is Guard.STOP_LINE  # type: ignore[union-attr]
-    assert history[-1].exit_code == 3  # type: ignore[union-attr]
+    assert history[-2].guard is Guard.STOP_LINE  # type: ignore[attr-defined]
+    assert history[-1].exit_code == 3  # type: ignore[attr-defined]
 
 
 async def test_a_drifted_reference_is_not_latched(scene) -> None:

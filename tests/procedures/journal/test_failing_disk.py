@@ -10,7 +10,7 @@ import pytest
 
 from hexacell.errors import FileError
 from procedures.journal.journal import Journal, read_journal
-from procedures.run import events
+from procedures.steps import events
 from tests.procedures.journal.told import TOLD
 
 

@@ -22,10 +22,11 @@ from hypothesis import strategies as st
 from hexacell.errors import CellBusy, FileError
 from procedures.journal import line_format
 from procedures.journal.journal import Journal, read_entries, read_journal
-from procedures.run import events
-from procedures.run.steps import Phase, SetKey
+from procedures.run.keys import Phase, SetKey
+from procedures.steps import events
 from tests.procedures.identified import an_identification
 from tests.procedures.journal.told import TOLD, write_told
+from tests.procedures.story import READING
 
 
 def test_a_new_journal_is_empty(path: Path) -> None:
@@ -140,7 +141,7 @@ texts = st.text(st.characters(exclude_categories=["Cs"]))
 def test_every_number_and_every_text_is_read_back_exactly(path: Path, text, values, results) -> None:
     key = SetKey(phase=Phase.IDENTIFY, point=1)
     told = (
-        events.SetClosed(at=key, drift_mm=values),
+        events.SetClosed(at=key, drift_mm=values, reading=READING),
         events.SetInvalidated(at=key, reason=text),
         events.Identified(result=an_identification(covariance=(results,), frame=text), held_out=()),
     )

@@ -15,7 +15,7 @@ import pytest
 from pydantic import BaseModel
 
 from procedures.journal.line_format import VERSION
-from procedures.run.events import Event
+from procedures.steps.events import Event
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "journal.md"
 EVENTS = get_args(get_args(Event)[0])

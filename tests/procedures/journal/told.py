@@ -8,10 +8,12 @@ from typing import Any
 
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.journal import Journal
-from procedures.run import events
+from procedures.steps import events
 
 TOLD: tuple[Any, ...] = (
-    events.Proposed(gates=(AcceptanceGate(name="converged", passed=True, sentence="It did to 0.5 µm."),)),
+    events.Proposed(
+        gates=(AcceptanceGate(name="converged", passed=True, sentence="It did to 0.5 µm."),), written={}
+    ),
     events.Committed(approved_by="a tester"),
     events.Interrupted(reason="line one\nline two\u2028\x85\r", exit_code=130),
     events.Ended(exit_code=1, line="rolled back"),

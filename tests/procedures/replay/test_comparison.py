@@ -13,8 +13,9 @@ from hexacell.cell.fields import Frozen
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.line_format import decode
 from procedures.replay.comparison import Aspect, Change, Difference, changes, is_wording
-from procedures.run import events
-from procedures.run.steps import Phase, SetKey
+from procedures.run.keys import Phase, SetKey
+from procedures.run.readings import Reading
+from procedures.steps import events
 
 KEY = SetKey(phase=Phase.BEFORE, point=2)
 
@@ -76,8 +77,8 @@ def test_a_field_missing_in_the_recorded_event_is_no_difference() -> None:
     line = b'{"n":2,"at":"2026-11-20T10:30:00.000Z","event":%b}' % body
     entry = decode(checked(line), Path("journal.jsonl"), 2)
     assert entry is not None
-    reading = events.Reading(
-        gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints=(0.0,) * 6, answers=(), counts=()
+    reading = Reading(
+        gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints=(0.0,) * 6, answers=(), counts=(), skews_s=()
     )
     again = events.SetClosed(at=KEY, drift_mm=(0.0, 0.0, 0.0), reading=reading)
     assert changes(entry.event, again, 1e-9) == []
@@ -90,7 +91,7 @@ def checked(body: bytes) -> bytes:
 
 def test_sentences_are_recognized_as_wording() -> None:
     gates = [AcceptanceGate(name="n", passed=True, sentence=words) for words in ("One.", "Two.")]
-    first, second = (events.Proposed(gates=(gate,)) for gate in gates)
+    first, second = (events.Proposed(gates=(gate,), written={}) for gate in gates)
     [change] = changes(first, second, 1e-9)
     assert change == Change("gates[0].sentence", "One.", "Two.")
     assert is_wording(change)

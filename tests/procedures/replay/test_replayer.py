@@ -20,15 +20,15 @@ from hexacell.errors import HexacellError, LimitError
 from hexacell.robot.model import robot_of
 from hexacell.services.run.calibration_run import calibration_of_run
 from hexacell.verdict.decision import Verdict
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
 from procedures.journal.journal import read_journal
 from procedures.journal.line_format import Entry
 from procedures.replay.comparison import Aspect, ReplayReport
 from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Replayer, Scope
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Phase, SetKey
+from procedures.steps import events
 
 Replay = Callable[..., ReplayReport]
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.cell.devices import ThermometerSettings
-from procedures.run import events
 from procedures.run.leg_temperatures import legs_warmer, mean_leg_temperatures, mean_temperature
-from procedures.run.steps import Phase, SetKey
+from procedures.run.readings import Reading, Temperature
 
 ROOM = ThermometerSettings(name="room", path="/room")
 PAIR = ThermometerSettings(name="pair", path="/pair", legs=(1, 2))
@@ -16,21 +15,15 @@ ALL = (ROOM, PAIR, SIXTH)
 BEFORE = (20.0, 21.0, None, None, None, 19.0)
 
 
-def sample(**celsius: float | None) -> events.RecordTaken:
-    reading = events.Reading(
+def sample(**celsius: float | None) -> Reading:
+    return Reading(
         gauges_mm=(0.0,) * 3,
         spread_mm=(0.0,) * 3,
         joints=(0.0,) * 6,
         answers=(),
         counts=(),
-        temperatures=tuple(events.Temperature(name=name, celsius=one) for name, one in celsius.items()),
-    )
-    return events.RecordTaken(
-        at=SetKey(phase=Phase.IDENTIFY, point=1),
-        orientation=1,
-        pose=(0.0,) * 6,
-        reading=reading,
-        deviation_mm=(0.0,) * 3,
+        skews_s=(),
+        temperatures=tuple(Temperature(name=name, celsius=one) for name, one in celsius.items()),
     )
 
 

@@ -10,17 +10,16 @@ from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded, ExitCode
 from hexacell.kinematics.pose import Pose
 from hexacell.verdict.acceptance_gates import AcceptanceGate
+from procedures.engine.commands import QuestionBroker, UnattendedOperator
+from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import (
     GaugePlacement,
     Question,
-    QuestionBroker,
     QuestionKind,
-    UnattendedOperator,
     ask_approval,
     ask_placement,
     ask_recovery,
 )
-from procedures.run.steps import Phase, SetKey
 from tests.procedures.fakes import SilentOperator
 
 

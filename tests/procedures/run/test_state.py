@@ -7,10 +7,13 @@ from typing import Any
 import pytest
 
 from hexacell.verdict.decision import Verdict
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
+from procedures.run.readings import Temperature
 from procedures.run.state import RunState, apply, fold
-from procedures.run.steps import CloseSet, Phase, SetKey
+from procedures.steps import events
+from procedures.steps.close import CloseSet
 from tests.procedures.identified import an_identification
+from tests.procedures.story import located
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 
@@ -99,9 +102,7 @@ def test_the_range_of_temperatures_is_that_of_one_thermometer(story) -> None:
     """The room is colder than the rails, which is no change of temperature; one reading is missing."""
 
     def warm(sampled, **celsius):
-        temperatures = tuple(
-            events.Temperature(name=name, celsius=value) for name, value in celsius.items()
-        )
+        temperatures = tuple(Temperature(name=name, celsius=value) for name, value in celsius.items())
         reading = sampled.reading.model_copy(update={"temperatures": temperatures})
         return sampled.model_copy(update={"reading": reading})
 
@@ -131,7 +132,7 @@ def test_held_out_deviations_leave_references_out(story) -> None:
     ("event", "attribute"),
     [
         (events.Identified(result=an_identification(), held_out=()), "identified"),
-        (events.Proposed(gates=()), "proposed"),
+        (events.Proposed(gates=(), written={}), "proposed"),
         (events.Committed(approved_by="a tester"), "committed"),
         (events.ResultValidated(verdict=Verdict.PASS, line="pass"), "judged"),
         (events.Ended(exit_code=0, line="pass"), "ended"),
@@ -199,9 +200,9 @@ def test_a_located_robot_has_no_path_from_the_reference(story) -> None:
     s = story()
     lost = events.Interrupted(reason="a power cut", exit_code=130)
     there = [s.arrived(1), s.arrived(2), s.arrived(3), lost]
-    assert trail_of(*there, events.Located(pose=STOP), s.arrived(4)) == []
-    assert trail_of(*there, events.Located(pose=STOP), s.arrived(2)) == [1, 2]
-    assert trail_of(*there, events.Located(pose=s.arrived(3).pose), s.arrived(4)) == [1, 2, 3, 4]
+    assert trail_of(*there, located(STOP), s.arrived(4)) == []
+    assert trail_of(*there, located(STOP), s.arrived(2)) == [1, 2]
+    assert trail_of(*there, located(s.arrived(3).pose), s.arrived(4)) == [1, 2, 3, 4]
 
 
 def test_a_refused_pose_leaves_the_robot_where_it_was_and_is_not_taken_again(story) -> None:

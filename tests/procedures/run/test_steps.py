@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import Any, get_args
 
 import pytest
@@ -12,7 +11,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.pilots import FIRST_PILOT
-from hexacell.cell.fields import Frozen
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.identification.solver.result import DataFaultKind
 from hexacell.kinematics.parameters import JointUnit
@@ -29,27 +27,30 @@ from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from hexacell.verdict.model_evidence import ModelTest
 from hexacell.verdict.verification import Verification
 from procedures.journal.journal import Journal, read_journal
-from procedures.run import events
-from procedures.run.events import course, measuring, results
-from procedures.run.steps import (
-    CloseSet,
-    Compute,
-    Expectation,
-    Locate,
-    Move,
-    Phase,
-    Pilot,
-    Place,
-    Probe,
-    Repeat,
-    Revisit,
-    Sample,
-    SetKey,
-    Standstill,
-    Step,
-    Try,
-)
+from procedures.run.keys import Phase, SetKey
+from procedures.run.readings import Reading
 from procedures.run.trips import Guard
+from procedures.steps import events
+from procedures.steps.accept import Accept
+from procedures.steps.assess_noise import AssessNoise
+from procedures.steps.close import CloseSet
+from procedures.steps.commit import Commit
+from procedures.steps.events import EVENTS
+from procedures.steps.identify import Identify
+from procedures.steps.judge import Judge
+from procedures.steps.locate import Locate
+from procedures.steps.move import Expectation, Move
+from procedures.steps.pilot import Pilot
+from procedures.steps.place import Place
+from procedures.steps.probe import Probe
+from procedures.steps.propose import Propose
+from procedures.steps.registry import Step
+from procedures.steps.repeat import Repeat
+from procedures.steps.revisit import Revisit
+from procedures.steps.roll_back import RollBack
+from procedures.steps.sample import Sample
+from procedures.steps.standstill import Standstill
+from procedures.steps.try_gauges import Try
 from tests.procedures.identified import an_identification
 
 POSE = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -72,9 +73,9 @@ P2 = SetKey(phase=Phase.IDENTIFY, point=2)
         (Repeat(at=P2), "P2/repeat"),
         (Probe(at=P2, moved_mm=(1.0, 0.0, 0.0)), "P2/probe"),
         (Try(at=P2), "P2/try"),
-        (Compute(kind="assess noise"), "assess noise"),
-        (Compute(kind="identify"), "identify"),
-        (Compute(kind="roll back"), "roll back"),
+        (AssessNoise(), "assess noise"),
+        (Identify(), "identify"),
+        (RollBack(), "roll back"),
     ],
 )
 def test_keys_are_stable(step: Any, key: str) -> None:
@@ -109,24 +110,20 @@ some_step: st.SearchStrategy[Any] = st.one_of(
     st.builds(Sample, at=set_key, orientation=count, pose=six),
     st.builds(Revisit, at=set_key),
     st.builds(CloseSet, at=set_key),
-    st.builds(
-        Compute,
-        kind=st.sampled_from(
-            ["assess noise", "identify", "propose", "commit", "judge", "accept", "roll back"]
-        ),
-    ),
+    st.sampled_from([AssessNoise(), Identify(), Propose(), Commit(), Judge(), Accept(), RollBack()]),
     st.builds(Standstill, at=set_key),
     st.builds(Repeat, at=set_key),
     st.builds(Probe, at=set_key, moved_mm=st.tuples(*[number] * 3)),
     st.builds(Try, at=set_key),
 )
 reading = st.builds(
-    events.Reading,
+    Reading,
     gauges_mm=three,
     spread_mm=three,
     joints=six,
     answers=st.lists(st.tuples(text, text, text), max_size=2).map(tuple),
     counts=st.lists(st.tuples(*[st.integers()] * 6), max_size=2).map(tuple),
+    skews_s=st.lists(number, max_size=2).map(tuple),
 )
 geometry = st.fixed_dictionaries(
     {
@@ -222,7 +219,7 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     ),
     st.builds(events.StepBegun, step=some_step),
     st.builds(events.Arrived, at=set_key, orientation=count, pose=six),
-    st.builds(events.Located, pose=six, joints=st.none() | six, encoders=st.none() | six),
+    st.builds(events.Located, pose=six, joints=st.none() | six, encoders=six),
     st.builds(
         events.PoseExcluded,
         at=set_key,
@@ -238,12 +235,13 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     ),
     st.builds(events.RecordRejected, at=set_key, orientation=count, reason=text),
     st.builds(events.RecordDiscarded, at=set_key, orientation=count),
-    st.builds(events.ReferenceConfirmed, at=set_key, change_mm=three),
+    st.builds(events.ReferenceConfirmed, at=set_key, change_mm=three, reading=reading),
     st.builds(
         events.StandstillRead,
         at=set_key,
         gauges_mm=st.lists(three, max_size=2).map(tuple),
         joints=st.lists(six, max_size=2).map(tuple),
+        skews_s=st.lists(number, max_size=2).map(tuple),
         answers=st.lists(st.tuples(text, text, text), max_size=2).map(tuple),
         counts=st.lists(st.tuples(*[st.integers()] * 6), max_size=2).map(tuple),
     ),
@@ -251,7 +249,7 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     st.builds(events.GaugesProbed, at=set_key, moved_mm=st.tuples(*[number] * 3), reading=reading),
     st.builds(events.GaugesTried, at=set_key, response=st.tuples(*[st.tuples(*[number] * 3)] * 3)),
     st.builds(events.NoiseMeasured, at=set_key, noise=measured_noise),
-    st.builds(events.SetClosed, at=set_key, drift_mm=three),
+    st.builds(events.SetClosed, at=set_key, drift_mm=three, reading=reading),
     st.builds(events.SetInvalidated, at=set_key, reason=text),
     st.builds(
         events.Identified,
@@ -267,7 +265,7 @@ some_event: st.SearchStrategy[Any] = st.one_of(
         held_out=st.lists(st.lists(six, max_size=2).map(tuple), max_size=2).map(tuple),
         held_out_after=st.lists(st.lists(six, max_size=2).map(tuple), max_size=2).map(tuple),
     ),
-    st.builds(events.Proposed, gates=st.lists(gate, max_size=3).map(tuple)),
+    st.builds(events.Proposed, gates=st.lists(gate, max_size=3).map(tuple), written=geometry),
     st.builds(events.Committed, approved_by=text),
     st.builds(
         events.ConfirmationPlanned,
@@ -317,16 +315,9 @@ def test_events_survive_the_journal(history: list[events.Event], tmp_path_factor
     assert read_journal(path) == tuple(history)
 
 
-def test_every_kind_of_event_is_in_the_union_and_under_test() -> None:
-    kinds = {
-        kind
-        for module in (course, measuring, results)
-        for _, kind in inspect.getmembers(module, inspect.isclass)
-        if issubclass(kind, Frozen) and "kind" in kind.model_fields and kind.__module__ == module.__name__
-    }
-    in_union = set(get_args(get_args(events.Event)[0]))
-    names = [kind.model_fields["kind"].default for kind in in_union]
-    assert kinds == in_union
+def test_kinds_of_events_are_different_and_never_change() -> None:
+    assert set(EVENTS) == set(get_args(get_args(events.Event)[0]))
+    names = [kind.model_fields["kind"].default for kind in EVENTS]
     assert len(set(names)) == len(names)
     assert set(names) == set(KINDS)
 

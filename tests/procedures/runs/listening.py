@@ -6,9 +6,9 @@ from typing import Any
 
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.journal import read_journal
-from procedures.run import events
+from procedures.run.keys import Phase
 from procedures.run.state import RunState
-from procedures.run.steps import Phase
+from procedures.steps import events
 
 
 def on(kind: type[Any], action: Any, count: int = 1) -> Any:
@@ -42,7 +42,8 @@ DOUBTFUL = AcceptanceGate(name="small", passed=False, sentence="It is 20 mm.", n
 
 
 def proposed(recording, *gates: AcceptanceGate) -> list[events.Event]:
-    return [*recording.until(events.Proposed)[:-1], events.Proposed(gates=gates)]
+    *before, last = recording.until(events.Proposed)
+    return [*before, last.model_copy(update={"gates": gates, "displacement": None})]
 
 
 def with_tiny_deviations_before(history) -> list[events.Event]:

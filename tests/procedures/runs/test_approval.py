@@ -6,8 +6,8 @@ import pytest
 
 from hexacell.config.change import ConfigChange
 from hexacell.errors import AnswerNeeded, ExitCode, LimitError
-from procedures.run import events
-from procedures.run.questions import UnattendedOperator
+from procedures.engine.commands import UnattendedOperator
+from procedures.steps import events
 from tests.procedures.runs.listening import DOUBTFUL, FORBIDDEN, GOOD, happened, proposed
 
 

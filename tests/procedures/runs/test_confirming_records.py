@@ -13,9 +13,10 @@ from hexacell.verdict import model_evidence
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.held_out_poses import HeldOutPoses
 from procedures.journal.journal import read_journal
-from procedures.run import events
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Move, Phase, SetKey
+from procedures.steps import events
+from procedures.steps.move import Move
 from tests.procedures.fakes import refused
 from tests.procedures.runs.listening import happened
 

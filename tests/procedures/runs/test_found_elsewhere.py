@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from hexacell.errors import ExitCode
-from procedures.run import events
-from procedures.run.steps import Move
+from procedures.steps import events
+from procedures.steps.move import Move
 from tests.procedures.runs.listening import happened
 
 

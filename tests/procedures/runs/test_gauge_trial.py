@@ -12,8 +12,9 @@ from hexacell.cell.recovery import Action
 from hexacell.errors import ExitCode, HexacellError, LimitError
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.steps import Move, Phase, SetKey
+from procedures.run.keys import Phase, SetKey
+from procedures.steps import events
+from procedures.steps.move import Move
 from tests.procedures.runs.gauge_mistakes import MISTAKES, corrected, make_mistake
 from tests.procedures.runs.listening import before_sampling, happened, on
 

@@ -7,8 +7,8 @@ import pytest
 from drivers.errors import GaugeAtEnd, GaugeSilent
 from hexacell.errors import AnswerNeeded, ExitCode, HexacellError, LimitError
 from hexacell.measurements.csv_file import read_measurements
-from procedures.run import events
-from procedures.run.questions import UnattendedOperator
+from procedures.engine.commands import UnattendedOperator
+from procedures.steps import events
 from tests.procedures.runs.listening import before_sampling, happened, on
 
 

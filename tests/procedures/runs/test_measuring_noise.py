@@ -21,16 +21,21 @@ from hexacell.errors import ExitCode, Interruption
 from hexacell.kinematics.pose import Pose
 from hexacell.services.run.calibration_run import calibration_of_run
 from hexacell.text.events import event_text
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
+from procedures.engine.commands import Abort, Stop
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
 from procedures.replay.comparison import ReplayReport
 from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Replayer
-from procedures.run import events
-from procedures.run.commands import Abort, Stop
+from procedures.run.keys import Phase, SetKey, SixNumbers
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Compute, Move, Phase, Pilot, Repeat, SetKey, SixNumbers, Standstill
+from procedures.steps import events
+from procedures.steps.assess_noise import AssessNoise
+from procedures.steps.move import Move
+from procedures.steps.pilot import Pilot
+from procedures.steps.repeat import Repeat
+from procedures.steps.standstill import Standstill
 from tests.procedures.replay.test_replayer import numbered
 from tests.procedures.rig import MakeRig, Rig, new_rig
 from tests.procedures.runs.listening import happened, on
@@ -81,7 +86,7 @@ async def test_it_is_read_at_rest_left_in_all_directions_and_evaluated(
     await measure_noise(asked)
     steps = steps_of(read_journal(asked.folder.journal))
     (first,) = (place for place, step in enumerate(steps) if isinstance(step, Standstill))
-    (last,) = (place for place, step in enumerate(steps) if step == Compute(kind="assess noise"))
+    (last,) = (place for place, step in enumerate(steps) if step == AssessNoise())
     reference = np.array(steps[first - 1].pose)
     between = steps[first + 1 : last]
     away, back, again = between[0::3], between[1::3], between[2::3]
@@ -199,7 +204,7 @@ async def test_encoders_that_show_other_places_each_time_are_told(make_rig: Make
     text = event_text(found, RunState())
     assert text is not None
     assert "Look at reading heads" in " ".join(text.split())
-    informed = rig.calibration.informed(fold(read_journal(rig.folder.journal)))
+    informed = rig.calibration.known(fold(read_journal(rig.folder.journal)))
     assert informed.settings.uncertainty == rig.cell.settings.uncertainty
     assert informed.robot.noise.encoders == pytest.approx(np.full(6, 0.03), rel=0.6)
     assert informed.robot.noise.gauges_mm == pytest.approx(np.full(3, 0.0012))

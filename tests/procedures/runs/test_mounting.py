@@ -10,9 +10,9 @@ import pytest
 
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.errors import ExitCode
-from procedures.calibration.mounting import MountingError
 from procedures.engine.recovery import RecoveryPolicy
-from procedures.run import events
+from procedures.steps import events
+from procedures.steps.place import MountingError
 from tests.procedures.runs.listening import happened, on
 
 OFF_MM = 3.8

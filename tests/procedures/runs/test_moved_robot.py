@@ -10,8 +10,8 @@ from hexacell.cell.recovery import Action
 from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
 from procedures.engine.recovery import RecoveryPolicy
-from procedures.run import events
 from procedures.run.trips import Guard, GuardTripped
+from procedures.steps import events
 from tests.procedures.runs.listening import happened, on
 
 

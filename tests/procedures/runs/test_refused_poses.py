@@ -15,10 +15,10 @@ from hexacell.cell.simulation import SoftLimits
 from hexacell.errors import ExitCode, IdentifiabilityError, Interruption
 from hexacell.kinematics.pose import Pose
 from procedures.engine import step_executor
-from procedures.run import events
-from procedures.run.commands import Abort
+from procedures.engine.commands import Abort
+from procedures.run.keys import Phase
 from procedures.run.state import fold
-from procedures.run.steps import Phase
+from procedures.steps import events
 from tests.procedures.fakes import refused
 from tests.procedures.runs.listening import happened, on
 

@@ -9,9 +9,9 @@ import pytest
 from drivers.errors import GaugeAtEnd
 from hexacell.errors import DeviceError, ExitCode, FileError, WriteBackUndone
 from hexacell.verdict.decision import Verdict
-from procedures.run import events
-from procedures.run.questions import UnattendedOperator
+from procedures.engine.commands import UnattendedOperator
 from procedures.run.state import fold
+from procedures.steps import events
 from tests.procedures.runs.listening import (
     before_sampling,
     commanding,

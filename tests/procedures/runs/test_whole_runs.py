@@ -14,10 +14,11 @@ from hexacell.config.toml_format import NativeToml
 from hexacell.errors import ExitCode
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.measurements.csv_file import read_measurements
-from procedures.calibration.workflow import Mode
-from procedures.run import events
+from procedures.calibration.calibration import Mode
+from procedures.run.keys import Phase
 from procedures.run.state import fold
-from procedures.run.steps import Compute, Phase, Sample
+from procedures.steps import events
+from procedures.steps.sample import Sample
 from tests.procedures.runs.listening import happened
 
 
@@ -98,9 +99,7 @@ async def test_a_check_measures_judges_and_changes_nothing(make_rig) -> None:
     assert "reload" not in rig.controller.log
     phases = {event.at.phase for event in happened(rig, events.RecordTaken)}
     assert phases == {Phase.IDENTIFY}
-    computed = [
-        event.step.kind for event in happened(rig, events.StepBegun) if isinstance(event.step, Compute)
-    ]
+    computed = [event.step.kind for event in happened(rig, events.StepBegun) if event.step.moves_nothing]
     assert computed == ["judge"]
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from hexacell.config.write_record import RECORDS, THE_RUN, WriteKind, WriteRecord, read_records
 from hexacell.errors import DeviceError, ExitCode, WriteBackUndone
-from procedures.run import events
+from procedures.steps import events
 from tests.procedures.runs.listening import with_tiny_deviations_before
 from tests.procedures.runs.test_rollback import CLEARLY_WORSE
 

@@ -13,11 +13,11 @@ from hexacell.services.notify import notice as run_notices
 from hexacell.services.notify.notice import RunEnd, notice_of_end, notice_of_failure
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.verdict.decision import Verdict
-from procedures.calibration.workflow import Mode
+from procedures.calibration.calibration import Mode
+from procedures.engine.commands import UnattendedOperator
 from procedures.journal.journal import read_journal
-from procedures.run import events
-from procedures.run.questions import UnattendedOperator
 from procedures.run.state import fold
+from procedures.steps import events
 from tests.hexacell.services.proposed_runs import a_cell, propose_run
 
 

@@ -1,0 +1,361 @@
+"""What is calibrated, and what a run has learnt of it so far; which step comes next is decided elsewhere.
+
+A check measures points until they decide, and nothing else (:mod:`~hexacell.checks.check`); the quick level
+carries a check on to a geometry (:mod:`~hexacell.checks.quick_level`). A length check, of its own or before
+the verdict on a calibration, measures two seats. Nothing here uses hardware or files, so a run, its
+resumption and its replay compute alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import cached_property, lru_cache, partial
+
+import numpy as np
+
+from hexacell.campaign.decisions import CampaignState
+from hexacell.campaign.planner import Plan
+from hexacell.campaign.pose_list import PoseList
+from hexacell.cell.model import CellSettings
+from hexacell.checks.check import Check, identified_before
+from hexacell.checks.quick_level import QuickLevel
+from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
+from hexacell.identification.identified_zeros import ParameterChoice
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.refused_commands import RefusedCommands
+from hexacell.measurements.records import MeasurementSet
+from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
+from hexacell.results.result import AcceptedResult
+from hexacell.results.written_geometry import WrittenGeometry, as_written
+from hexacell.robot.model import Robot
+from hexacell.robot.stated_effects import stated_effects
+from hexacell.verdict.decision import ErrorLimits
+from hexacell.verdict.length_check import with_measured_scale
+from procedures.calibration.held_out_poses import HeldOutPoses, PosesByPoint, replacements
+from procedures.run.keys import Phase, SetKey, SixNumbers
+from procedures.run.state import RunState
+
+
+class Mode(StrEnum):
+    """What a run is for."""
+
+    OPTIMISE = "optimise"
+    CHECK = "check"
+    QUICK = "quick"
+    LENGTH = "length"
+
+
+@dataclass(frozen=True, slots=True)
+class Learnt:
+    """What a run has learnt and done so far, as far as the choice of steps depends on it.
+
+    Attributes:
+        refused: what the cell file excludes and the controller refused.
+        noise: what was measured of it; None before that, or where the cell file does not ask for it.
+        provisional: parameters of the geometry that the controller was given for a while, in the
+            mechanism's frame convention; ``is_lent``: it has it now.
+        written: parameters of the proposed geometry, in the controller's frames; ``is_committed``: the
+            controller has it.
+    """
+
+    refused: RefusedCommands
+    noise: MeasuredNoise | None = None
+    provisional: tuple[float, ...] | None = None
+    is_lent: bool = False
+    written: tuple[float, ...] | None = None
+    is_committed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """The calibration or check of one cell.
+
+    Attributes:
+        listed: the poses to measure, if a file lists them.
+        accepted: the result that the controller has, of which a check starts; None where that is the
+            drawing. A length check and the quick level have one.
+        length_check: whether the length scale of a calibration is checked.
+        effort: of the search for poses.
+    """
+
+    settings: CellSettings
+    robot: Robot
+    mode: Mode
+    listed: PoseList | None = None
+    accepted: AcceptedResult | None = None
+    length_check: bool = False
+    effort: SearchEffort = USUAL_EFFORT
+
+    def __post_init__(self) -> None:
+        # Checks, and the quick level that carries one on, have to do with all that may have drifted.
+        if self.mode is not Mode.OPTIMISE and self.robot.identifies is not ParameterChoice.ALL:
+            object.__setattr__(self, "robot", replace(self.robot, identifies=ParameterChoice.ALL))
+
+    def known(self, state: RunState) -> Knowledge:
+        """What is known of the robot in a state of the run; one object as long as nothing new is learnt."""
+        parameters = self.robot.mechanism.parameters
+        lent, proposed = self.provisional_of(state), state.proposed
+        written = None if proposed is None else Geometry.of(parameters, proposed.written)
+        return self._knowledge(
+            Learnt(
+                self.robot.refused | state.refused,
+                None if state.noise is None else state.noise.noise,
+                None if lent is None else tuple(lent.vector.tolist()),
+                state.provisional_active,
+                None if written is None else tuple(written.vector.tolist()),
+                state.committed is not None,
+            )
+        )
+
+    @cached_property
+    def at_start(self) -> Knowledge:
+        """What is known before anything is measured."""
+        return Knowledge(self, Learnt(self.robot.refused))
+
+    @cached_property
+    def _knowledge(self) -> Callable[[Learnt], Knowledge]:
+        # What was searched and estimated for a step serves the next one; a run returns to what it knew when
+        # a provisional geometry is taken back.
+        return lru_cache(maxsize=4)(partial(Knowledge, self))
+
+    @property
+    def plan(self) -> Plan:
+        """What is measured to identify the geometry, or to check it, as far as it is known at the start."""
+        return self.at_start.plan
+
+    def robot_of(self, state: RunState) -> Robot:
+        """The robot with all geometries that commanded the records of the identification."""
+        return self.known(state).robot_of(state)
+
+    def as_written(self, identified: Geometry) -> WrittenGeometry:
+        """What the controller gets of a geometry in the frame convention."""
+        return as_written(self.settings, self.robot, identified)
+
+    def provisional_of(self, state: RunState) -> Geometry | None:
+        """The provisional geometry of a run, in the mechanism's frame convention; None if it had none."""
+        lent = state.provisional
+        return None if lent is None else Geometry.of(self.robot.mechanism.parameters, lent.geometry)
+
+    def robot_checked(self, robot: Robot) -> Robot:
+        """A robot as the accepted result left it, with its drift since, before a length check."""
+        assert self.accepted is not None  # noqa: S101 - without one no length check is begun
+        covariance, drift = np.array(self.accepted.covariance), self.settings.check.drift_per_parameter_mm
+        return replace(robot, known=identified_before(robot, covariance, drift).prior(1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """A calibration with what its run has learnt so far."""
+
+    calibration: Calibration
+    learnt: Learnt
+
+    @property
+    def noise(self) -> MeasuredNoise | None:
+        """What was measured of the noise; None before that."""
+        return self.learnt.noise
+
+    @cached_property
+    def settings(self) -> CellSettings:
+        """What the cell file states, with the measured noise."""
+        settings, noise = self.calibration.settings, self.learnt.noise
+        return settings if noise is None else with_measured_noise(settings, noise)
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot as its controller commanded it at the start, with the measured noise."""
+        robot = replace(self.calibration.robot, refused=self.learnt.refused)
+        return robot if self.learnt.noise is None else robot.with_errors_of(self.settings)
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The plan of what is measured first, for the geometry that the controller has at the start."""
+        match self.calibration.mode:
+            case Mode.QUICK:
+                return self.quick.plan
+            case Mode.CHECK:
+                return self.check.plan
+            case Mode.LENGTH:
+                return self._plan_of(self.calibration.robot_checked(self.robot))
+        return self._plan_of(self.robot)
+
+    @cached_property
+    def identifying(self) -> Plan:
+        """The plan for the geometries that the controller has while the points are measured."""
+        if (lent := self.learnt.provisional) is None:
+            return self.plan
+        geometry = Geometry(self.robot.mechanism.parameters, lent)
+        return self._plan_of(self.robot.with_provisional(geometry, is_used=self.learnt.is_lent))
+
+    @cached_property
+    def measuring(self) -> Plan:
+        """The plan for the geometry that the controller has now, and for those that it had."""
+        if not self.learnt.is_committed:
+            return self.identifying
+        return self._plan_of(self.robot.with_controller(self._written))
+
+    @cached_property
+    def check(self) -> Check:
+        """The check of the robot as it is now."""
+        calibration, wanted, accepted = self.calibration, self.settings.check, self.calibration.accepted
+        before, robot = None, self._at_temperatures(self.robot)
+        if accepted is not None:
+            covariance = np.array(accepted.covariance)
+            before = identified_before(robot, covariance, wanted.drift_per_parameter_mm)
+        return Check(
+            self.settings,
+            robot,
+            before,
+            ErrorLimits.of(self.settings.acceptance),
+            wanted.budget_records,
+            calibration.listed,
+            robot.effects,
+            {} if accepted is None else accepted.parameter_columns,
+            calibration.effort,
+        )
+
+    @cached_property
+    def quick(self) -> QuickLevel:
+        """The quick level, from the accepted result on."""
+        return QuickLevel(self.check, self.settings.quick.budget_records)
+
+    @property
+    def held_out_poses(self) -> HeldOutPoses:
+        """Chooses the held-out poses that are measured before the write-back."""
+        return self._held_out_poses(self.plan.robot)
+
+    def robot_of(self, state: RunState) -> Robot:
+        """The robot with all geometries that commanded the records of the identification."""
+        if self.calibration.mode is Mode.QUICK:
+            robot = self.quick.robot_after(state.measurements())
+        else:
+            robot = self.identifying.robot
+        return self._at_temperatures(robot, state.temperature_range_k)
+
+    def written_robot(self, state: RunState) -> Robot:
+        """The robot with the proposed geometry in its controller."""
+        return self._at_temperatures(self.robot.with_controller(self._written), state.temperature_range_k)
+
+    def provisional_geometry(self, state: RunState) -> Geometry:
+        """The estimate by now, or the provisional geometry that the run applied before an interruption.
+
+        A run has only one, because poses that were commanded with it are visited again.
+
+        Raises:
+            HexacellError: the records so far give no estimate.
+        """
+        lent = self.calibration.provisional_of(state)
+        return self.plan.estimate(campaign_state(state, None)).belief.estimate if lent is None else lent
+
+    def held_out_poses_after(self, identified: Identification, before: PosesByPoint) -> PosesByPoint:
+        """Held-out poses that the robot can take once the identified geometry is written."""
+        zeros = self.robot.identified_zeros(identified)
+        written = as_written(self.settings, self.robot, (zeros or identified).geometry).geometry
+        return self._held_out_poses(self.robot.with_controller(written)).after(identified, before)
+
+    def confirming_poses(self, identified: Identification, state: RunState) -> PosesByPoint:
+        """Held-out poses unlike all that were measured, to confirm a failure."""
+        found = state.identified
+        assert found is not None  # noqa: S101 - callers have a result
+        chooser = self._held_out_poses(self.measuring.robot)
+        return chooser.confirming(identified, found.held_out, found.held_out_after)
+
+    def held_out_replacements(
+        self, identified: Identification, state: RunState
+    ) -> Iterator[tuple[SixNumbers, SixNumbers]]:
+        """Held-out poses that the controller refuses, each with another one, in the controller's frames.
+
+        Those that were measured before the write-back are not replaced after it: both are compared. A point
+        with too few others keeps what is left of its own, and one whose reference is refused is left.
+        """
+        found = state.identified
+        assert found is not None  # noqa: S101 - its poses are held out of an identification
+        references = [poses[0] if poses else None for poses in found.held_out]
+        if state.committed is None:
+            others = self.held_out_poses.after(identified, found.held_out)
+            yield from replacements(state.refused, references, found.held_out, others)
+        if found.held_out_after:
+            others = self.held_out_poses_after(identified, found.held_out)
+            yield from replacements(state.refused, references, found.held_out_after, others)
+
+    @property
+    def _written(self) -> Geometry:
+        assert self.learnt.written is not None  # noqa: S101 - only then there is a proposal
+        return Geometry(self.robot.mechanism.parameters, self.learnt.written)
+
+    def _held_out_poses(self, robot: Robot) -> HeldOutPoses:
+        return HeldOutPoses(self.settings, robot, self.calibration.effort.held_out_candidates)
+
+    def _plan_of(self, robot: Robot) -> Plan:
+        calibration = self.calibration
+        return Plan(self.settings, robot, calibration.listed, calibration.effort)
+
+    def _at_temperatures(self, robot: Robot, range_k: float | None = None) -> Robot:
+        """The robot with the effects of temperatures read while measuring, and a scale measured before."""
+        accepted = self.calibration.accepted
+        effects = stated_effects(self.settings, range_k)
+        length = None if accepted is None else accepted.length
+        is_carried_on = accepted is not None and self.calibration.mode is Mode.QUICK
+        known = accepted.parameter_columns if accepted is not None and is_carried_on else {}
+        return replace(robot, effects=with_measured_scale(effects, length), known_effects=known)
+
+
+def expected_records(
+    settings: CellSettings, mode: Mode, listed: PoseList | None = None, *, length_check: bool = False
+) -> int:
+    """The largest number of settled readings in a whole run, closings of sets included."""
+    fixture = settings.length_check
+    length = 0 if fixture is None else fixture.mountings * (fixture.orientations + 2)
+    if mode is Mode.LENGTH:
+        return length
+    plan, held_out = settings.identification, settings.verification
+    points = len(held_out.points)
+    verification = points * (held_out.orientations + 1)
+    if mode is Mode.CHECK:
+        return settings.check.budget_records + len(plan.points)
+    records = len(plan.points) * plan.orientations if listed is None else len(listed)
+    budget = settings.quick.budget_records if mode is Mode.QUICK else plan.budget_records
+    identification = min(records, budget or records) + len(plan.points)
+    calibration = identification + 2 * verification + points * (held_out.orientations - 1)
+    return calibration + (length if length_check else 0)
+
+
+def campaign_state(state: RunState, key: SetKey | None) -> CampaignState:
+    """The run as the campaign knows it, with an open set or none.
+
+    Records are in the order in which their sets were measured.
+    """
+    sets = {at: measured for at, measured in state.sets.items() if at.phase is Phase.IDENTIFY}
+    records = tuple(sample.record for measured in sets.values() for sample in measured.samples)
+    return CampaignState(
+        measurements=MeasurementSet(records),
+        point=None if key is None else key.point,
+        done=frozenset(at.point for at, measured in sets.items() if measured.closed) | _left_points(state),
+        present=_present_pose(state, key),
+        rejections=0 if key is None else state.set(key).rejections,
+        zero_mm=None if key is None else state.zero_shown(key),
+        pilots=state.pilots,
+    )
+
+
+def _left_points(state: RunState) -> frozenset[int]:
+    """Points that cannot be measured, because the controller refuses their reference."""
+    keys = {refused.at for refused in state.excluded if refused.at.phase is Phase.IDENTIFY}
+    return frozenset(key.point for key in keys if state.is_left(key))
+
+
+def _present_pose(state: RunState, key: SetKey | None) -> Pose | None:
+    """The pose that the robot was commanded to last, that of a rejected record included.
+
+    Between points none where it was brought by somebody: it can be brought elsewhere, too.
+    """
+    if state.target is not None and (key is not None or state.at_pose is not None):
+        return Pose(*state.target)
+    if key is None:
+        return None
+    samples = state.set(key).samples
+    return Pose(*samples[-1].pose) if samples else None

@@ -1,0 +1,205 @@
+"""The controller's config during a run: its changes, each a transaction, and edits by somebody else.
+
+A run makes two changes: a provisional geometry while the points are measured, and the result. One step
+applies a change, another reverts it::
+
+    change        applied by    reverted by    backup and receipt
+    provisional   lend          take back      <run>/lent
+    result        commit        roll back      <run>
+
+A transaction is begun in the journal by its step, written with a receipt that can undo it, read by the
+controller, and confirmed in the journal by its event; each write of the file leaves a record beside the run
+folders (:mod:`~hexacell.config.write_record`). If the controller does not read a new geometry,
+the file is restored before the error is raised. A crash or a cancellation in between leaves a whole file,
+old or new, and the receipt; applying and reverting may both be repeated from there.
+
+The records of a run are commanded with the geometry of its config. The file must therefore be the one that
+the run began with, or the one that the run itself wrote and has not reverted.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import zip_longest
+from pathlib import Path
+
+from hexacell.cell.loader import Cell
+from hexacell.config.change import ConfigChange, propose
+from hexacell.config.layout import Contents, fingerprint, fingerprint_of, read_contents
+from hexacell.config.receipt import RECEIPT, Receipt
+from hexacell.config.write_back import commit, rollback
+from hexacell.config.write_record import THE_RUN, WriteCause, WriteKind, recorded_write
+from hexacell.errors import FileError, HexacellError, WriteBackUndone
+from hexacell.kinematics.geometry import Geometry
+from hexacell.robot.model import config_layout
+from hexacell.runs.run_folder import RunFolder
+from procedures.resources.startup import Startup
+from procedures.run.cancellation import in_thread
+from procedures.run.state import RunState
+
+_log = logging.getLogger(__name__)
+
+PROVISIONAL_FOLDER = "lent"
+
+_NAMES = {WriteKind.RESULT: "the new geometry", WriteKind.PROVISIONAL: "the provisional geometry"}
+_UNDOES = {
+    WriteKind.RESULT: WriteKind.TAKEN_BACK,
+    WriteKind.PROVISIONAL: WriteKind.PROVISIONAL_TAKEN_BACK,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ConfigChanges:
+    """Changes the config of one run, and makes the controller read it."""
+
+    cell: Cell
+    startup: Startup
+    folder: RunFolder
+
+    @property
+    def provisional_backup(self) -> Path:
+        """Where the config is kept while the controller has a provisional geometry."""
+        return self.folder.path / PROVISIONAL_FOLDER
+
+    def holds_provisional(self) -> bool:
+        """Whether the config holds the provisional geometry of this run; raises ``FileError``."""
+        return holds_provisional(self.folder, self.cell.config_paths)
+
+    def change_to(self, geometry: Geometry, state: RunState) -> ConfigChange:
+        """The change of the config to a geometry in the controller's frames; nothing is written."""
+        return propose(
+            self.cell.config_paths,
+            config_layout(self.cell.settings),
+            geometry,
+            fingerprint_at_start=state.started.config_sha256 if state.started else "",
+        )
+
+    def cause(self, kind: WriteKind, why: str, *, by: str = THE_RUN) -> WriteCause:
+        """Why this run writes."""
+        return WriteCause(kind, by, self.folder.name, why)
+
+    async def apply(
+        self, change: ConfigChange, backup: Path, cause: WriteCause, action: str | None = None
+    ) -> None:
+        """Write a change and make the controller read it.
+
+        Raises:
+            WriteBackUndone: the controller did not read the new geometry; its config is as before.
+            HexacellError: the config cannot be written or read.
+        """
+        receipt = await in_thread(self._commit, change, backup, cause)
+        try:
+            await self.startup.reload()
+        except HexacellError as error:
+            undoing = self.cause(_UNDOES[cause.kind], f"the controller did not take it: {error}")
+            await in_thread(self._roll_back, receipt, undoing)
+            raise WriteBackUndone(
+                f"the controller did not take {_NAMES[cause.kind]} ({error}); its config is restored",
+                subject=receipt.path,
+                action=action if await self._reads_again() else "Restart the controller before it moves",
+            ) from error
+
+    async def write(self, change: ConfigChange, backup: Path, cause: WriteCause) -> None:
+        """Write a change that the controller is not to read yet."""
+        await in_thread(self._commit, change, backup, cause)
+
+    async def restore(self, backup: Path, cause: WriteCause) -> None:
+        """Restore what a backup keeps; the controller is not made to read it yet."""
+        await in_thread(self._roll_back, Receipt.of(backup), cause)
+
+    def require_begun_with(self, state: RunState) -> None:
+        """Make sure that the config is the one that the run began with; raises ``FileError``."""
+        if state.started and fingerprint(*self.cell.config_paths) != state.started.config_sha256:
+            raise _edited(self.cell.config_path)
+
+    async def _reads_again(self) -> bool:
+        """Reload the restored config; whether the controller is known to have its old geometry."""
+        try:
+            await self.startup.controller.reload(self.startup.stated)
+            return (await self.startup.guards.position.read()).trip is None
+        except HexacellError:
+            return False
+
+    def _commit(self, change: ConfigChange, backup: Path, cause: WriteCause) -> Receipt:
+        with self._recorded(cause):
+            return commit(change, backup)
+
+    def _roll_back(self, receipt: Receipt, cause: WriteCause) -> None:
+        with self._recorded(cause):
+            rollback(receipt)
+
+    @contextmanager
+    def _recorded(self, cause: WriteCause) -> Iterator[None]:
+        """Record a write; where that fails the run goes on, with a warning: its journal has the write."""
+        layout = config_layout(self.cell.settings)
+        with recorded_write(self.folder.siblings, self.cell.config_paths, layout, cause) as recording:
+            yield
+        if recording.problem:
+            _log.warning("%s", recording.problem)
+
+
+def holds_provisional(folder: RunFolder, config: tuple[Path, ...]) -> bool:
+    """Whether a config holds the provisional geometry that a run wrote; raises ``FileError``."""
+    backup = folder.path / PROVISIONAL_FOLDER
+    return (backup / RECEIPT).is_file() and Receipt.of(backup).sha256_after == fingerprint(*config)
+
+
+@dataclass(eq=False)
+class ConfigEdits:
+    """Notices that somebody edited the config of a run, before the robot moves again."""
+
+    paths: tuple[Path, ...]
+    folder: RunFolder
+    _unedited: Contents | None = field(default=None, init=False)
+
+    def require_none(self, state: RunState) -> None:
+        """Make sure that the config is as the run has it; while it is being changed, it may be either.
+
+        Raises:
+            FileError: it was edited; with the first line that differs, if this process has seen it before.
+        """
+        expected = expected_fingerprints(self.folder, state)
+        if not expected:
+            return
+        found = read_contents(self.paths)
+        if fingerprint_of(found) in expected:
+            self._unedited = found
+            return
+        raise _edited(*self._first_difference(found))
+
+    def _first_difference(self, found: Contents) -> tuple[Path, int | None]:
+        """The first file that differs, and its first line that does; no line if that is not known."""
+        for path, old, new in zip(self.paths, self._unedited or (), found, strict=False):
+            if old != new:
+                lines = zip_longest(old.split(b"\n"), new.split(b"\n"))
+                return path, next(
+                    (row for row, (one, two) in enumerate(lines, start=1) if one != two), None
+                )
+        return self.paths[0], None
+
+
+def expected_fingerprints(folder: RunFolder, state: RunState) -> set[str]:
+    """The fingerprints that the config may have by now; empty where that is not known."""
+    if state.started is None or state.config_write_pending or state.rolling_back:
+        return set()
+    if state.committed is not None and not state.rolled_back:
+        return {Receipt.of(folder.path).sha256_after}
+    if state.provisional_active:
+        return {Receipt.of(folder.path / PROVISIONAL_FOLDER).sha256_after}
+    expected = {state.started.config_sha256}
+    if state.proposed is not None and (folder.path / RECEIPT).is_file():  # killed while it was written
+        expected.add(ConfigChange.load(folder.proposal).sha256_after)
+    return expected
+
+
+def _edited(path: Path, line: int | None = None) -> FileError:
+    """The error for a config that is not as the run has it."""
+    return FileError(
+        "the config changed since the run began, whose records were commanded with the geometry before",
+        subject=path,
+        line=line,
+        action="Undo the edit and retry; if the run has ended, resume it then",
+    )

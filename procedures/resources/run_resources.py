@@ -1,0 +1,222 @@
+"""What a step uses to do its work: the devices under guards, the clock, the operator, the run folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from drivers.interfaces import StartupAction
+from hexacell.campaign.budget import speed_limits
+from hexacell.cell.loader import Cell
+from hexacell.cell.model import CellSettings
+from hexacell.clock import CellClock
+from hexacell.config.layout import CurrentConfig
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.position_agreement import PositionReports
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import deviation_of, joints_of
+from hexacell.motion.duration import LineDurations
+from hexacell.robot.model import config_layout
+from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.calibration import Calibration
+from procedures.devices.device_set import Devices, Thermometers, gather_errors
+from procedures.devices.settling import DeviceSnapshot, Settled, read_series, settle, trimmed_mean
+from procedures.guards.guards import Guards
+from procedures.resources.config_changes import ConfigChanges, ConfigEdits
+from procedures.resources.startup import Startup
+from procedures.run.cancellation import in_thread
+from procedures.run.keys import SixNumbers
+from procedures.run.questions import Operator, Question
+from procedures.run.readings import Reading, ReadingSeries, Temperature
+from procedures.run.state import RunState
+from procedures.run.trips import Guard, Trip, WatchedSet
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+SKEW_DECIMALS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class RunResources:
+    """The resources of one run; a replay has others of the same kind."""
+
+    cell: Cell
+    calibration: Calibration
+    devices: Devices
+    clock: CellClock
+    operator: Operator
+    folder: RunFolder
+    thermometers: Thermometers = field(default_factory=Thermometers)
+
+    @property
+    def settings(self) -> CellSettings:
+        """What the cell file states."""
+        return self.cell.settings
+
+    @cached_property
+    def guards(self) -> Guards:
+        """What stops the robot; a guard that tripped stays latched as long as this exists."""
+        return Guards(self.settings, self.devices, self.clock, self.folder.path, self.current_config)
+
+    @cached_property
+    def current_config(self) -> CurrentConfig:
+        """The config that the controller is to run."""
+        return CurrentConfig(self.cell.config_paths, config_layout(self.settings))
+
+    @cached_property
+    def startup(self) -> Startup:
+        """What makes the controller ready to move."""
+        stated = frozenset(StartupAction(word) for word in self.settings.controller.startup)
+        return Startup(self.devices.controller, self.guards, self.operator, stated)
+
+    @cached_property
+    def config(self) -> ConfigChanges:
+        """What changes the controller's config."""
+        return ConfigChanges(self.cell, self.startup, self.folder)
+
+    @cached_property
+    def edits(self) -> ConfigEdits:
+        """Whether somebody edited the config."""
+        return ConfigEdits(self.cell.config_paths, self.folder)
+
+    async def prepare(self, state: RunState) -> None:
+        """Make the controller, whose config nobody edited, ready to move; raises ``HexacellError``."""
+        await self.require_unedited_config(state)
+        await self.startup.prepare(state)
+
+    async def require_unedited_config(self, state: RunState) -> None:
+        """Make sure that nobody edited the config; raises ``FileError``."""
+        self.edits.require_none(state)
+
+    async def in_thread(
+        self, work: Callable[Arguments, Result], *args: Arguments.args, **kwargs: Arguments.kwargs
+    ) -> Result:
+        """Compute in a thread; a cancelled caller waits for its end."""
+        return await in_thread(work, *args, **kwargs)
+
+    # Where the robot is, and how it moves.
+
+    async def locate(self) -> PositionReports:
+        """Where the robot is; raises ``GuardTripped`` if controller and encoders do not agree on that."""
+        return await self.guards.locate()
+
+    async def require_departure(self, state: RunState) -> None:
+        """Make sure that the robot is where the run left it; nothing moves.
+
+        While a run is paused, or waits for a person, somebody may have moved the robot with its own
+        controller.
+
+        Raises:
+            GuardTripped: it is somewhere else, or where it is, is not known.
+        """
+        supervisor = self.guards.supervisor
+        supervisor.check()
+        if state.target is None or state.position_unknown:
+            return
+        reported = await self.devices.controller.position()
+        if reported is not None and self._is_at(reported.pose, state.target):
+            return
+        here = (await self.guards.locate()).pose
+        if not self._is_at(here, state.target):
+            problem = (
+                f"the robot is at {here} and not at {Pose(*state.target)}, where it arrived: it was moved"
+            )
+            action = "Retry: the run then plans its way from where the robot is"
+            raise supervisor.latch(Trip(Guard.POSITION, "controller", problem, action))
+
+    async def has_stayed(self, state: RunState) -> bool:
+        """Whether the robot is still where it was commanded last; raises ``GuardTripped``."""
+        here = await self.guards.locate()
+        return state.target is not None and self._is_at(here.pose, state.target)
+
+    def _is_at(self, here: Pose, target: SixNumbers) -> bool:
+        """Whether a reported pose is a commanded one; each may be off by the tolerance of an arrival."""
+        there, settings = Pose(*target), self.settings.controller
+        position = np.abs(here.position - there.position).max()
+        angle = np.degrees(np.abs(here.rotation - there.rotation).max())
+        is_near = position <= 2.0 * settings.position_tolerance_mm
+        return bool(is_near and angle <= 2.0 * settings.angle_tolerance_deg)
+
+    async def move(self, start: Pose, target: Pose, watched: WatchedSet, *, at_gauges: bool) -> None:
+        """Move under guards, as fast as the cell file allows with or without gauges at the ball."""
+        commanding = self.current_config.geometry()
+        lines = LineDurations(self.settings.mechanism, commanding.geometry, commanding.branch)
+        duration_s = lines.of(start, target, speed_limits(self.settings.speed, at_gauges=at_gauges))
+        await self.guards.move(target, duration_s, watched, partial(self._joints_at, target))
+
+    def _joints_at(self, target: Pose) -> Array:
+        """The joint variables (6,) of a pose by the geometry that the controller has now."""
+        commanding = self.current_config.geometry()
+        mechanism = self.calibration.robot.mechanism
+        joints: Array = mechanism.inverse(commanding.geometry, commanding.branch, PoseBatch.of([target]))[0]
+        return joints
+
+    async def ask_at_standstill(self, question: Question) -> str | None:
+        """Ask a person while the robot must not move."""
+        return await self.guards.at_standstill(lambda: self.operator.ask(question))
+
+    # What the instruments read.
+
+    async def read(self, windows: int = 1) -> Reading:
+        """The mean of some settled windows of all devices; raises ``HexacellError``."""
+        timing = self.settings.timing
+        settled = [
+            await self.guards.during_readings(lambda: settle(self.devices, timing, self.clock))
+            for _ in range(windows)
+        ]
+        return _reading(self.devices, settled, await self.thermometers.read())
+
+    async def read_series(self, count: int) -> ReadingSeries:
+        """A series of readings of all devices, once they are settled; raises ``HexacellError``."""
+        timing = self.settings.timing
+        series = await self.guards.during_readings(
+            lambda: read_series(self.devices, timing, self.clock, count)
+        )
+        return ReadingSeries(
+            gauges_mm=tuple(deviation_of(_on_axes(self.devices, row)) for row in series.gauges),
+            joints=tuple(joints_of(row) for row in series.joints),
+            **_raw(series.window),
+        )
+
+    async def check_gauges(self) -> None:
+        """Make sure that the gauges are set as they were; raises ``HexacellError``."""
+        checks = [mounted.gauge.check() for mounted in self.devices.gauges]
+        await gather_errors("gauges are not as they were", checks)
+
+
+def _reading(
+    devices: Devices, settled: Sequence[Settled], temperatures: tuple[Temperature, ...]
+) -> Reading:
+    """The trimmed mean of settled windows, with the largest range within one of them."""
+    gauges = trimmed_mean(np.concatenate([one.gauges for one in settled]))
+    joints = trimmed_mean(np.concatenate([one.joints for one in settled]))
+    spreads = np.max([np.ptp(one.gauges, axis=0) for one in settled], axis=0)
+    return Reading(
+        gauges_mm=deviation_of(_on_axes(devices, gauges)),
+        spread_mm=deviation_of(np.abs(_on_axes(devices, spreads))),
+        joints=joints_of(joints),
+        temperatures=temperatures,
+        **_raw([snapshot for one in settled for snapshot in one.window]),
+    )
+
+
+def _on_axes(devices: Devices, values: Array) -> Array:
+    """Values (3,) of the gauges, in their order, along base x, y, z."""
+    on_axes = np.zeros(3)
+    for row, mounted in enumerate(devices.gauges):
+        on_axes[mounted.axis.index] = mounted.axis.coordinate(values[row])
+    return on_axes
+
+
+def _raw(snapshots: Sequence[DeviceSnapshot]) -> dict[str, Any]:
+    """The fields of raw readings."""
+    return {
+        "answers": tuple(tuple(reading.raw for reading in one.gauges) for one in snapshots),
+        "counts": tuple(one.encoders.counts for one in snapshots),
+        "skews_s": tuple(round(one.skew_s, SKEW_DECIMALS) for one in snapshots),
+    }

@@ -1,0 +1,76 @@
+"""Where something is measured, and what for: phases, and the keys of sets."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from hexacell.campaign.pilots import pilot_number
+from hexacell.cell.fields import Frozen
+
+SixNumbers = tuple[float, float, float, float, float, float]
+ThreeNumbers = tuple[float, float, float]
+
+
+class Phase(StrEnum):
+    """What a set of poses is measured for; the value begins the keys of its steps."""
+
+    IDENTIFY = "P"
+    BEFORE = "before-V"
+    AFTER = "after-V"
+    CONFIRM = "confirm-V"
+    LENGTH = "L"
+
+    @property
+    def has_new_geometry(self) -> bool:
+        """Whether the held-out poses are commanded with the geometry that is to be verified."""
+        return self in {Phase.AFTER, Phase.CONFIRM}
+
+
+SET_NAMES = {
+    Phase.IDENTIFY: "point {}",
+    Phase.BEFORE: "held-out point {}, before",
+    Phase.AFTER: "held-out point {}, after",
+    Phase.CONFIRM: "held-out point {}, again",
+    Phase.LENGTH: "length check, mounting {}",
+}
+
+
+class SetKey(Frozen):
+    """The poses at one point, measured with gauges zeroed once; points count from 1.
+
+    In a length check a point is a mounting of the gauges; all have the zero of the first one.
+    """
+
+    phase: Phase
+    point: int
+
+    def __str__(self) -> str:
+        return f"{self.phase.value}{self.point}"
+
+    @property
+    def station(self) -> str:
+        """Where the gauges stand, and for what, in words."""
+        match self.phase:
+            case Phase.BEFORE:
+                return f"held-out point {self.point}"
+            case Phase.AFTER:
+                return f"held-out point {self.point} with the new geometry"
+            case Phase.CONFIRM:
+                return f"held-out point {self.point} with the new geometry, confirming records"
+        return f"point {self.point}"
+
+    @property
+    def seat(self) -> int:
+        """The seat, 1 or 2, of a mounting in a length check."""
+        return 2 - self.point % 2
+
+    @property
+    def name(self) -> str:
+        """Display name: ``point 2``, ``held-out point 1, before``."""
+        return SET_NAMES[self.phase].format(self.point)
+
+    def pose_name(self, orientation: int) -> str:
+        """Display name of a pose of the set: ``point 2, orientation 3``, ``point 1, pilot pose 2``."""
+        pilot = pilot_number(orientation)
+        pose = f"orientation {orientation}" if pilot is None else f"pilot pose {pilot}"
+        return f"{self.name}, {pose}"

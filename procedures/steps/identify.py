@@ -1,0 +1,86 @@
+"""Identify: the geometry is identified from the records, and the held-out poses are chosen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from hexacell.checks.quick_level import QuickAccuracy
+from hexacell.errors import LimitError
+from hexacell.identification.estimator import identify
+from hexacell.measurements.csv_file import write_measurements
+from hexacell.results.result import ExpectedImprovement, IdentificationResult
+from hexacell.verdict.assessment import Assessment, assess
+from hexacell.verdict.findings import findings
+from hexacell.verdict.fit_document import fit_document
+from procedures.run.keys import SixNumbers
+from procedures.steps.base import BaseEvent, Computation
+
+if TYPE_CHECKING:
+    from procedures.calibration.calibration import Knowledge
+    from procedures.calibration.held_out_poses import PosesByPoint
+    from procedures.resources.run_resources import RunResources
+    from procedures.run.state import RunState
+
+
+class Identified(BaseEvent):
+    """The geometry was identified, and the held-out poses were chosen.
+
+    ``held_out`` are measured at each point before and after, ``held_out_after`` only after: the robot
+    cannot take them safely before it is calibrated. ``improvement`` is None where the robot can reach none
+    of the task poses. ``quick`` is how well the quick level knows the robot; None in other runs.
+    """
+
+    kind: Literal["identified"] = "identified"
+    result: IdentificationResult
+    held_out: tuple[tuple[SixNumbers, ...], ...]
+    held_out_after: tuple[tuple[SixNumbers, ...], ...] = ()
+    improvement: ExpectedImprovement | None = None
+    quick: QuickAccuracy | None = None
+
+    def applied_to(self, state: RunState) -> RunState:
+        """The run has a geometry to verify."""
+        return replace(state, identified=self)
+
+
+class Identify(Computation):
+    """Identify the geometry."""
+
+    kind: Literal["identify"] = "identify"
+
+    outcomes: ClassVar = (Identified,)
+
+    def activity(self) -> str:
+        """What is computed."""
+        return "identifying the geometry"
+
+    def compute(self, run: RunResources, state: RunState) -> Identified:
+        """Identify, assess, keep the fit in the run folder, and choose the held-out poses."""
+        measurements = state.measurements()
+        write_measurements(run.folder.measurements, measurements)
+        known = run.calibration.known(state)
+        robot = known.robot_of(state)
+        identified = identify(robot.problem(measurements))
+        assessed = assess(known.settings, robot, measurements, identified, known.noise)
+        run.folder.write_result(fit_document(assessed))
+        held_out = _held_out_poses(known, assessed)
+        is_quick = run.calibration.mode == "quick"
+        return Identified(
+            result=IdentificationResult.of(identified, assessed.zeros),
+            held_out=held_out,
+            held_out_after=known.held_out_poses_after(identified, held_out),
+            improvement=assessed.improvement,
+            quick=known.quick.accuracy(measurements) if is_quick else None,
+        )
+
+
+def _held_out_poses(known: Knowledge, assessed: Assessment) -> PosesByPoint:
+    """Those of an identification; the error states its verdict, as a wrong geometry may be the cause."""
+    try:
+        return known.held_out_poses.before(assessed.found)
+    except LimitError as error:
+        verdict, *_ = findings(assessed)
+        raise LimitError(
+            f"{verdict} With this geometry no held-out pose can be measured: {error.problem}",
+            action=error.action,
+        ) from error

@@ -1,0 +1,159 @@
+"""Judge: the verdict of a run, or the confirming records that it needs first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from statistics import fmean
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from hexacell.cell.model import CellSettings
+from hexacell.checks.check_result import CheckResult, check_line, check_result
+from hexacell.identification.estimator import identify
+from hexacell.measurements.csv_file import write_measurements
+from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.verdict.decision import Verdict
+from hexacell.verdict.length_check import LengthMeasurements, LengthStatement, length_statement
+from hexacell.verdict.outcome import length_line, outcome_line, reason_of
+from hexacell.verdict.verification import HeldOut, Verification, verify
+from procedures.run.keys import Phase, SixNumbers
+from procedures.run.leg_temperatures import legs_warmer
+from procedures.steps.base import BaseEvent, Computation
+
+if TYPE_CHECKING:
+    from procedures.resources.run_resources import RunResources
+    from procedures.run.state import RunState
+    from procedures.steps.sample import RecordTaken
+
+
+class ConfirmationPlanned(BaseEvent):
+    """A test of the model failed, perhaps by chance: confirming held-out poses were chosen, which tell.
+
+    ``poses`` are those at each held-out point, its reference first; empty at a point that is left.
+    """
+
+    kind: Literal["confirmation planned"] = "confirmation planned"
+    reason: str
+    poses: tuple[tuple[SixNumbers, ...], ...]
+
+    def applied_to(self, state: RunState) -> RunState:
+        """These poses are measured before the verdict."""
+        return replace(state, confirmation=self)
+
+    def text(self, state: RunState) -> str:
+        """Why more is measured, and how much."""
+        del state
+        return f"{self.reason}: {sum(map(len, self.poses))} new records tell whether by chance"
+
+
+class ResultValidated(BaseEvent):
+    """The verdict of the run.
+
+    That of a calibration is by its ``verification``, of a check by its result ``check``, of a length check
+    of its own by ``length``.
+    """
+
+    kind: Literal["judged"] = "judged"
+    verdict: Verdict
+    line: str
+    verification: Verification | None = None
+    check: CheckResult | None = None
+    length: LengthStatement | None = None
+
+    def applied_to(self, state: RunState) -> RunState:
+        """The run has its verdict."""
+        return replace(state, judged=self)
+
+
+class Judge(Computation):
+    """Verify the written geometry, or state what a check or a length check found.
+
+    A test of the model that failed narrowly asks for confirming records once, where any can be taken.
+    """
+
+    kind: Literal["judge"] = "judge"
+
+    outcomes: ClassVar = (ResultValidated, ConfirmationPlanned)
+
+    def activity(self) -> str:
+        """What is computed."""
+        return "verifying the result"
+
+    def compute(self, run: RunResources, state: RunState) -> ResultValidated | ConfirmationPlanned:
+        """Judge by the mode of the run; raises ``HexacellError``."""
+        match run.calibration.mode:
+            case "check":
+                return _checked(run, state)
+            case "length":
+                return _length_checked(run, state)
+        known = run.calibration.known(state)
+        found = identify(known.robot_of(state).problem(state.measurements()))
+        written = known.written_robot(state)
+        verification = verify(known.settings, written, found, _held_out(known.settings, state))
+        if verification.needs_confirmation and state.confirmation is None:
+            poses = known.confirming_poses(found, state)
+            if any(poses):
+                return ConfirmationPlanned(reason=reason_of(verification), poses=poses)
+        assert state.identified is not None  # noqa: S101 - decided only after the identification
+        line = outcome_line(state.identified.result, len(found.free), verification, written.unknowns)
+        return ResultValidated(verdict=verification.verdict, line=line, verification=verification)
+
+
+def _checked(run: RunResources, state: RunState) -> ResultValidated:
+    measurements = state.measurements()
+    write_measurements(run.folder.measurements, measurements)
+    known, accepted = run.calibration.known(state), run.calibration.accepted
+    effects = known.robot_of(state).effects
+    before = () if accepted is None else accepted.leg_temperatures_c
+    shown = [sample.reading for sample in state.samples(Phase.IDENTIFY)]
+    warmer = legs_warmer(run.settings.thermometers, shown, before)
+    found = check_result(known.check, measurements, accepted, effects, warmer)
+    return ResultValidated(verdict=found.verdict, line=check_line(found), check=found)
+
+
+def _length_checked(run: RunResources, state: RunState) -> ResultValidated:
+    calibration = run.calibration
+    assert calibration.accepted is not None  # noqa: S101 - without one no length check is begun
+    measured = _length_measurements(run.settings, state)
+    stated = length_statement(
+        run.settings, calibration.robot_checked(calibration.robot), calibration.accepted, measured
+    )
+    return ResultValidated(verdict=stated.verdict, line=length_line(stated), length=stated)
+
+
+def _length_measurements(settings: CellSettings, state: RunState) -> LengthMeasurements:
+    """What was measured in the two seats, and the fixture's temperature if it has a thermometer."""
+    samples = state.samples(Phase.LENGTH)
+    named = settings.length_check and settings.length_check.thermometer
+    shown = [
+        one.celsius
+        for sample in samples
+        for one in sample.reading.temperatures
+        if one.name == named and one.celsius is not None
+    ]
+    records = MeasurementSet(tuple(sample.record for sample in samples))
+    return LengthMeasurements(records, fmean(shown) if shown else None)
+
+
+def _held_out(settings: CellSettings, state: RunState) -> HeldOut:
+    """What was measured at the held-out points, each phase at points of its own, and in the two seats."""
+    count = max(sample.at.point for sample in state.samples(Phase.IDENTIFY))
+    records: list[Record] = []
+    for phase in (Phase.BEFORE, Phase.AFTER):
+        samples = state.samples(phase)
+        records += _at_points_from(count, samples)
+        count += max((sample.at.point for sample in samples), default=0)
+    confirming = state.samples(Phase.CONFIRM)
+    return HeldOut(
+        records=MeasurementSet(tuple(records)),
+        before=state.held_out(Phase.BEFORE),
+        after=state.held_out(Phase.AFTER),
+        left_travel=state.left_travel,
+        length=_length_measurements(settings, state) if state.samples(Phase.LENGTH) else None,
+        confirming=MeasurementSet(tuple(_at_points_from(count, confirming))) if confirming else None,
+    )
+
+
+def _at_points_from(count: int, samples: Iterable[RecordTaken]) -> Iterator[Record]:
+    """The records at points of their own, numbered after ``count`` others."""
+    return (replace(sample.record, point=sample.at.point + count) for sample in samples)

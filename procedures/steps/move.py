@@ -1,0 +1,220 @@
+"""Move: the robot goes to a pose, unless the controller refuses it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from drivers.errors import PoseRefused
+from hexacell.campaign.decisions import Forecast
+from hexacell.cell.fields import Frozen
+from hexacell.cell.model import CellSettings
+from hexacell.errors import HexacellError
+from hexacell.identification.estimator import identify
+from hexacell.kinematics.pose import Pose
+from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
+from procedures.run.trips import GuardTripped, WatchedSet
+from procedures.steps.base import BaseEvent, StepAtPose
+from procedures.steps.sample import RecordRejected
+
+if TYPE_CHECKING:
+    from procedures.resources.run_resources import RunResources
+    from procedures.run.state import RunState
+    from procedures.steps.identify import Identified
+
+MOST_REFUSALS = 40
+"""The controller refuses at most so many poses of one set; then a person is to look at its limits."""
+
+STUCK_GAUGE_SIGMAS = 5.0
+"""An expected displacement is reduced by so many standard deviations before a gauge counts as stuck."""
+
+
+class Arrived(BaseEvent):
+    """A move has ended at its pose."""
+
+    kind: Literal["arrived"] = "arrived"
+    at: SetKey
+    orientation: int
+    pose: SixNumbers
+
+    def applied_to(self, state: RunState) -> RunState:
+        """The gauges of all other open sets may be carried away now."""
+        is_waypoint = self.orientation == 0
+        if self.orientation != 1 and self.at in state.sets:
+            state = state.with_set(self.at, replace(state.set(self.at), has_left=True))
+        arrived = replace(
+            state,
+            at_pose=None if is_waypoint else (self.at, self.orientation),
+            off_plan=is_waypoint,
+            target=self.pose,
+            path_from_reference=self._path(state),
+            position_unknown=False,
+            is_in_estop=False,
+        )
+        return arrived.unverified(but=self.at)
+
+    def _path(self, state: RunState) -> tuple[tuple[int, SixNumbers], ...]:
+        """The path from the reference without loops; empty if the robot did not start from its end."""
+        poses = [pose for _, pose in state.path_from_reference]
+        if self.orientation == 1:
+            return ((1, self.pose),)
+        if self.pose in poses:
+            return state.path_from_reference[: poses.index(self.pose) + 1]
+        is_at_its_end = not state.position_unknown and bool(poses) and state.target == poses[-1]
+        return (*state.path_from_reference, (self.orientation, self.pose)) if is_at_its_end else ()
+
+
+class PoseExcluded(BaseEvent):
+    """The controller refused a pose and did not move; it is not commanded again in this run.
+
+    ``axis`` is the axis beyond whose limit it is, the highest or the lowest; then no pose is commanded that
+    is as far out. Without it the pose alone is left out. ``replacements`` are held-out poses that cannot be
+    commanded now, each with the one that takes its place.
+    """
+
+    kind: Literal["excluded"] = "excluded"
+    at: SetKey
+    orientation: int
+    pose: SixNumbers
+    reason: str
+    axis: Literal["x", "y", "z", "a", "b", "c"] | None = None
+    is_highest: bool = True
+    replacements: tuple[tuple[SixNumbers, SixNumbers], ...] = ()
+
+    def applied_to(self, state: RunState) -> RunState:
+        """The robot is where it was; a record that was to be taken again at the pose is chosen anew."""
+        left = replace(state, excluded=(*state.excluded, self), identified=self._with_replacements(state))
+        if self.at not in state.sets:
+            return left
+        measured = state.set(self.at)
+        again = tuple(pair for pair in measured.again if pair[1] != self.pose)
+        return left.with_set(self.at, replace(measured, again=again))
+
+    def _with_replacements(self, state: RunState) -> Identified | None:
+        """The identification with other held-out poses in the place of those that cannot be commanded."""
+        found, place = state.identified, dict(self.replacements)
+        if found is None or not place:
+            return found
+        lists = {
+            name: tuple(tuple(place.get(pose, pose) for pose in poses) for poses in getattr(found, name))
+            for name in ("held_out", "held_out_after")
+        }
+        return found.model_copy(update=lists)
+
+    def text(self, state: RunState) -> str:
+        """What follows from the refusal."""
+        del state
+        if self.orientation == 1:
+            what = "its reference is refused, the point is left out"
+        else:
+            what = "the controller refuses this pose, which is not commanded again"
+        return f"{self.at.pose_name(self.orientation)}: {what}: {self.reason}"
+
+
+class Expectation(Frozen):
+    """What the gauges should show (mm, base x y z), one sigma, and what is learnt (nat)."""
+
+    deviation_mm: ThreeNumbers
+    sigma_mm: ThreeNumbers
+    gain: float
+    forecast: Forecast | None = None
+
+
+class Move(StepAtPose):
+    """Send the robot to a pose. Orientation 0 is a waypoint, at which nothing is measured.
+
+    With ``from_elsewhere`` it comes from where the set's gauges are not, as to a set's first reference.
+    """
+
+    kind: Literal["move"] = "move"
+    expected: Expectation | None = None
+    from_elsewhere: bool = False
+
+    outcomes: ClassVar = (Arrived, PoseExcluded)
+
+    @property
+    def target(self) -> Pose:
+        """Where to: the pose as the controller takes it."""
+        return Pose(*self.pose)
+
+    def activity(self) -> str:
+        """The pose, with the predicted error now and at the end of the plan."""
+        forecast = self.expected and self.expected.forecast
+        predicted = f": {forecast.now_mm:.3f} -> {forecast.end_mm:.3f} mm" if forecast else ""
+        return f"{self.at.pose_name(self.orientation)}{predicted}"
+
+    async def perform(self, run: RunResources, state: RunState) -> BaseEvent:
+        """Move under guards; with a new geometry a ball that leaves its plate is a rejected record."""
+        await run.require_departure(state)
+        here = Pose(*state.target) if state.target else (await run.locate()).pose
+        at_gauges = gauges_are_at_ball(run.settings, self.at, state)
+        try:
+            await run.move(here, self.target, self._watched(state), at_gauges=at_gauges)
+        except PoseRefused as refusal:
+            return await self._refused(run, state, refusal)
+        except GuardTripped as tripped:
+            measured = state.set(self.at)
+            is_there = not measured.reference_unverified or measured.rejections > 0
+            if not self.at.phase.has_new_geometry or not tripped.trip.is_about_the_ball or not is_there:
+                raise
+            # The new geometry takes the ball off its plate: the second time that is a verdict.
+            run.guards.supervisor.clear()
+            return RecordRejected(at=self.at, orientation=self.orientation, reason=str(tripped))
+        return Arrived(at=self.at, orientation=self.orientation, pose=self.pose)
+
+    def _watched(self, state: RunState) -> WatchedSet:
+        """What the gauges of the set must show on the way."""
+        zero_mm, samples = state.zero_shown(self.at), state.set(self.at).samples
+        is_watched = zero_mm is not None and bool(samples) and not self.from_elsewhere
+        moved_mm = None
+        if self.expected is not None and state.at_pose == (self.at, len(samples)):
+            change = np.subtract(self.expected.deviation_mm, samples[-1].deviation_mm)
+            sure = np.abs(change) - STUCK_GAUGE_SIGMAS * np.array(self.expected.sigma_mm)
+            moved_mm = tuple(np.copysign(np.maximum(0.0, sure), change).tolist())
+        return WatchedSet(zero_mm, is_watched=is_watched, moved_mm=moved_mm)
+
+    async def _refused(self, run: RunResources, state: RunState, refusal: PoseRefused) -> PoseExcluded:
+        """A refusal of the pose is no failure: the robot is where it was, and others may be possible."""
+        has_stayed = await run.has_stayed(state)
+        refusals = sum(one.at == self.at for one in state.excluded)
+        if refusals >= MOST_REFUSALS or not has_stayed:
+            raise refusal
+        excluded = PoseExcluded(
+            at=self.at,
+            orientation=self.orientation,
+            pose=self.pose,
+            reason=refusal.reason,
+            axis=refusal.axis,
+            is_highest=refusal.is_highest,
+        )
+        return await run.in_thread(_with_replacements, excluded, run, state)
+
+
+def _with_replacements(refusal: PoseExcluded, run: RunResources, state: RunState) -> PoseExcluded:
+    """A refusal at a held-out point with others for the held-out poses that it leaves out."""
+    if state.identified is None or refusal.at.phase not in {Phase.BEFORE, Phase.AFTER}:
+        return refusal
+    after = refusal.applied_to(state)
+    known = run.calibration.known(after)
+    try:
+        identified = identify(known.robot_of(after).problem(after.measurements()))
+        pairs = tuple(known.held_out_replacements(identified, after))
+    except HexacellError:  # then those that are left are measured
+        return refusal
+    return refusal.model_copy(update={"replacements": pairs})
+
+
+def gauges_are_at_ball(settings: CellSettings, at: SetKey, state: RunState) -> bool:
+    """Whether a move to a set begins or ends with gauges at the ball.
+
+    Where they are fixed they stand at every point. Placed by hand, they stand around the ball from then
+    until the robot has left their point, and at any open set that it may be in.
+    """
+    if at.phase is Phase.LENGTH and settings.length_check is not None:
+        are_fixed = settings.length_check.mounting == "fixed"
+    else:
+        are_fixed = settings.stations.placement == "fixed"
+    left = [] if state.at_pose is None else [state.at_pose[0]]
+    return are_fixed or any(state.set(key).placed for key in (at, *left, *state.open_sets))

@@ -1,0 +1,101 @@
+"""Revisit: back at a set's reference after an interruption, the set goes on or is measured again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from drivers.errors import GaugeAtEnd
+from hexacell.errors import HexacellError, consists_only_of
+from hexacell.measurements.records import deviation_of
+from procedures.run.keys import Phase, SetKey, ThreeNumbers
+from procedures.run.readings import Reading, in_words
+from procedures.steps.base import BaseEvent, StepOfSet
+
+if TYPE_CHECKING:
+    from procedures.resources.run_resources import RunResources
+    from procedures.run.state import RunState
+
+
+class ReferenceConfirmed(BaseEvent):
+    """The reference was read again after an interruption: ``change_mm`` is small, the set continues."""
+
+    kind: Literal["confirmed"] = "confirmed"
+    at: SetKey
+    change_mm: ThreeNumbers
+    reading: Reading
+
+    def applied_to(self, state: RunState) -> RunState:
+        """The gauges have kept their zero."""
+        return state.with_set(self.at, replace(state.set(self.at), reference_unverified=False))
+
+    def text(self, state: RunState) -> str:
+        """Which set continues."""
+        del state
+        return f"{self.at.name} continues: its reference is unchanged"
+
+
+class SetInvalidated(BaseEvent):
+    """The set does not count and is measured again. Its records stay in the journal.
+
+    There is a ``reading`` if its reference was read again and had changed.
+    """
+
+    kind: Literal["voided"] = "voided"
+    at: SetKey
+    reason: str
+    reading: Reading | None = None
+
+    def applied_to(self, state: RunState) -> RunState:
+        """A mounting of a length check whose zero is in doubt takes all mountings with it."""
+        takes_all = self.at.phase is Phase.LENGTH and bool(state.set(self.at).samples)
+        lost = {key for key in state.sets if key == self.at or (takes_all and key.phase is Phase.LENGTH)}
+        kept = {key: value for key, value in state.sets.items() if key not in lost}
+        return replace(state, sets=kept, at_pose=None, invalidated=state.invalidated + 1)
+
+    def text(self, state: RunState) -> str:
+        """Which set, and why."""
+        del state
+        return f"{self.at.name} is measured again: {self.reason}"
+
+
+class Revisit(StepOfSet):
+    """Back at a set's reference after an interruption: see whether the gauges kept their zero."""
+
+    kind: Literal["revisit"] = "revisit"
+
+    outcomes: ClassVar = (ReferenceConfirmed, SetInvalidated)
+    doing: ClassVar[str] = "reading the reference again, after an interruption"
+
+    async def perform(self, run: RunResources, state: RunState) -> ReferenceConfirmed | SetInvalidated:
+        """Read again and compare; a plunger at its end voids the set."""
+        try:
+            reading = await run.read()
+        except HexacellError as error:
+            if not consists_only_of(error, GaugeAtEnd):
+                raise
+            return SetInvalidated(at=self.at, reason=str(error))
+        await run.check_gauges()
+        before, limits = state.set(self.at).samples[0].reading, run.settings.reference_agreement
+        return check_reference(self.at, before, reading, *limits)
+
+
+def check_reference(
+    at: SetKey, before: Reading, now: Reading, limit_mm: float, joint_limit: float
+) -> ReferenceConfirmed | SetInvalidated:
+    """Whether gauges and encoders show at a set's reference what they showed before.
+
+    ``joint_limit`` is in the unit of the joint variables.
+    """
+    gauges = np.subtract(now.gauges_mm, before.gauges_mm)
+    joints = np.subtract(now.joints, before.joints)
+    if np.abs(gauges).max() > limit_mm:
+        reason = f"back at its reference the gauges show {in_words(gauges)}, more than {limit_mm:g} mm"
+        return SetInvalidated(at=at, reason=reason, reading=now)
+    if np.abs(joints).max() > joint_limit:
+        leg = int(np.abs(joints).argmax())
+        reason = f"back at its reference q{leg + 1} shows {joints[leg]:+.3f}, more than {joint_limit:g}"
+        return SetInvalidated(at=at, reason=reason, reading=now)
+    return ReferenceConfirmed(at=at, change_mm=deviation_of(gauges), reading=now)

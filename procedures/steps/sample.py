@@ -1,0 +1,156 @@
+"""Sample: a record is taken, or rejected because the ball left the gauges' travel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from drivers.errors import GaugeAtEnd
+from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.model import CellSettings
+from hexacell.errors import HexacellError, consists_only_of, joined
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.records import Record, deviation_of
+from hexacell.robot.stated_limits import gauge_travel_of
+from procedures.run.keys import SetKey, SixNumbers, ThreeNumbers
+from procedures.run.readings import Reading, in_words
+from procedures.steps.base import BaseEvent, StepAtPose
+from procedures.steps.place import MountingError
+
+if TYPE_CHECKING:
+    from procedures.resources.run_resources import RunResources
+    from procedures.run.state import RunState
+
+
+class RecordTaken(BaseEvent):
+    """A record was taken; ``deviation_mm`` is from the set's reference."""
+
+    kind: Literal["sampled"] = "sampled"
+    at: SetKey
+    orientation: int
+    pose: SixNumbers
+    reading: Reading
+    deviation_mm: ThreeNumbers
+
+    @property
+    def record(self) -> Record:
+        """The record for the identification."""
+        return Record(
+            self.at.point, self.orientation, Pose(*self.pose), self.reading.joints, self.deviation_mm
+        )
+
+    def applied_to(self, state: RunState) -> RunState:
+        """The set has one more record."""
+        return state.with_set(self.at, state.set(self.at).with_sample(self))
+
+
+class RecordRejected(BaseEvent):
+    """A record was rejected: the ball left the travel. Its orientation is chosen again.
+
+    There is no ``reading`` if a plunger was at its end.
+    """
+
+    kind: Literal["refused"] = "refused"
+    at: SetKey
+    orientation: int
+    reason: str
+    reading: Reading | None = None
+
+    def applied_to(self, state: RunState) -> RunState:
+        """At the pose the ball was outside the travel; before it, a guard stopped the robot on the way."""
+        rejected = state.set(self.at).with_rejection(self.orientation)
+        is_on_the_way = self.at.phase.has_new_geometry and state.at_pose != (self.at, self.orientation)
+        left = state.without_position() if is_on_the_way else replace(state, at_pose=None)
+        # With the new geometry it may be a verdict: that the gauges are as they were is verified first.
+        is_verified = not self.at.phase.has_new_geometry or rejected.rejections > 1
+        return left.with_set(self.at, rejected if is_verified else rejected.unverified())
+
+    def text(self, state: RunState) -> str:
+        """Which record, and why."""
+        del state
+        return f"{self.at.pose_name(self.orientation)} left out: {self.reason}"
+
+
+class Sample(StepAtPose):
+    """Wait for settled readings and record them; the first of a set is the gauges' zero."""
+
+    kind: Literal["sample"] = "sample"
+
+    outcomes: ClassVar = (RecordTaken, RecordRejected)
+    doing: ClassVar[str] = "reading, once the gauges have settled"
+
+    def activity(self) -> None:
+        """The run still does what its move began."""
+
+    async def perform(self, run: RunResources, state: RunState) -> RecordTaken | RecordRejected:
+        """Read as many windows as the measured noise asks for."""
+        windows = 1 if state.noise is None else state.noise.noise.windows
+        reading = await read_inside(self, run, state, windows)
+        if isinstance(reading, RecordRejected):
+            return reading
+        zero = state.zero(self.at) or reading
+        return RecordTaken(
+            at=self.at,
+            orientation=self.orientation,
+            pose=self.pose,
+            reading=reading,
+            deviation_mm=deviation_of(np.subtract(reading.gauges_mm, zero.gauges_mm)),
+        )
+
+
+async def read_inside(
+    step: StepAtPose, run: RunResources, state: RunState, windows: int = 1
+) -> Reading | RecordRejected:
+    """Read with the ball inside the gauges' travel, or reject the record."""
+    try:
+        reading = await run.read(windows)
+    except HexacellError as error:
+        if not consists_only_of(error, GaugeAtEnd):
+            raise
+        return RecordRejected(at=step.at, orientation=step.orientation, reason=str(error))
+    zero = state.zero(step.at)
+    if zero is None:
+        require_room(run.settings, reading.gauges_mm)
+        zero = reading
+    deviation = np.subtract(reading.gauges_mm, zero.gauges_mm)
+    room = gauge_travel_of(run.settings).room(zero.gauges_mm)
+    if not room.holds(deviation):
+        reason = f"the ball is {in_words(deviation)} mm from its reference, farther than {room}"
+        return RecordRejected(at=step.at, orientation=step.orientation, reason=reason, reading=reading)
+    return reading
+
+
+def require_room(settings: CellSettings, shown_mm: ThreeNumbers) -> None:
+    """Refuse gauges whose plungers stand too far from the middle of their travel.
+
+    ``shown_mm`` is what they show along base x, y, z. A gauge whose display does not tell its place passes.
+
+    Raises:
+        MountingError: says which gauge must be moved, which way, and how far.
+    """
+    if errors := list(_without_room(settings, shown_mm)):
+        raise joined("the gauges must be mounted again", errors)
+
+
+def _without_room(settings: CellSettings, shown_mm: ThreeNumbers) -> Iterator[MountingError]:
+    travel = gauge_travel_of(settings)
+    room, needed = travel.room(shown_mm), travel.sure_room
+    gauges = sorted(settings.gauges, key=lambda gauge: gauge.axis)
+    for axis, (gauge, place) in enumerate(zip(gauges, travel.places(shown_mm), strict=True)):
+        if place is None or abs(place) <= settings.stations.mounting_mm:
+            continue
+        left = room.upper[axis] if place > 0.0 else -room.lower[axis]
+        yield _off_the_middle(gauge, place, max(0.0, left), needed.upper[axis])
+
+
+def _off_the_middle(gauge: GaugeSettings, place: float, left_mm: float, needed_mm: float) -> MountingError:
+    side = f"{'+' if place > 0.0 else '-'}{gauge.axis}"
+    return MountingError(
+        f"its plunger stands {abs(place):.1f} mm from the middle of its travel: {left_mm:.1f} mm are left "
+        f"towards {side}, where {needed_mm:g} are needed",
+        subject=f"gauge {gauge.name}",
+        action=f"Move the gauge by {abs(place):.1f} mm along {side}, or correct its middle_mm",
+    )

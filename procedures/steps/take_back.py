@@ -1,0 +1,68 @@
+"""Take back: the controller gets its own geometry again after the provisional one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from hexacell.config.write_record import WriteKind
+from hexacell.errors import HexacellError
+from procedures.steps.base import BaseEvent, StepWithoutMotion
+
+if TYPE_CHECKING:
+    from procedures.resources.run_resources import RunResources
+    from procedures.run.state import RunState
+
+
+class ProvisionalReverted(BaseEvent):
+    """The controller has read the config that it had before the provisional geometry."""
+
+    kind: Literal["taken back"] = "taken back"
+
+    def applied_to(self, state: RunState) -> RunState:
+        """The same joint variables are another pose now."""
+        return replace(state, provisional_active=False, config_write_pending=False).without_position()
+
+    def text(self, state: RunState) -> str:
+        """What changed."""
+        del state
+        return "the controller uses its own geometry again"
+
+
+class TakeBack(StepWithoutMotion):
+    """Give the controller the geometry that it had before the provisional one."""
+
+    kind: Literal["take back"] = "take back"
+
+    outcomes: ClassVar = (ProvisionalReverted,)
+
+    def activity(self) -> str:
+        """What the config gets."""
+        return "restoring the controller's geometry"
+
+    def begun_in(self, state: RunState) -> RunState:
+        """How far the change got is unknown until its event."""
+        return replace(state, config_write_pending=True)
+
+    async def perform(self, run: RunResources, state: RunState) -> ProvisionalReverted:
+        """Restore the config and have it read; raises ``HexacellError``."""
+        config = run.config
+        is_written = config.holds_provisional()
+        if is_written:
+            cause = config.cause(WriteKind.PROVISIONAL_TAKEN_BACK, "it was to be used in the run alone")
+            await config.restore(config.provisional_backup, cause)
+        else:
+            config.require_begun_with(state)
+        try:
+            await run.startup.reload()
+        except HexacellError:
+            # Far from level, the slider positions may belong to no pose of the old geometry. The file
+            # must not differ from what the controller has until it can be reloaded.
+            provisional = run.calibration.provisional_of(state)
+            if is_written and provisional is not None:
+                geometry = run.calibration.robot.for_controller(provisional)
+                change = await run.in_thread(config.change_to, geometry, state)
+                cause = config.cause(WriteKind.PROVISIONAL, "the controller does not take the old one here")
+                await config.write(change, config.provisional_backup, cause)
+            raise
+        return ProvisionalReverted()

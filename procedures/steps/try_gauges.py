@@ -1,0 +1,117 @@
+"""Try: back at a set's reference it is judged whether each gauge followed the ball."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.model import CellSettings
+from hexacell.errors import joined
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import deviation_of
+from hexacell.noise.gauge_trial import GaugeMistake, TrialFinding, judge_response, response_of
+from procedures.run.keys import SetKey, ThreeNumbers
+from procedures.steps.base import BaseEvent, StepOfSet
+from procedures.steps.place import MountingError
+
+if TYPE_CHECKING:
+    from procedures.resources.run_resources import RunResources
+    from procedures.run.state import RunState
+
+
+MISTAKES: Mapping[GaugeMistake, tuple[str, str, str]] = {
+    GaugeMistake.DEAD: (
+        "does not follow the ball",
+        "do not follow the ball",
+        "See whether the plunger touches the ball and is free, and whether the display changes",
+    ),
+    GaugeMistake.INCHES: (
+        "seems to answer in inches",
+        "seem to answer in inches",
+        "Press the in/mm key; if it answers in mm, see whether its plunger is free",
+    ),
+    GaugeMistake.EXCHANGED: (
+        "answers on another axis",
+        "are exchanged",
+        "Exchange their cables, or correct port, channel or axis in the cell file and begin a new run",
+    ),
+    GaugeMistake.REVERSED: (
+        "counts the wrong way",
+        "count the wrong way",
+        "Change the counting direction, or correct sign in the cell file and begin a new run",
+    ),
+}
+"""What each mistake of one gauge and of several is called, and what to do."""
+
+
+class GaugesTried(BaseEvent):
+    """The gauges of a set follow the ball, each on its axis, with its sign and scale.
+
+    ``response`` is what the gauges x, y, z showed per length of a move along x, y, z.
+    """
+
+    kind: Literal["tried"] = "tried"
+    at: SetKey
+    response: tuple[ThreeNumbers, ThreeNumbers, ThreeNumbers]
+
+    def applied_to(self, state: RunState) -> RunState:
+        """The set's gauges need no other trial until they are unwatched."""
+        return state.with_set(self.at, replace(state.set(self.at), tried=True, has_left=False))
+
+
+class Try(StepOfSet):
+    """Back at a set's reference: judge whether the gauges followed the ball."""
+
+    kind: Literal["try"] = "try"
+
+    outcomes: ClassVar = (GaugesTried,)
+
+    def activity(self) -> str:
+        """The set, and what for."""
+        return f"{self.at.name}, trying the gauges"
+
+    async def perform(self, run: RunResources, state: RunState) -> GaugesTried:
+        """Compare the probes with the reference; raises ``MountingError`` where a gauge did not follow."""
+        measured = state.set(self.at)
+        zero = np.array(measured.samples[0].reading.gauges_mm)
+        moved = np.array([probe.moved_mm for probe in measured.probes])
+        shown = np.array([probe.reading.gauges_mm for probe in measured.probes]) - zero
+        x, y, z = (deviation_of(row) for row in require_response(run.settings, moved, shown))
+        return GaugesTried(at=self.at, response=(x, y, z))
+
+
+def require_response(settings: CellSettings, moved_mm: Array, shown_mm: Array) -> Array:
+    """What each gauge showed per length of a move along each axis (3, 3), by gauge and axis.
+
+    ``moved_mm`` (3, 3) are the moves in rows, ``shown_mm`` (3, 3) what the gauges x, y, z showed of them.
+
+    Raises:
+        MountingError: names the gauges that do not follow the ball as they should, and what to do.
+    """
+    response = response_of(moved_mm, shown_mm)
+    if findings := judge_response(response):
+        gauges = sorted(settings.gauges, key=lambda gauge: gauge.axis)
+        errors = [_mistake(finding, gauges, response) for finding in findings]
+        raise joined("the gauges do not answer as they are mounted by the cell file", errors)
+    return response
+
+
+def _mistake(finding: TrialFinding, gauges: Sequence[GaugeSettings], response: Array) -> MountingError:
+    """What is wrong with some gauges, what they showed, and what to do."""
+    named = [gauges[number] for number in finding.gauges]
+    of_one, of_several, action = MISTAKES[finding.mistake]
+    problem = of_several if len(named) > 1 else of_one
+    shown = "; ".join(f"{gauges[n].name} showed {_numbers(response[n])}" for n in finding.gauges)
+    return MountingError(
+        f"{problem}: while the ball moved by 1 mm along x, y and z in turn, {shown} mm",
+        subject=f"gauge{'s' if len(named) > 1 else ''} {', '.join(gauge.name for gauge in named)}",
+        action=action,
+    )
+
+
+def _numbers(row: Array) -> str:
+    return ", ".join(f"{value:+.3f}" for value in row)

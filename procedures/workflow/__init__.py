@@ -1,0 +1,1 @@
+"""Which step comes next, one stage of a calibration a file; preflight."""

@@ -1,0 +1,140 @@
+"""The steps that measure the held-out points, before and after the new geometry is written.
+
+The poses are chosen in :mod:`~procedures.calibration.held_out_poses`. Those that are measured before are
+measured again afterwards, for the comparison.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hexacell.errors import LimitError
+from hexacell.kinematics.rotations import Array
+from procedures.run.keys import Phase, SetKey, SixNumbers
+from procedures.run.state import RunState
+from procedures.steps.judge import Judge
+from procedures.steps.locate import Locate
+from procedures.steps.move import Move
+from procedures.steps.registry import Step
+from procedures.workflow.sets import SetSteps, TravelError, reference_move, reference_pose, require_zero
+from procedures.workflow.trial import TrialSteps
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutSteps:
+    """Decides on the steps that measure the chosen poses of ``point_count`` points."""
+
+    point_count: int
+    sets: SetSteps
+    trials: TrialSteps
+
+    def next_step(self, state: RunState, phase: Phase) -> Step | None:
+        """The next step of the first set that is not closed; None if all are."""
+        for point in range(1, self.point_count + 1):
+            key = SetKey(phase=phase, point=point)
+            if not state.set(key).closed and not self._is_left(state, key):
+                return Locate() if state.position_unknown else self._in_set(state, key)
+        return None
+
+    def way_back(self, state: RunState, key: SetKey) -> Step:
+        """The next move to the reference of a set in which the robot is.
+
+        Raises:
+            HexacellError: no safe path leads there.
+        """
+        is_in_order = self.sets.paths.is_in_order(state, key)
+        return reference_move(state, key) if is_in_order else self._to_reference(state, key)
+
+    def _poses(self, state: RunState, key: SetKey) -> tuple[tuple[SixNumbers, ...], int]:
+        """The poses of a set, and how many of them were chosen as one list, in this order."""
+        if key.phase is Phase.CONFIRM and state.confirmation is not None:
+            poses = state.confirmation.poses[key.point - 1]
+            return poses, len(poses)
+        assert state.identified is not None  # noqa: S101 - its poses are held out of an identification
+        common = state.identified.held_out[key.point - 1]
+        if key.phase is Phase.BEFORE or not state.identified.held_out_after:
+            return common, len(common)
+        return common + state.identified.held_out_after[key.point - 1], len(common)
+
+    def _is_left(self, state: RunState, key: SetKey) -> bool:
+        """Whether a point cannot be measured: it has no poses, or the controller refuses its reference."""
+        poses, common = self._poses(state, key)
+        return not common or (not state.set(key).samples and not state.refused.allows(poses[0]))
+
+    def _in_set(self, state: RunState, key: SetKey) -> Step:
+        measured = state.set(key)
+        require_zero(state, key)
+        if measured.rejections and key.phase.has_new_geometry:
+            if step := self._after_rejection(state, key):
+                return step
+        elif measured.rejections:
+            raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
+        if measured.reference_unverified:
+            return self.sets.at_reference(state, key) or self._to_reference(state, key)
+        if measured.samples and (trial := self.trials.next_step(state, key, self._ball(state, key))):
+            return trial
+        if (orientation := self._next_orientation(state, key)) is not None:
+            here = self.sets.at_pose(state, key, orientation)
+            return here or self._to_pose(state, key, orientation)
+        if step := self.sets.at_reference(state, key):
+            return step
+        # The poses were chosen with a safe straight line back from each of them.
+        is_in_order = self.sets.paths.is_in_order(state, key)
+        return reference_move(state, key) if is_in_order else self._to_reference(state, key)
+
+    def _next_orientation(self, state: RunState, key: SetKey) -> int | None:
+        """The lowest one without a record that the controller does not refuse; none if there is none."""
+        taken = {sample.orientation for sample in state.set(key).samples}
+        poses, _ = self._poses(state, key)
+        waiting = (number for number in range(1, len(poses) + 1) if number not in taken)
+        return next((number for number in waiting if state.refused.allows(poses[number - 1])), None)
+
+    def _to_pose(self, state: RunState, key: SetKey, orientation: int) -> Move:
+        poses, common = self._poses(state, key)
+        move = Move(at=key, orientation=orientation, pose=poses[orientation - 1])
+        if orientation == 1:
+            return self.sets.paths.towards(state, move)
+        # Each list of poses was chosen with safe lines from one to the next, replacements apart.
+        replacements = {new for refused in state.excluded for _, new in refused.replacements}
+        is_as_chosen = not replacements & {move.pose, state.target}
+        if is_as_chosen and state.at_pose == (key, orientation - 1) and orientation != common + 1:
+            return move
+        return self.sets.paths.towards(state, move, self._ball(state, key))
+
+    def _after_rejection(self, state: RunState, key: SetKey) -> Step | None:
+        """What follows when the ball has left the travel with the new geometry; None if its pose is next.
+
+        A reading that could not be taken is no verdict: a gauge may have slipped. If the reference is as it
+        was, the pose is taken again, and the second time it is a verdict.
+        """
+        measured = state.set(key)
+        if measured.rejections > 1:
+            back = None if measured.reference_unverified else self._back(state, key)
+            return back or Judge()
+        if not measured.reference_unverified:
+            return None
+        try:
+            return self.sets.at_reference(state, key) or self._to_reference(state, key)
+        except LimitError:
+            return Judge()
+
+    def _back(self, state: RunState, key: SetKey) -> Move | None:
+        """The move to the reference after the ball has left the travel; none there, or where none is found.
+
+        The verdict is certain, and the old config is to be restored. Far from level, the joint variables
+        may belong to no pose of the old geometry. One attempt is made.
+        """
+        measured = state.set(key)
+        if not measured.samples or measured.rejections > 2 or state.at_pose == (key, 1):
+            return None
+        try:
+            return self._to_reference(state, key)
+        except LimitError:
+            return None
+
+    def _to_reference(self, state: RunState, key: SetKey) -> Move:
+        return self.sets.to_reference(state, key, self._ball(state, key))
+
+    def _ball(self, state: RunState, key: SetKey) -> Array | None:
+        """Where the ball is at the set's reference (3,), mm, by what is known now."""
+        return self.sets.paths.ball_at(state, reference_pose(state, key))

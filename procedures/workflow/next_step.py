@@ -1,0 +1,138 @@
+"""The next step of a calibration, decided from the state of the run and nothing else.
+
+The points are measured (:mod:`~procedures.workflow.points`) and the geometry is identified. The held-out
+points are measured (:mod:`~procedures.workflow.held_out`), the geometry is written to the controller, and
+the held-out points are measured again. A check only measures points. A length check, of its own or before
+the verdict on a calibration, measures two seats (:mod:`~procedures.workflow.length`).
+"""
+
+from __future__ import annotations
+
+from hexacell.campaign.planner import Plan
+from hexacell.errors import HexacellError
+from hexacell.kinematics.pose import Pose
+from hexacell.verdict.decision import Verdict
+from procedures.calibration.calibration import Calibration, Mode
+from procedures.run.keys import Phase
+from procedures.run.state import RunState
+from procedures.steps.accept import Accept
+from procedures.steps.base import BaseStep
+from procedures.steps.commit import Commit
+from procedures.steps.identify import Identify
+from procedures.steps.judge import Judge, ResultValidated
+from procedures.steps.propose import Propose
+from procedures.steps.roll_back import RollBack
+from procedures.steps.take_back import TakeBack
+from procedures.workflow.held_out import HeldOutSteps
+from procedures.workflow.length import LengthSteps
+from procedures.workflow.noise import NoiseSteps
+from procedures.workflow.points import IdentificationSteps
+from procedures.workflow.sets import SetSteps
+from procedures.workflow.trial import TrialSteps
+
+
+def next_step(calibration: Calibration, state: RunState) -> BaseStep | None:
+    """The step to execute; None if the run is over.
+
+    Raises:
+        HexacellError: no step is possible.
+    """
+    if state.ended is not None:
+        return None
+    if state.config_write_pending:
+        return TakeBack()
+    measuring = Measuring(calibration.known(state).measuring)
+    if state.recalled is not None:
+        return _way_back(measuring, state)
+    if calibration.mode in {Mode.LENGTH, Mode.CHECK}:
+        return None if state.judged else _measure_and_judge(calibration.mode, measuring, state)
+    if state.identified is None:
+        step = measuring.points.next_step(state)
+        return step or (TakeBack() if state.provisional_active else Identify())
+    before = measuring.held_out.next_step(state, Phase.BEFORE)
+    return before or _write_back(measuring, state, has_length_check=calibration.length_check)
+
+
+class Measuring:
+    """The stages that measure, for the geometries that command the robot of a plan.
+
+    Attributes:
+        points: the identification, or a check.
+        held_out: the held-out points.
+        length: the length check; None without a fixture.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        sets, settings = SetSteps(plan.robot), plan.settings
+        trials = TrialSteps(settings.stations.trial_mm, sets)
+        self.points = IdentificationSteps(plan, sets, NoiseSteps(plan, sets), trials)
+        self.held_out = HeldOutSteps(len(settings.verification.points), sets, trials)
+        fixture = settings.length_check
+        self.length = None if fixture is None else LengthSteps(fixture, sets, trials)
+
+    def length_step(self, state: RunState) -> BaseStep | None:
+        """The next step of the length check; None when it is done."""
+        return None if self.length is None else self.length.next_step(state)
+
+
+def _measure_and_judge(mode: Mode, measuring: Measuring, state: RunState) -> BaseStep:
+    """The next step of a check or of a length check."""
+    is_length = mode is Mode.LENGTH
+    return (measuring.length_step(state) if is_length else measuring.points.next_step(state)) or Judge()
+
+
+def length_poses(calibration: Calibration) -> tuple[tuple[str, Pose], ...]:
+    """The poses of the length check of a run with their names; empty without one."""
+    steps = Measuring(calibration.plan).length
+    is_wanted = calibration.length_check or calibration.mode is Mode.LENGTH
+    return steps.planned_poses() if is_wanted and steps is not None else ()
+
+
+def _way_back(measuring: Measuring, state: RunState) -> BaseStep | None:
+    """The next move back to the reference of the set in which the robot is; None where it is there.
+
+    Nor is there one where the robot is in no set, is lost, or finds no safe path.
+    """
+    keys = [key for key in state.open_sets if state.set(key).samples]
+    at_reference = state.at_pose is not None and state.at_pose[1] == 1
+    if not keys or at_reference or state.position_unknown or state.target is None:
+        return None
+    key = keys[-1] if state.at_pose is None else state.at_pose[0]
+    steps = measuring.points if key.phase is Phase.IDENTIFY else measuring.held_out
+    try:
+        return steps.way_back(state, key) if key in keys else None
+    except HexacellError:
+        return None
+
+
+def _write_back(measuring: Measuring, state: RunState, *, has_length_check: bool) -> BaseStep | None:
+    """The next step once the held-out points are measured for the first time."""
+    if state.proposed is None:
+        return Propose()
+    if state.judged is not None:
+        return _after_verdict(state, state.judged)
+    if state.rolling_back:
+        return RollBack()
+    if state.committed is None:
+        return Commit()
+    return _verifying(measuring, state, has_length_check=has_length_check) or Judge()
+
+
+def _verifying(measuring: Measuring, state: RunState, *, has_length_check: bool) -> BaseStep | None:
+    """The next step of what the verdict on the written geometry needs; None if all is measured."""
+    if after := measuring.held_out.next_step(state, Phase.AFTER):
+        return after
+    if has_length_check and (length := measuring.length_step(state)):
+        return length
+    return None if state.confirmation is None else measuring.held_out.next_step(state, Phase.CONFIRM)
+
+
+def _after_verdict(state: RunState, judged: ResultValidated) -> BaseStep | None:
+    """What follows a verdict on a written geometry: it stays, or a person decides, or it is rolled back."""
+    if judged.verdict is Verdict.PASS or state.rolled_back:
+        return None
+    is_offered = judged.verification is not None and judged.verification.is_offered
+    if is_offered and state.accepted is None and not state.rolling_back:
+        return Accept()
+    is_kept = state.accepted is not None and state.accepted.by is not None
+    return None if is_kept else RollBack()

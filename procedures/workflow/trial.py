@@ -1,0 +1,90 @@
+"""The steps that try the gauges: whenever they were placed or connected again, three small known moves.
+
+The reference of a set is recorded, the ball is moved a millimetre along each axis of the base, and the
+gauges are read. Back at the reference it is judged whether each of them follows the ball on its axis, with
+its sign and scale (:mod:`hexacell.noise.gauge_trial`). Only then is anything else
+measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.errors import LimitError
+from hexacell.identification.belief import RobotBelief
+from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.rotations import Array
+from hexacell.motion.path_check import ball_position, is_clear
+from procedures.run.keys import SetKey, SixNumbers, ThreeNumbers
+from procedures.run.state import RunState
+from procedures.steps.move import Move
+from procedures.steps.probe import Probe
+from procedures.steps.registry import Step
+from procedures.steps.try_gauges import Try
+from procedures.workflow.sets import SetSteps, reference_pose
+
+
+@dataclass(frozen=True, eq=False)
+class TrialSteps:
+    """Decides on the steps of one robot's sets; ``distance_mm`` is the length of a move, 0 for no trial."""
+
+    distance_mm: float
+    sets: SetSteps
+
+    def next_step(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
+        """The next step at a set with a reference; None if its gauges were tried, or are not to be.
+
+        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
+
+        Raises:
+            LimitError: no small move is possible there.
+        """
+        measured = state.set(key)
+        if not self.distance_mm or measured.tried or not measured.samples:
+            return None
+        axis = len(measured.probes)
+        if axis == 3:
+            is_back = state.at_pose == (key, 1)
+            return Try(at=key) if is_back else self.sets.to_reference(state, key, ball)
+        moved = self._moved(state, key, axis)
+        pose = _beside(reference_pose(state, key), moved)
+        if state.off_plan and state.target == pose:
+            return Probe(at=key, moved_mm=moved)
+        if state.at_pose != (key, 1) and not _is_beside(state, key):
+            return self.sets.to_reference(state, key, ball)
+        return Move(at=key, orientation=0, pose=pose)
+
+    def _moved(self, state: RunState, key: SetKey, axis: int) -> ThreeNumbers:
+        """The move along an axis, to the side on which there is room."""
+        belief = self.sets.robot.belief().zeroed_at(state.zero_shown(key))
+        for side in (1.0, -1.0):
+            x, y, z = (side * self.distance_mm * np.eye(3)[axis]).tolist()
+            if self._is_clear(belief, reference_pose(state, key), (x, y, z)):
+                return (x, y, z)
+        raise LimitError(
+            f"{key}: the gauges cannot be tried, because the robot cannot move by {self.distance_mm:g} mm "
+            f"along {'xyz'[axis]} there within its limits",
+            action="Choose another point, or a smaller trial_mm in [stations]",
+        )
+
+    def _is_clear(self, belief: RobotBelief, reference: SixNumbers, moved: ThreeNumbers) -> bool:
+        """Whether the robot as it was drawn gets there and back within the limits."""
+        here, there = (
+            self.sets.robot.from_commands([Pose(*one)]) for one in (reference, _beside(reference, moved))
+        )
+        ball = ball_position(belief, here)
+        return is_clear(belief, here, there, ball) and is_clear(belief, there, here, ball)
+
+
+def _is_beside(state: RunState, key: SetKey) -> bool:
+    """Whether the robot is where the last probe was read."""
+    probes = state.set(key).probes
+    beside = [_beside(reference_pose(state, key), probe.moved_mm) for probe in probes[-1:]]
+    return state.off_plan and not state.position_unknown and state.target in beside
+
+
+def _beside(reference: SixNumbers, moved: ThreeNumbers) -> SixNumbers:
+    (x, y, z, a, b, c), (dx, dy, dz) = reference, moved
+    return (x + dx, y + dy, z + dz, a, b, c)

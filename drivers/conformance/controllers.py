@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AbstractContextManager, asynccontextmanager
+from abc import abstractmethod
 from typing import Protocol
 
-from drivers.conformance.suite import LONGEST_S, failure, require_named
+from drivers.conformance.suite import Suite, failure, require_named
 from drivers.controllers.linuxcnc.protocol import pose_difference
 from drivers.errors import MotionInterrupted, MoveRefused, StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction
@@ -44,16 +42,15 @@ class ControllerTwin(Protocol):
         ...
 
 
-class ControllerConformance(ABC):
+class ControllerConformance(Suite[Controller, ControllerTwin]):
     """Subclass it in a test file, name it ``Test...``, and say what is tested."""
 
     @abstractmethod
     def driver(self, settings: ControllerSettings) -> Controller:
         """The driver under test."""
 
-    @abstractmethod
-    def twin(self) -> AbstractContextManager[ControllerTwin]:
-        """The controller, as long as the context lasts."""
+    def _driver_of(self, twin: ControllerTwin) -> Controller:
+        return self.driver(twin.settings)
 
     def test_it_is_the_same_whenever_it_is_opened(self) -> None:
         async def check(controller: Controller, _: ControllerTwin) -> None:
@@ -202,19 +199,3 @@ class ControllerConformance(ABC):
         once = await self._pose(controller)
         assert await self._is_at(controller, twin, once)
         assert not await self._is_at(controller, twin, twin.target)
-
-    def _run(self, check: Callable[[Controller, ControllerTwin], Awaitable[None]]) -> None:
-        async def run() -> None:
-            with self.twin() as twin:
-                async with self._closed_after(twin) as controller, asyncio.timeout(LONGEST_S):
-                    await check(controller, twin)
-
-        asyncio.run(run())
-
-    @asynccontextmanager
-    async def _closed_after(self, twin: ControllerTwin) -> AsyncIterator[Controller]:
-        controller = self.driver(twin.settings)
-        try:
-            yield controller
-        finally:
-            await controller.close()

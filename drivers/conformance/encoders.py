@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, asynccontextmanager, contextmanager
+from abc import abstractmethod
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Protocol
 
-from drivers.conformance.suite import LONGEST_S, failure, require_named
+from drivers.conformance.suite import Suite, failure, require_named
 from drivers.encoders.bank import joint_variables
 from drivers.interfaces import EncoderBank
 from hexacell.cell.devices import EncoderSettings
@@ -36,7 +36,7 @@ class EncoderTwin(Protocol):
         ...
 
 
-class EncoderConformance(ABC):
+class EncoderConformance(Suite[EncoderBank, EncoderTwin]):
     """Subclass it in a test file, name it ``Test...``, and say what is tested.
 
     Attributes:
@@ -51,9 +51,8 @@ class EncoderConformance(ABC):
     def driver(self, twin: EncoderTwin) -> EncoderBank:
         """The driver under test."""
 
-    @abstractmethod
-    def twin(self) -> AbstractContextManager[EncoderTwin]:
-        """The encoders, as long as the context lasts."""
+    def _driver_of(self, twin: EncoderTwin) -> EncoderBank:
+        return self.driver(twin)
 
     def test_they_are_the_same_whenever_they_are_opened(self) -> None:
         async def check(bank: EncoderBank, _: EncoderTwin) -> None:
@@ -84,7 +83,7 @@ class EncoderConformance(ABC):
         self._run(check)
 
     def test_a_sample_is_of_one_instant(self) -> None:
-        """All joints move together: a sample that is put together of two instants differs in itself."""
+        """All joints move together: a sample of two instants differs in itself."""
 
         async def check(bank: EncoderBank, twin: EncoderTwin) -> None:
             twin.stand_at((0.0,) * 6)
@@ -143,22 +142,6 @@ class EncoderConformance(ABC):
         assert sample.unit == twin.settings.unit
         for found, joint in zip(sample.positions, joints, strict=True):
             assert abs(found - joint) <= self.tolerance, sample
-
-    def _run(self, check: Callable[[EncoderBank, EncoderTwin], Awaitable[None]]) -> None:
-        async def run() -> None:
-            with self.twin() as twin:
-                async with self._closed_after(twin) as bank, asyncio.timeout(LONGEST_S):
-                    await check(bank, twin)
-
-        asyncio.run(run())
-
-    @asynccontextmanager
-    async def _closed_after(self, twin: EncoderTwin) -> AsyncIterator[EncoderBank]:
-        bank = self.driver(twin)
-        try:
-            yield bank
-        finally:
-            await bank.close()
 
 
 @contextmanager

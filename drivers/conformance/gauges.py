@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from abc import ABC, abstractmethod
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AbstractContextManager, asynccontextmanager
+from abc import abstractmethod
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Protocol
 
-from drivers.conformance.suite import LONGEST_S, failure, require_named
+from drivers.conformance.suite import Suite, failure, require_named
 from drivers.interfaces import Gauge
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
@@ -36,7 +36,7 @@ class GaugeTwin(Protocol):
         ...
 
 
-class GaugeConformance(ABC):
+class GaugeConformance(Suite[Gauge, GaugeTwin]):
     """Subclass it in a test file, name it ``Test...``, and say what is tested.
 
     Attributes:
@@ -48,10 +48,6 @@ class GaugeConformance(ABC):
     @abstractmethod
     def driver(self, settings: GaugeSettings, ports: SharedSerialPorts) -> Gauge:
         """The driver under test."""
-
-    @abstractmethod
-    def twin(self) -> AbstractContextManager[GaugeTwin]:
-        """The instrument, as long as the context lasts."""
 
     def test_it_is_the_same_whenever_it_is_opened(self) -> None:
         async def check(gauge: Gauge, _: GaugeTwin) -> None:
@@ -104,12 +100,13 @@ class GaugeConformance(ABC):
             twin.show(1.0)
             await gauge.open()
             twin.inject("damaged", on=True)
+            agreement_mm = twin.settings.agreement_mm or 0.05
             for _ in range(20):
                 try:
                     found = await gauge.read()
                 except DeviceError:
                     continue
-                assert abs(found.value_mm - 1.0) <= self._agreement_mm(twin), found
+                assert abs(found.value_mm - 1.0) <= agreement_mm + self.tolerance_mm, found
 
         self._run(check)
 
@@ -140,23 +137,14 @@ class GaugeConformance(ABC):
 
         self._run(check)
 
-    def _agreement_mm(self, twin: GaugeTwin) -> float:
-        return (twin.settings.agreement_mm or 0.05) + self.tolerance_mm
-
-    def _run(self, check: Callable[[Gauge, GaugeTwin], Awaitable[None]]) -> None:
-        async def run() -> None:
-            with self.twin() as twin:
-                async with self._opened(twin) as gauge, asyncio.timeout(LONGEST_S):
-                    await check(gauge, twin)
-
-        asyncio.run(run())
+    def _driver_of(self, twin: GaugeTwin) -> Gauge:
+        return self.driver(twin.settings, self._ports)
 
     @asynccontextmanager
-    async def _opened(self, twin: GaugeTwin) -> AsyncIterator[Gauge]:
-        ports = SharedSerialPorts(worst_latency_s=WORST_LATENCY_S)
-        gauge = self.driver(twin.settings, ports)
+    async def _closed_after(self, twin: GaugeTwin) -> AsyncIterator[Gauge]:
+        self._ports = SharedSerialPorts(worst_latency_s=WORST_LATENCY_S)
         try:
-            yield gauge
+            async with super()._closed_after(twin) as gauge:
+                yield gauge
         finally:
-            await gauge.close()
-            await ports.close()
+            await self._ports.close()

@@ -1,18 +1,25 @@
-"""What all conformance tests ask of failures: an error of the device, that names it."""
+"""What all conformance suites have in common: a device against its twin, and what they ask of failures."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
-from typing import Any
+import asyncio
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import AbstractContextManager, asynccontextmanager
+from typing import Any, Generic, TypeVar
 
+from drivers.interfaces import Device
 from hexacell.errors import DeviceError
 
 LONGEST_S = 60.0
 """No call may take longer, whatever the device does."""
 
+DeviceT = TypeVar("DeviceT", bound=Device[Any])
+TwinT = TypeVar("TwinT")
+
 
 async def failure(call: Callable[[], Awaitable[Any]]) -> Exception | None:
-    """What a call raises; none if it succeeds."""
+    """What a call raises; None if it succeeds."""
     try:
         await call()
     except Exception as error:
@@ -24,3 +31,31 @@ def require_named(error: BaseException | None, name: str) -> None:
     """Fail unless it is a ``DeviceError`` whose subject has the name in it."""
     assert isinstance(error, DeviceError), f"{error!r} is no DeviceError"
     assert name in (error.subject or ""), f"{error} does not name {name}"
+
+
+class Suite(ABC, Generic[DeviceT, TwinT]):
+    """Subclass one of the suites in a test file, name it ``Test...``, and say what is tested."""
+
+    @abstractmethod
+    def twin(self) -> AbstractContextManager[TwinT]:
+        """The device's twin, as long as the context lasts."""
+
+    @abstractmethod
+    def _driver_of(self, twin: TwinT) -> DeviceT:
+        """The driver under test, for a twin."""
+
+    def _run(self, check: Callable[[DeviceT, TwinT], Awaitable[None]]) -> None:
+        async def run() -> None:
+            with self.twin() as twin:
+                async with self._closed_after(twin) as device, asyncio.timeout(LONGEST_S):
+                    await check(device, twin)
+
+        asyncio.run(run())
+
+    @asynccontextmanager
+    async def _closed_after(self, twin: TwinT) -> AsyncIterator[DeviceT]:
+        device = self._driver_of(twin)
+        try:
+            yield device
+        finally:
+            await device.close()

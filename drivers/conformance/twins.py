@@ -54,11 +54,8 @@ def served_twin(
     settings: GaugeSettings, instrument: InstrumentFactory | None = None
 ) -> Iterator[ServedTwin]:
     """Serve a simulated gauge on a pseudo-terminal: an instrument of one's own, or that of the protocol."""
-    twin = ServedTwin(settings, instrument)
-    try:
+    with closing(ServedTwin(settings, instrument)) as twin:
         yield twin
-    finally:
-        twin.close()
 
 
 FAULTY_LEG = 3

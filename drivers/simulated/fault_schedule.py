@@ -142,7 +142,6 @@ class FaultSchedule(Closeable):
                 self._enqueue(fault)
 
     def close(self) -> None:
-        """Inject no more faults; closing twice is harmless."""
         self._closing = True
         self._changed.set()
         self._thread.join()

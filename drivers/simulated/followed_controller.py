@@ -17,7 +17,7 @@ import numpy as np
 
 from drivers.simulated.cell import SimulatedSensors
 from drivers.simulated.physics import GaugePlaces, Motion, RobotPhysics
-from drivers.simulated.served_device import Closeable
+from drivers.simulated.served_device import Closeable, ServedGroup
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
@@ -29,118 +29,15 @@ from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.storage.atomic_files import write_atomically
 
-
-class FollowedController(Closeable):
-    """Serves gauges and encoders at the joints of ``[simulation] joints_command`` until it is closed.
-
-    Raises:
-        FileError: the controller's config cannot be read.
-        ReachError: the first point of the cell is out of reach by its config or its true geometry.
-        UsageError: faults are stated, or a clock that is not the real one; or there is no such command.
-    """
-
-    def __init__(
-        self,
-        settings: CellSettings,
-        simulation: SimulationSettings,
-        mechanism: Mechanism,
-        layout: ConfigLayout,
-        config: tuple[Path, ...],
-        *,
-        other_processes: bool,
-    ) -> None:
-        _require_real(settings, simulation)
-        clock = CellClock(1.0)
-        home = Pose(*settings.identification.points[0])
-        commanding, fixture = layout.read(*config), settings.length_check
-        with ExitStack() as served:
-            source = served.enter_context(JointSource(simulation.joints_command))
-            kept = KeptGauges(config)
-            self.physics = FollowingPhysics(
-                source, kept, mechanism, simulation, clock, commanding, home, fixture
-            )
-            self.sensors = served.enter_context(
-                SimulatedSensors(settings, simulation, self.physics, clock, other_processes=other_processes)
-            )
-            self._served = served.pop_all()
-        self.settings = self.sensors.addressed(settings)
-
-    def close(self) -> None:
-        """Stop serving; twice is harmless."""
-        self._served.close()
-
-
-def _require_real(settings: CellSettings, simulation: SimulationSettings) -> None:
-    if simulation.faults:
-        problem, action = (
-            "only a simulated controller has faults",
-            "Remove [[simulation.faults]]",
-        )
-    elif settings.timing.clock_factor != 1.0:
-        problem, action = "a real controller has no fast clock", "Remove timing.clock_factor"
-    elif which(simulation.joints_command[0]) is None:
-        problem = f"there is no program '{simulation.joints_command[0]}'"
-        action = "Install it, or remove [simulation]"
-    else:
-        return
-    raise UsageError(f"[simulation] names a joints_command, but {problem}", action=action)
-
-
 LONGEST_STEP_MM = 5.0
 """Of a joint variable between two solutions of the pose, so that the assembly mode is kept."""
-
 MOVED_MM = 1e-4
-
-
-class FollowingPhysics(RobotPhysics):
-    """Where the joints are is what ``source`` says; before it says anything, at the first point."""
-
-    def __init__(self, source: JointSource, kept: KeptGauges, *arguments: Any) -> None:  # noqa: ANN401 - those of its base
-        super().__init__(*arguments)
-        self._source = source
-        self._kept: KeptGauges | None = kept
-        self._draw_noise()
-
-    def _update(self) -> float:
-        now = self._clock.now()
-        for shown in self._source.passed():
-            self._follow(shown / self._shown_per_mm, now)
-            if (
-                self._kept is not None
-            ):  # before, the ball was at the first point for want of anything better
-                self._kept.restore(self.gauges)
-                self._kept = None
-        return now
-
-    def encoder_positions(self) -> Array:
-        """The joint variables measured by the encoders (6,)."""
-        with self._lock:
-            self._update()
-            return super().encoder_positions()
-
-    def _follow(self, joints: Array, now: float) -> None:
-        step = joints - self._joints
-        largest = float(np.abs(step).max())
-        if largest < MOVED_MM:
-            return
-        if self._motion.end_s < now - RESTING_S:  # it stood, and another move begins
-            self._draw_noise()
-            self.on_motion_start()
-        for share in np.linspace(0.0, 1.0, int(np.ceil(largest / LONGEST_STEP_MM)) + 1)[1:]:
-            self._move_platform(joints - (1.0 - share) * step)
-        self._motion = Motion(np.stack([joints, joints]), now, 0.0)
-
-
 RESTING_S = 0.2
 """Without a change of the joints for longer, the robot stands."""
-
-
 RESTART_S = 0.5
 """Pause before the program is started again: it ends whenever the controller does."""
-
 BACKLOG_S = 0.3
 """In which the program prints what was sampled before it was started; that is not where the joints are."""
-
 KEPT = 10_000
 """Positions that nobody asked for, of which the oldest are dropped."""
 
@@ -168,7 +65,6 @@ class JointSource(Closeable):
         return found
 
     def close(self) -> None:
-        """End the program; twice is harmless."""
         with self._lock:
             self._closing.set()
             if self._process is not None:
@@ -237,3 +133,93 @@ class KeptGauges:
                 "triad": triad.tolist(),
             }
             write_atomically(self.path, json.dumps(kept).encode())
+
+
+class FollowingPhysics(RobotPhysics):
+    """Where the joints are is what ``source`` says; before it says anything, at the first point."""
+
+    def __init__(self, source: JointSource, kept: KeptGauges, *arguments: Any) -> None:  # noqa: ANN401 - those of its base
+        super().__init__(*arguments)
+        self._source = source
+        self._kept: KeptGauges | None = kept
+        self._draw_noise()
+
+    def _update(self) -> float:
+        now = self._clock.now()
+        for shown in self._source.passed():
+            self._follow(shown / self._shown_per_mm, now)
+            if (
+                self._kept is not None
+            ):  # before, the ball was at the first point for want of anything better
+                self._kept.restore(self.gauges)
+                self._kept = None
+        return now
+
+    def encoder_positions(self) -> Array:
+        with self._lock:
+            self._update()
+            return super().encoder_positions()
+
+    def _follow(self, joints: Array, now: float) -> None:
+        step = joints - self._joints
+        largest = float(np.abs(step).max())
+        if largest < MOVED_MM:
+            return
+        if self._motion.end_s < now - RESTING_S:  # it stood, and another move begins
+            self._draw_noise()
+            self.on_motion_start()
+        for share in np.linspace(0.0, 1.0, int(np.ceil(largest / LONGEST_STEP_MM)) + 1)[1:]:
+            self._move_platform(joints - (1.0 - share) * step)
+        self._motion = Motion(np.stack([joints, joints]), now, 0.0)
+
+
+class FollowedController(ServedGroup):
+    """Serves gauges and encoders at the joints of ``[simulation] joints_command`` until it is closed.
+
+    Raises:
+        FileError: the controller's config cannot be read.
+        ReachError: the first point of the cell is out of reach by its config or its true geometry.
+        UsageError: faults are stated, or a clock that is not the real one; or there is no such command.
+    """
+
+    def __init__(
+        self,
+        settings: CellSettings,
+        simulation: SimulationSettings,
+        mechanism: Mechanism,
+        layout: ConfigLayout,
+        config: tuple[Path, ...],
+        *,
+        other_processes: bool,
+    ) -> None:
+        _require_real(settings, simulation)
+        clock = CellClock(1.0)
+        home = Pose(*settings.identification.points[0])
+        commanding, fixture = layout.read(*config), settings.length_check
+        with ExitStack() as served:
+            source = served.enter_context(JointSource(simulation.joints_command))
+            kept = KeptGauges(config)
+            self.physics = FollowingPhysics(
+                source, kept, mechanism, simulation, clock, commanding, home, fixture
+            )
+            self.sensors = served.enter_context(
+                SimulatedSensors(settings, simulation, self.physics, clock, other_processes=other_processes)
+            )
+            self._served = served.pop_all()
+        self.settings = self.sensors.addressed(settings)
+
+
+def _require_real(settings: CellSettings, simulation: SimulationSettings) -> None:
+    if simulation.faults:
+        problem, action = (
+            "only a simulated controller has faults",
+            "Remove [[simulation.faults]]",
+        )
+    elif settings.timing.clock_factor != 1.0:
+        problem, action = "a real controller has no fast clock", "Remove timing.clock_factor"
+    elif which(simulation.joints_command[0]) is None:
+        problem = f"there is no program '{simulation.joints_command[0]}'"
+        action = "Install it, or remove [simulation]"
+    else:
+        return
+    raise UsageError(f"[simulation] names a joints_command, but {problem}", action=action)

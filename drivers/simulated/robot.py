@@ -93,7 +93,6 @@ class SimulatedMachine:
                 raise SoftLimitExceeded(axis, is_highest=value > high)
 
     def stop(self) -> None:
-        """Stop in place."""
         with self._lock:
             self._stop_count += 1
             self._physics.stop()

@@ -75,11 +75,9 @@ class PtyLine:
 
     @property
     def url(self) -> str:
-        """The path of the link."""
         return str(self._link)
 
     def plug_in(self) -> None:
-        """Create a pseudo-terminal in raw mode and link to it."""
         if self._master >= 0:
             return
         self._master, self._slave = os.openpty()
@@ -91,7 +89,6 @@ class PtyLine:
         self._link.symlink_to(os.ttyname(self._slave))
 
     def unplug(self) -> None:
-        """Remove the link and close both ends."""
         if self._master < 0:
             return
         self._link.unlink()
@@ -100,11 +97,9 @@ class PtyLine:
         self._master = self._slave = -1
 
     def descriptors(self) -> list[int]:
-        """The master end."""
         return [] if self._master < 0 else [self._master]
 
     def receive(self, ready: Sequence[int]) -> bytes:
-        """One packet: data, or the notice of a change at the client's end."""
         if self._master not in ready:
             return b""
         packet = os.read(self._master, CHUNK)
@@ -113,12 +108,10 @@ class PtyLine:
         return packet[1:] if packet[:1] == b"\0" else b""
 
     def send(self, data: bytes, wait_s: float = 0.0) -> None:
-        """Write to the master end."""
         if self._master >= 0:
             _write_or_drop(self._master, data, wait_s)
 
     def close(self) -> None:
-        """Close both ends and remove the link."""
         self.unplug()
         self._folder.cleanup()
 
@@ -147,28 +140,23 @@ class SocketLine:
 
     @property
     def url(self) -> str:
-        """``socket://`` address and port."""
         return f"socket://{LOOPBACK}:{self._port}"
 
     def plug_in(self) -> None:
-        """Accept clients."""
         self._listener.listen(1)
         self._plugged = True
 
     def unplug(self) -> None:
-        """Drop the client; keep the port without accepting clients."""
         self.close()
         self._plugged = False
         self._listener = self._bound()
 
     def descriptors(self) -> list[int]:
-        """The listener while plugged in, and the client."""
         listening = [self._listener] if self._plugged else []
         connected = [self._client] if self._client else []
         return [each.fileno() for each in (*listening, *connected)]
 
     def receive(self, ready: Sequence[int]) -> bytes:
-        """Bytes from the client; accepts one if there is none."""
         data = b""
         if self._client is not None and self._client.fileno() in ready:
             data = self._read(self._client)
@@ -180,14 +168,12 @@ class SocketLine:
         return data
 
     def send(self, data: bytes, wait_s: float = 0.0) -> None:
-        """Send to the client, if there is one."""
         client = self._client
         if client is not None:
             with suppress(OSError, ValueError):  # the client may be dropped meanwhile
                 _write_or_drop(client.fileno(), data, wait_s)
 
     def close(self) -> None:
-        """Drop the client and close the port."""
         self._drop()
         self._listener.close()
 

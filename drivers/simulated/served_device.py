@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from contextlib import ExitStack
 from typing import Protocol, Self
 
 
@@ -18,6 +19,16 @@ class Closeable(ABC):
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class ServedGroup(Closeable):
+    """Several devices, served until it is closed; a subclass collects them in ``_served``."""
+
+    _served: ExitStack
+
+    def close(self) -> None:
+        """Stop serving all of them; closing twice is harmless."""
+        self._served.close()
 
 
 class Switch(Protocol):

@@ -118,7 +118,6 @@ class SlcanServer(Closeable):
 
     @property
     def bus_settings(self) -> dict[str, Any]:
-        """The settings for ``can.Bus`` to reach the bus from any process of this machine."""
         return {
             "interface": "slcan",
             "channel": self._url,
@@ -128,7 +127,6 @@ class SlcanServer(Closeable):
         }
 
     def close(self) -> None:
-        """End both threads and release line and bus; closing twice is harmless."""
         if self._closing.is_set():
             return
         self._closing.set()

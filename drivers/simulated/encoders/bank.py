@@ -57,15 +57,12 @@ class SimulatedEncoderBank(Closeable):
 
     @property
     def bus_settings(self) -> dict[str, Any]:
-        """The settings for ``can.Bus`` to reach the bank from this process."""
         return {"interface": "virtual", "channel": self.channel}
 
     def close(self) -> None:
-        """Switch them off and close the channel; closing twice is harmless."""
         self.bus.close()
 
     def faults(self, leg: int) -> dict[FaultKind, Switch]:
-        """The faults of the encoder of a leg, from 1."""
         encoder = self._encoders[leg - 1]
         return {
             "unplugged": partial(self._set_fault, encoder.set_unplugged),

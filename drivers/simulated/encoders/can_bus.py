@@ -34,7 +34,6 @@ class SimulatedCanBus(canopen.Network):
         self._thread = threading.Thread(target=self._run, name="simulated encoders", daemon=True)
 
     def start(self) -> None:
-        """Start to receive frames."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -44,7 +43,6 @@ class SimulatedCanBus(canopen.Network):
             self._thread.join()
 
     def close(self) -> None:
-        """Stop, and close the channel."""
         self.stop()
         if self.bus is not None:
             self.bus.shutdown()
@@ -54,7 +52,6 @@ class SimulatedCanBus(canopen.Network):
         return self._timers.enterabs(time.monotonic() + seconds, 0, action)
 
     def cancel(self, timer: sched.Event) -> None:
-        """Cancel an action that has not run yet."""
         self._timers.cancel(timer)
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
@@ -119,5 +116,4 @@ class PeriodicFrame(PeriodicAction):
         self._data = data
 
     def update(self, data: bytes) -> None:
-        """Send other data from now on."""
         self._data = data

@@ -43,7 +43,6 @@ class SimulatedDbcEncoder:
         return data
 
     def set_silent(self, *, on: bool) -> None:
-        """Send nothing, or again."""
         self.is_silent = on
 
     def set_frozen(self, *, on: bool) -> None:
@@ -84,11 +83,9 @@ class SimulatedDbcBank(Closeable):
 
     @property
     def bus_settings(self) -> dict[str, Any]:
-        """The settings for ``can.Bus`` to reach the bank from this process."""
         return {"interface": "virtual", "channel": self.channel}
 
     def faults(self, leg: int) -> dict[FaultKind, Switch]:
-        """The faults of the encoder of a leg, from 1."""
         encoder = self._encoders[leg - 1]
         return {
             "unplugged": partial(self._switch, encoder.set_silent),
@@ -99,7 +96,6 @@ class SimulatedDbcBank(Closeable):
         }
 
     def close(self) -> None:
-        """Close the channel; twice is harmless."""
         self.bus.close()
 
     def _switch(self, switch: Switch, *, on: bool) -> None:

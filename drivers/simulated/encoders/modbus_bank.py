@@ -39,7 +39,6 @@ class ModbusScales(Instrument):
         self.silent_legs: frozenset[int] = frozenset()
 
     def split(self, received: bytes) -> tuple[list[bytes], bytes]:
-        """Whole requests with a right checksum."""
         return split_requests(received)
 
     def answer(self, command: bytes) -> bytes:
@@ -119,7 +118,6 @@ class SimulatedModbusBank(Closeable):
         """Where a driver finds them."""
 
     def faults(self, leg: int) -> dict[FaultKind, Switch]:
-        """The faults of the encoder of a leg, from 1, and of the line."""
         found: dict[FaultKind, Switch] = {
             "unplugged": self._served.set_unplugged,
             "silent": partial(self._set_silent, leg),
@@ -132,7 +130,6 @@ class SimulatedModbusBank(Closeable):
         return found | ({"alarm": partial(self._set_invalid, leg)} if self._described.invalid else {})
 
     def close(self) -> None:
-        """Close the line; twice is harmless."""
         self._served.close()
 
     def _counts(self) -> list[int]:

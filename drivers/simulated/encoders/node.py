@@ -119,7 +119,6 @@ class SimulatedEncoder:
         self._set(object_dictionary.WARNINGS, bytes((DIRTY_SCALE * on, 0)))
 
     def sample(self, counts: int) -> None:
-        """Take the present position."""
         if not self._is_frozen:
             is_reversed = self._value(object_dictionary.OPERATING_PARAMETERS, 0) & REVERSED
             self.counts = (-counts if is_reversed else counts) + self._shift

@@ -37,7 +37,6 @@ class Vendor:
 
     @property
     def is_rotary(self) -> bool:
-        """Whether it measures angles."""
         return self.device_type == MULTI_TURN
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from drivers.simulated.gauges.instruments import Indicator, Instrument, PlungerPosition
 from drivers.simulated.gauges.server import LATE_TIMEOUTS, GaugeLineServer, LineFault, LineFaults
 from drivers.simulated.serial_line import PtyLine, SocketLine
-from drivers.simulated.served_device import Closeable, Switch
+from drivers.simulated.served_device import ServedGroup, Switch
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import FaultKind, SimulatedGauges
 from hexacell.clock import CellClock
@@ -36,7 +36,7 @@ def instrument_class(protocol: str) -> InstrumentFactory:
     return load(Group.SIMULATED_GAUGES, protocol)
 
 
-class SimulatedGaugeBank(Closeable):
+class SimulatedGaugeBank(ServedGroup):
     """The gauges of a simulated cell; serves until it is closed.
 
     Args:
@@ -78,11 +78,9 @@ class SimulatedGaugeBank(Closeable):
         )
 
     def line(self, gauge: str) -> GaugeLineServer:
-        """The line of ``gauge``."""
         return self._lines[gauge]
 
     def faults(self, gauge: str) -> dict[FaultKind, Switch]:
-        """The faults of ``gauge`` and of its line."""
         line, indicator = self._lines[gauge], self.indicators[gauge]
         return {
             "unplugged": line.set_unplugged,
@@ -101,10 +99,6 @@ class SimulatedGaugeBank(Closeable):
             "switched on again": partial(_switch_on, line, self._channels[gauge]),
             **{fault.value: partial(line.faults.switch, fault) for fault in LineFault},
         }
-
-    def close(self) -> None:
-        """Close every line; closing twice is harmless."""
-        self._served.close()
 
     def _exchange(self, gauge: str, *, on: bool) -> None:
         """Exchange a gauge with the next one; clearing it exchanges them again."""

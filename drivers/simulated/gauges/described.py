@@ -9,6 +9,8 @@ from typing import ClassVar
 from drivers.simulated.gauges.instruments import MM_PER_INCH, Indicator, Instrument, SingleIndicator
 from hexacell.cell.described_devices import DescribedFrame, RequestSettings, StreamSettings, VisaSettings
 
+SOCKET = re.compile(r"socket://([\w.]+):(\d+)")
+
 
 class ByRequest(SingleIndicator):
     """One that is asked."""
@@ -46,41 +48,12 @@ class Streaming(Instrument):
         self._template = _Template(described)
 
     def answer(self, command: bytes) -> bytes:
-        """Nothing: it does not listen."""
         del command
         return b""
 
     def _value(self, channel: int) -> bytes:
         shown = self.indicators[channel].shown()
         return self.at_end if shown is None else self._template.filled(shown, channel)
-
-
-class _Template:
-    """The example of a frame, whose number and channel are others."""
-
-    def __init__(self, described: DescribedFrame) -> None:
-        match = re.fullmatch(described.answer, described.example.strip("\r\n"))
-        if match is None:
-            raise ValueError(described.example)
-        self._example, self._mm_per_unit = described.example, described.mm_per_unit
-        self._number = match.span(described.number_group)
-        self._channel = match.span("channel") if "channel" in match.groupdict() else None
-
-    def filled(self, mm: float, channel: int) -> bytes:
-        """The frame of a value."""
-        shown = self._example[slice(*self._number)]
-        decimals = len(shown.partition(".")[2])
-        parts = [(self._number, f"{mm / self._mm_per_unit:+0{len(shown)}.{decimals}f}")]
-        if self._channel is not None:
-            width = self._channel[1] - self._channel[0]
-            parts.append((self._channel, f"{channel:0{width}d}"))
-        text = self._example
-        for (start, end), part in sorted(parts, reverse=True):
-            text = text[:start] + part + text[end:]
-        return text.encode("latin-1")
-
-
-SOCKET = re.compile(r"socket://([\w.]+):(\d+)")
 
 
 class Scpi(Instrument):
@@ -118,7 +91,31 @@ class Scpi(Instrument):
 
     @classmethod
     def address(cls, url: str) -> str:
-        """The VISA resource of a line."""
         if match := SOCKET.fullmatch(url):
             return f"TCPIP::{match[1]}::{match[2]}::SOCKET"
         return f"ASRL{url}::INSTR"
+
+
+class _Template:
+    """The example of a frame, whose number and channel are others."""
+
+    def __init__(self, described: DescribedFrame) -> None:
+        match = re.fullmatch(described.answer, described.example.strip("\r\n"))
+        if match is None:
+            raise ValueError(described.example)
+        self._example, self._mm_per_unit = described.example, described.mm_per_unit
+        self._number = match.span(described.number_group)
+        self._channel = match.span("channel") if "channel" in match.groupdict() else None
+
+    def filled(self, mm: float, channel: int) -> bytes:
+        """The frame of a value."""
+        shown = self._example[slice(*self._number)]
+        decimals = len(shown.partition(".")[2])
+        parts = [(self._number, f"{mm / self._mm_per_unit:+0{len(shown)}.{decimals}f}")]
+        if self._channel is not None:
+            width = self._channel[1] - self._channel[0]
+            parts.append((self._channel, f"{channel:0{width}d}"))
+        text = self._example
+        for (start, end), part in sorted(parts, reverse=True):
+            text = text[:start] + part + text[end:]
+        return text.encode("latin-1")

@@ -78,7 +78,6 @@ class DigimaticUsb(SingleIndicator):
 
     @staticmethod
     def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
-        """A number alone."""
         return b"%.*f\n" % (5 if inch else 3, value)
 
 
@@ -90,7 +89,6 @@ class Uwave(Instrument):
     has_channels: ClassVar[bool] = True
 
     def answer(self, command: bytes) -> bytes:
-        """Nothing: the commands of its own program are not simulated."""
         del command
         return b""
 

@@ -63,7 +63,6 @@ class Indicator:
         self.peak_mm = self._live_mm() if on else None
 
     def set_battery_low(self, *, on: bool) -> None:
-        """Report a low battery, or a good one."""
         self.battery_low = on
 
     def set_zeroed(self, *, on: bool) -> None:
@@ -95,11 +94,9 @@ class Indicator:
         self._pushed_mm = -copysign(PUSH_MM, self._plunger()) if on else 0.0
 
     def set_reversed(self, *, on: bool) -> None:
-        """Count in the other direction, or as it should."""
         self.reversed = on
 
     def set_inch(self, *, on: bool) -> None:
-        """Show inches, or mm."""
         self.inch = on
 
     def exchange_with(self, other: Indicator) -> None:
@@ -181,7 +178,6 @@ class SingleIndicator(Instrument):
 
     @property
     def indicator(self) -> Indicator:
-        """Its indicator."""
         return self.indicators[1]
 
     def answer(self, command: bytes) -> bytes:

@@ -24,48 +24,42 @@ class ClientSession:
 
     @property
     def has_control(self) -> bool:
-        """Whether this client has control."""
         return self.state.commander is self
 
 
 UNITS = {1.0: "MM", 10.0: "CM", 25.4: "INCH"}
 
 
-def _on_off(*, on: bool) -> str:
-    return "ON" if on else "OFF"
+def _switch(is_on: bool) -> str:
+    return "ON" if is_on else "OFF"
 
 
-def _yes_no(*, yes: bool) -> str:
-    return "YES" if yes else "NO"
+def _answer(is_so: bool) -> str:
+    return "YES" if is_so else "NO"
 
 
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(f"{value:.6f}" for value in values)
+def _numbers(values: Iterable[float], unit: float = 1.0) -> str:
+    """Lengths in the machine's unit; angles come with unit 1."""
+    return " ".join(f"{value / unit:.6f}" for value in values)
 
 
 def _position(session: ClientSession, values: tuple[float, ...]) -> str:
     """Three lengths in the machine's unit, and three angles."""
-    unit = session.settings.unit_mm
-    return _numbers([*(value / unit for value in values[:3]), *values[3:]])
-
-
-def _joints(session: ClientSession) -> str:
-    unit = session.settings.joint_unit_mm
-    return _numbers(value / unit for value in session.state.machine.joints())
+    return f"{_numbers(values[:3], session.settings.unit_mm)} {_numbers(values[3:])}"
 
 
 GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
-    "ECHO": lambda session: _on_off(on=session.echo),
-    "VERBOSE": lambda session: _on_off(on=session.verbose),
-    "ENABLE": lambda session: _on_off(on=session.has_control),
+    "ECHO": lambda session: _switch(session.echo),
+    "VERBOSE": lambda session: _switch(session.verbose),
+    "ENABLE": lambda session: _switch(session.has_control),
     "SET_WAIT": lambda session: session.state.wait_mode.value,
-    "ESTOP": lambda session: _on_off(on=session.state.estop),
-    "MACHINE": lambda session: _on_off(on=session.state.enabled),
+    "ESTOP": lambda session: _switch(session.state.estop),
+    "MACHINE": lambda session: _switch(session.state.enabled),
     "MODE": lambda session: session.state.mode.value,
     "ERROR": lambda session: session.state.next_error(),
-    "TELEOP_ENABLE": lambda session: _yes_no(yes=session.state.teleop),
-    "JOINT_HOMED": lambda session: " ".join([_yes_no(yes=session.state.homed)] * 6),
-    "JOINT_POS": _joints,
+    "TELEOP_ENABLE": lambda session: _answer(session.state.teleop),
+    "JOINT_HOMED": lambda session: " ".join([_answer(session.state.homed)] * 6),
+    "JOINT_POS": lambda session: _numbers(session.state.machine.joints(), session.settings.joint_unit_mm),
     "ABS_ACT_POS": lambda session: _position(session, session.state.machine.pose().as_tuple()),
     "POS_OFFSET": lambda session: _position(session, session.state.modes.offsets),
     "PROGRAM_CODES": lambda session: session.state.modes.codes,
@@ -75,8 +69,6 @@ GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
     "INIFILE": lambda session: Path(session.settings.config).name,
     "PLAT": lambda _session: "Linux",
 }
-
-
 OF_SERVER = frozenset({"ECHO", "VERBOSE", "ENABLE", "SET_WAIT"})
 """What the server answers by itself, whatever the controller does."""
 
@@ -115,22 +107,6 @@ def _one_of(
     return execute
 
 
-def _set_echo(session: ClientSession, on: bool) -> None:
-    session.echo = on
-
-
-def _set_verbose(session: ClientSession, on: bool) -> None:
-    session.verbose = on
-
-
-def _set_wait_mode(session: ClientSession, mode: WaitMode) -> None:
-    session.state.wait_mode = mode
-
-
-def _set_teleop(session: ClientSession, on: bool) -> None:
-    session.state.teleop = on
-
-
 def _enable(session: ClientSession, argument: str) -> bool:
     if argument == session.settings.enable_password.get_secret_value():
         session.state.commander = session
@@ -141,36 +117,31 @@ def _enable(session: ClientSession, argument: str) -> bool:
     return False
 
 
-def _mdi(session: ClientSession, argument: str) -> bool:
-    return session.state.mdi(argument)
-
-
 def _abort(session: ClientSession, _argument: str) -> bool:
     session.state.abort()
     return True
 
 
 _SWITCH = {"ON": True, "OFF": False}
-_ALL_JOINTS = {"-1": -1}
 _TASK_MODES = {mode.value: mode for mode in TaskMode}
 _WAIT_MODES = {mode.value: mode for mode in WaitMode}
 
 SET_COMMANDS: dict[str, SetCommand] = {
-    "ECHO": SetCommand(Permission.ANYBODY, _one_of(_SWITCH, _set_echo)),
-    "VERBOSE": SetCommand(Permission.ANYBODY, _one_of(_SWITCH, _set_verbose)),
+    "ECHO": SetCommand(Permission.ANYBODY, _one_of(_SWITCH, lambda it, on: setattr(it, "echo", on))),
+    "VERBOSE": SetCommand(Permission.ANYBODY, _one_of(_SWITCH, lambda it, on: setattr(it, "verbose", on))),
     "ENABLE": SetCommand(Permission.ANYBODY, _enable),
-    "SET_WAIT": SetCommand(Permission.COMMANDER, _one_of(_WAIT_MODES, _set_wait_mode)),
-    "ESTOP": SetCommand(
-        Permission.COMMANDER, _one_of(_SWITCH, lambda session, on: session.state.set_estop(on=on))
+    "SET_WAIT": SetCommand(
+        Permission.COMMANDER, _one_of(_WAIT_MODES, lambda one, mode: setattr(one.state, "wait_mode", mode))
     ),
+    "ESTOP": SetCommand(Permission.COMMANDER, _one_of(_SWITCH, lambda one, on: one.state.set_estop(on=on))),
     "MACHINE": SetCommand(
-        Permission.COMMANDER, _one_of(_SWITCH, lambda session, on: session.state.set_machine(on=on))
+        Permission.COMMANDER, _one_of(_SWITCH, lambda one, on: one.state.set_machine(on=on))
     ),
-    "MODE": SetCommand(
-        Permission.ON, _one_of(_TASK_MODES, lambda session, mode: session.state.set_mode(mode))
+    "MODE": SetCommand(Permission.ON, _one_of(_TASK_MODES, lambda one, mode: one.state.set_mode(mode))),
+    "TELEOP_ENABLE": SetCommand(
+        Permission.ON, _one_of(_SWITCH, lambda one, on: setattr(one.state, "teleop", on))
     ),
-    "TELEOP_ENABLE": SetCommand(Permission.ON, _one_of(_SWITCH, _set_teleop)),
-    "HOME": SetCommand(Permission.ON, _one_of(_ALL_JOINTS, lambda session, _joints: session.state.home())),
-    "MDI": SetCommand(Permission.ON, _mdi),
+    "HOME": SetCommand(Permission.ON, _one_of({"-1": -1}, lambda one, _joints: one.state.home())),
+    "MDI": SetCommand(Permission.ON, lambda one, block: one.state.mdi(block)),
     "ABORT": SetCommand(Permission.ON, _abort),
 }

@@ -68,7 +68,6 @@ class SimulatedController(Closeable):
         self._server.frozen_answers = _answers_now(self._server) if on else None
 
     def close(self) -> None:
-        """Stop the machine, cut all connections and end all threads; closing twice is harmless."""
         self._server.shutdown()
         self.state.close()
         self._server.cut_all()

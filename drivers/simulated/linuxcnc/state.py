@@ -116,7 +116,6 @@ class ControllerState:
         self._motion = ThreadPoolExecutor(1, thread_name_prefix="simulated motion")
 
     def close(self) -> None:
-        """Stop the machine and end the motion thread."""
         with self._lock:
             self._closed = True
         self.abort()

@@ -1,4 +1,4 @@
-"""Failures of gauges, encoders and serial ports: one class for each reaction of a run.
+"""Failures of devices: one class for each reaction of a run.
 
 A failure without a reaction of its own is a plain :class:`hexacell.errors.DeviceError`.
 """
@@ -105,7 +105,7 @@ class PoseRefused(MoveRefused):
     """The pose itself is refused: beyond a limit, or out of reach. The controller takes others.
 
     Attributes:
-        axis: beyond whose limit it is, one of ``xyzabc``; none if the controller gave another reason.
+        axis: beyond whose limit it is, one of ``xyzabc``; None if the controller gave another reason.
         is_highest: whether that is the axis' highest value, not its lowest.
     """
 

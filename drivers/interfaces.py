@@ -23,8 +23,9 @@ class DeviceIdentity:
     """The identity of a device: recorded with every run, compared after every reconnection.
 
     Attributes:
+        name: unique in the cell, as messages name it.
         settings: what is set in the device that changes the meaning of its readings, in words.
-        port: the place or the adapter that it is connected to, where the operating system tells.
+        port: the place or the adapter that it is connected to, where the operating system knows it.
         remark: what a person should know of it now; not compared.
     """
 
@@ -47,7 +48,13 @@ class GaugeReading:
 
 @dataclass(frozen=True, slots=True)
 class EncoderSample:
-    """Six joint variables sampled at one SYNC: raw counts, and in the unit of the joint variables."""
+    """Six joint variables sampled at one instant.
+
+    Attributes:
+        counts: raw counts (6,), as the encoders send them.
+        positions: joint variables (6,), in ``unit``.
+        unit: mm or deg.
+    """
 
     counts: tuple[int, ...]
     positions: tuple[float, ...]
@@ -57,7 +64,7 @@ class EncoderSample:
 class StartupAction(StrEnum):
     """What makes a controller ready to move; done only where it is permitted.
 
-    The emergency stop that a controller starts in is told from one that came after it was started.
+    The emergency stop that a controller starts in is another one than one that came later.
     """
 
     RESET_INITIAL_ESTOP = "reset-estop"
@@ -93,8 +100,8 @@ class ReportedPosition:
     """Where a controller has the robot.
 
     Attributes:
-        pose: by its own forward kinematics.
-        joints: its six joint variables; none where its protocol does not tell them.
+        pose: by its own forward kinematics, mm and deg.
+        joints: its joint variables (6,), mm or deg; None where its protocol does not report them.
     """
 
     pose: Pose
@@ -113,7 +120,11 @@ class Device(Protocol[Identity_co]):
     """The life cycle of every device."""
 
     async def open(self) -> Identity_co:
-        """Connect, and check that it is the expected device in usable settings; nothing moves."""
+        """Connect, and check that it is the expected device in usable settings; nothing moves.
+
+        Returns:
+            Its identity, or those of all its parts.
+        """
         ...
 
     async def close(self) -> None:
@@ -130,14 +141,21 @@ class Gauge(Device[DeviceIdentity], Protocol):
         ...
 
     async def read(self) -> GaugeReading:
-        """The plunger's position now, mm, in the instrument's own zero and direction."""
+        """The plunger's position now.
+
+        Returns:
+            The value, mm, in the instrument's own zero and direction, once readings agree.
+        """
         ...
 
     async def read_once(self) -> GaugeReading:
-        """The displayed value at this moment, from a single query, also during motion.
+        """The displayed value at this moment, also during motion: for supervision, never for a record.
 
-        For supervision only, never for a record. A garbled answer raises
-        :class:`drivers.errors.WrongAnswer`.
+        Returns:
+            The value of a single query, mm.
+
+        Raises:
+            drivers.errors.WrongAnswer: the answer is garbled.
         """
         ...
 
@@ -150,7 +168,11 @@ class EncoderBank(Device[tuple[DeviceIdentity, ...]], Protocol):
     """Six encoders of the joints that are sampled simultaneously."""
 
     async def read(self) -> EncoderSample:
-        """One complete sample of all six encoders at the same instant, or an error."""
+        """Sample all six encoders.
+
+        Returns:
+            One complete sample, all of the same instant.
+        """
         ...
 
 
@@ -160,21 +182,37 @@ class Controller(Device[DeviceIdentity], Protocol):
     async def prepare(self, permitted: StartupActions) -> None:
         """Make it ready to move: out of emergency stop, enabled, homed. May move the machine.
 
+        Args:
+            permitted: the actions that may be taken for that.
+
         Raises:
             drivers.errors.StartupNotPermitted: it needs an action that is not permitted.
         """
         ...
 
     async def move(self, pose: Pose, duration_s: float) -> None:
-        """Move straight to ``pose`` in ``duration_s`` or longer; returns on arrival."""
+        """Move straight to a pose; returns on arrival.
+
+        Args:
+            pose: the target, mm and deg, in the controller's own frames.
+            duration_s: shortest duration, s.
+        """
         ...
 
     async def position(self) -> ReportedPosition | None:
-        """Where it has the robot now; none before it is homed, when nobody knows."""
+        """Where it has the robot now.
+
+        Returns:
+            Pose and joints; None before it is homed, when nobody knows.
+        """
         ...
 
     async def status(self) -> ControllerStatus:
-        """Emergency stop, enabled, and error messages; also during ``move``."""
+        """Its status now, also during ``move``.
+
+        Returns:
+            Emergency stop, enabled, error messages and heartbeat.
+        """
         ...
 
     async def stop(self) -> None:
@@ -186,15 +224,18 @@ class Controller(Device[DeviceIdentity], Protocol):
 
         It is switched off and on for that, without permission where it was on before.
 
+        Args:
+            permitted: the actions that may be taken to make it ready again.
+
         Raises:
-            drivers.errors.StartupNotPermitted: as ``prepare``, which may then complete it.
+            drivers.errors.StartupNotPermitted: it needs another action; ``prepare`` may complete it.
         """
         ...
 
 
 @runtime_checkable
 class CheckedController(Protocol):
-    """What a controller may have beside: a look at its settings before it is made ready to move."""
+    """A controller whose settings can be checked before it is made ready to move."""
 
     async def check(self) -> None:
         """Raise if units, offsets or modes of it lead commands elsewhere; nothing is set, nothing moves."""
@@ -205,7 +246,11 @@ class StopInput(Device[DeviceIdentity | None], Protocol):
     """A contact or a file that forbids motion; without hardware it has no identity."""
 
     async def active_reason(self) -> str | None:
-        """Why motion is forbidden, or nothing. Fail-safe: a lost line forbids motion."""
+        """Why motion is forbidden now. Fail-safe: a lost line forbids motion.
+
+        Returns:
+            The reason in words; None if motion is allowed.
+        """
         ...
 
 
@@ -218,5 +263,9 @@ class Thermometer(Device[DeviceIdentity], Protocol):
         ...
 
     async def read(self) -> TemperatureReading:
-        """The temperature now, or a ``DeviceError`` within the time-out of the cell file."""
+        """The temperature now.
+
+        Returns:
+            The temperature, deg C, within the time-out of the cell file.
+        """
         ...

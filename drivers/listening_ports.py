@@ -13,7 +13,7 @@ _LISTENING = "0A"
 
 
 def accepts_from_network(port: int, tables: Sequence[Path] = _TABLES) -> bool:
-    """Whether something listens at ``port`` on more than the loopback addresses; False if none can tell."""
+    """Whether something listens at ``port`` beyond the loopback addresses; False if that is not known."""
     return any(not address.is_loopback for address in _listening_at(port, tables))
 
 

@@ -15,7 +15,7 @@ from operator import itemgetter
 from hexacell.errors import FileError
 
 CAPACITY_BYTES = 16 << 20
-"""Of memory, for each line."""
+"""Memory for the trace of each line."""
 
 ENTRY_BYTES = 300
 """What an entry takes in memory beside its bytes: the most are of a few bytes."""

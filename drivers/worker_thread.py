@@ -17,7 +17,7 @@ from typing import TypeVar
 
 Result = TypeVar("Result")
 Jobs = SimpleQueue[Callable[[], object] | None]
-"""What is to be done; none is the end."""
+"""Jobs to be done; None is the end."""
 
 
 class WorkerThread:

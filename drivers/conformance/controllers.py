@@ -24,7 +24,7 @@ class ControllerTwin(Protocol):
 
     @property
     def settings(self) -> ControllerSettings:
-        """Those of the controller, with the address at which the twin answers."""
+        """The settings of the controller, with the address at which the twin answers."""
         ...
 
     @property

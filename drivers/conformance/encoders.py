@@ -24,7 +24,7 @@ class EncoderTwin(Protocol):
 
     @property
     def settings(self) -> EncoderSettings:
-        """Those of the encoders, with the address at which the twin answers."""
+        """The settings of the encoders, with the address at which the twin answers."""
         ...
 
     def stand_at(self, joints: Sequence[float]) -> None:

@@ -24,7 +24,7 @@ class GaugeTwin(Protocol):
 
     @property
     def settings(self) -> GaugeSettings:
-        """Those of the gauge, with the port on which the twin answers."""
+        """The settings of the gauge, with the port on which the twin answers."""
         ...
 
     def show(self, mm: float) -> None:

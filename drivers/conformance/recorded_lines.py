@@ -99,7 +99,7 @@ class AnswersInOrder:
         return self._left[0].request if self._left else b""
 
     def answers_to(self, request: bytes) -> tuple[RecordedAnswer, ...]:
-        """Those to the next request, which must be this one."""
+        """The answers to the next request, which must be this one."""
         if not self._left:
             raise DialogueDiffers(f"asks {request!r} after the last request of the trace")
         if request != self.expected:
@@ -119,7 +119,7 @@ class AnswersByRequest:
             self._left[exchange.request].append(exchange)
 
     def answers_to(self, request: bytes) -> tuple[RecordedAnswer, ...]:
-        """Those to the same request, in their turn."""
+        """The answers to the same request, in their turn."""
         if request not in self._left:
             raise DialogueDiffers(f"asks {request!r}, which the trace has nowhere")
         left = self._left[request]
@@ -278,8 +278,8 @@ def recorded_bus(entries: Iterable[TraceEntry], line: str) -> Iterator[Mapping[s
     Each frame is answered as the same frame was, whatever the order.
 
     Raises:
-        ValueError: as :func:`recorded_line`.
-        DialogueDiffers: as :func:`recorded_line`.
+        ValueError: the trace has no such line.
+        DialogueDiffers: at the end, if the driver asked something else.
     """
     with RecordedBus(RecordedTraffic.of(entries, line)) as served, _in_agreement(served):
         yield served.settings

@@ -17,7 +17,7 @@ QUICKER = 100.0
 
 
 class ServedTwin:
-    """One gauge of the simulation; it shows what it is told to."""
+    """One gauge of the simulation; it shows the length that is set."""
 
     def __init__(self, settings: GaugeSettings, instrument: InstrumentFactory | None) -> None:
         self._mm = 0.0
@@ -62,7 +62,7 @@ FAULTY_LEG = 3
 
 
 class ServedEncoderTwin:
-    """The six CiA 406 encoders of the simulation; they stand where they are told to."""
+    """The six CiA 406 encoders of the simulation; they stand where they are put."""
 
     def __init__(self, settings: EncoderSettings) -> None:
         self._joints: Sequence[float] = (0.0,) * 6

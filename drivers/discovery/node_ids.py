@@ -40,8 +40,8 @@ def set_node_id(bus: Mapping[str, Any], node: int) -> int | None:
     with closing(EncoderBus(bus, threading.Event())) as opened:
         before = responding_nodes(opened)
         if len(before) > 1:
-            told = ", ".join(map(str, before))
-            raise DeviceError(f"has several nodes: {told}", subject=opened.name, action=ALONE)
+            nodes = ", ".join(map(str, before))
+            raise DeviceError(f"has several nodes: {nodes}", subject=opened.name, action=ALONE)
         with _in_configuration_state(opened) as master:
             _require_alone(opened, master)
             _store(opened, master, node)

@@ -78,7 +78,7 @@ class EncoderNode:
         return value
 
     def read_optional(self, entry: ObjectEntry) -> int | None:
-        """The value of an entry; none if the device does not have it."""
+        """The value of an entry; None if the device does not have it."""
         try:
             return int.from_bytes(self.sdo.upload(entry.index, entry.subindex), "little")
         except SdoAbortedError:

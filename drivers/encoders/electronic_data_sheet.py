@@ -42,7 +42,7 @@ HOW_IT_IS_SET = {
 
 @dataclass(frozen=True, slots=True)
 class DataSheet:
-    """The values of one file; ``None`` where it states none.
+    """The values of one file.
 
     Attributes:
         path: of the file.

@@ -1,7 +1,7 @@
 """Encoders with Modbus RTU: counts in registers, of one device with several inputs or of several devices.
 
 Modbus has no SYNC. Registers of one device come in one answer, which is a sample. Several devices are
-sampled at one instant if they can be told to keep their positions (``latch``, a broadcast). Where they
+sampled at one instant if they can be made to keep their positions (``latch``, a broadcast). Where they
 cannot, they are asked there and back, and the mean is the position at the instant in the middle: right
 at rest and at a constant speed.
 """

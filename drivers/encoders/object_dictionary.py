@@ -30,7 +30,7 @@ class DeviceType(IntEnum):
 
     @property
     def unit(self) -> JointUnit:
-        """Of the joint variables that it measures."""
+        """The unit of the joint variables that it measures."""
         is_rotary = self in {DeviceType.SINGLE_TURN, DeviceType.MULTI_TURN}
         return JointUnit.DEG if is_rotary else JointUnit.MM
 
@@ -70,7 +70,7 @@ UNITS_PER_TURN = ObjectEntry(0x6001, 0, 4)
 MEASURING_STEP_SETTING = ObjectEntry(0x6005, 1, 4)
 MEASURING_STEP = ObjectEntry(0x6501, 0, 4)
 RESOLUTION = ObjectEntry(0x6501, 0, 4)
-"""Of a rotary encoder, whose counts a turn object 6001h may divide."""
+"""Physical resolution of a rotary encoder; object 6001h may divide it into other counts a turn."""
 ALARMS = ObjectEntry(0x6503, 0, 2)
 WARNINGS = ObjectEntry(0x6505, 0, 2)
 OFFSET = ObjectEntry(0x6509, 0, 4)

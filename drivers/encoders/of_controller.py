@@ -1,12 +1,12 @@
-"""Encoders that are wired to the robot's controller: their positions as it tells them.
+"""Encoders that are wired to the robot's controller: their positions as it reports them.
 
-Of most machines the scales are those of the drives, and nothing but the controller can read them. What it
-tells is as old as its last cycle (10 ms of LinuxCNC's task) and a position only once the joints are homed.
-It is kept in counts of the size that the cell file states. A comparison of encoders and controller says
-nothing then: both are one reading, and a scale that slips moves both.
+In most machines the scales are those of the drives, and nothing but the controller can read them. What
+it reports is as old as its last cycle (10 ms of LinuxCNC's task) and a position only once the joints are
+homed. It is kept in counts of the size that the cell file states. A comparison of encoders and controller
+says nothing then: both are one reading, and a scale that slips moves both.
 
-Where the joints that it tells include the zeros of its geometry, an encoder shows what is told less the
-zero in its config. That the controller runs these zeros is not seen before others are written: then the
+Where the joints that it reports include the zeros of its geometry, an encoder shows what is reported less
+the zero in its config. That the controller runs these zeros is not seen before others are written: then the
 joints change by other amounts than the config does, and the records do not agree.
 """
 
@@ -25,15 +25,15 @@ from hexacell.kinematics.parameters import LEGS
 PROTOCOL = "controller"
 
 Zeros = Callable[[], Sequence[float]]
-"""What the joints that a controller tells are more than its encoders show, now; raises ``FileError``."""
+"""By how much the joints that a controller reports exceed what its encoders show; raises ``FileError``."""
 
 
 @runtime_checkable
 class JointPositions(Protocol):
-    """A controller that tells where its joints are, also during a move."""
+    """A controller that reports where its joints are, also during a move."""
 
     async def joints_now(self) -> tuple[float, ...] | None:
-        """The six joints, in the unit of the joint variables; none before they are homed."""
+        """The six joints, in the unit of the joint variables; None before they are homed."""
         ...
 
 
@@ -41,7 +41,7 @@ class ControllerScales:
     """``drivers.interfaces.EncoderBank`` of the scales at a controller; opened and closed with that.
 
     Raises:
-        UsageError: this controller does not tell its joints.
+        UsageError: this controller does not report its joints.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class ControllerScales:
     ) -> None:
         if not isinstance(controller, JointPositions):
             raise UsageError(
-                "the controller does not tell where its joints are",
+                "the controller does not report where its joints are",
                 action="Give the encoders a bus of their own, in [encoders]",
             )
         self._settings = settings
@@ -59,7 +59,7 @@ class ControllerScales:
     async def open(self) -> tuple[DeviceIdentity, ...]:
         """One identity a leg; nothing is asked."""
         return tuple(
-            DeviceIdentity(f"encoder of leg {leg}", PROTOCOL, "as the controller tells its joints")
+            DeviceIdentity(f"encoder of leg {leg}", PROTOCOL, "as the controller reports its joints")
             for leg in range(1, LEGS + 1)
         )
 
@@ -71,15 +71,15 @@ class ControllerScales:
             DeviceError: the controller does not answer.
             FileError: its config has no zeros.
         """
-        told = await self._controller.joints_now()
-        if told is None:
+        joints = await self._controller.joints_now()
+        if joints is None:
             raise NotHomedError(
-                "are not homed: what the controller tells of its joints is no position yet",
+                "are not homed: what the controller reports of its joints is not a position yet",
                 subject="encoders",
                 action="Home the controller, or let controller.startup do it",
             )
         settings = self._settings
-        terms = zip(told, self._zeros(), settings.direction, settings.offset, strict=True)
+        terms = zip(joints, self._zeros(), settings.direction, settings.offset, strict=True)
         counts = tuple(
             round(sign * (joint - zero - offset) / settings.step) for joint, zero, sign, offset in terms
         )

@@ -2,7 +2,7 @@
 
 The section ``request`` of a gauge says what is asked, which answer is expected, and what a unit of its
 number is; the section ``stream`` has the pattern of lines that a gauge sends by itself. A group ``channel``
-in that pattern tells several gauges on one port apart.
+in that pattern distinguishes several gauges on one port.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Digimatic indicators behind a microcontroller on USB: any line asks, a bare number answers.
 
-The number is in the unit of the instrument, which nothing tells; a line that begins with ``#`` is an error.
+The number is in the unit of the instrument, which is not sent; a line that begins with ``#`` is an error.
 So do open designs of such adapters (apirek/digimatic on GitHub). A USB port has no baud rate or parity.
 """
 

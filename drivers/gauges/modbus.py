@@ -1,7 +1,7 @@
 """Gauges with Modbus RTU in place of a dial indicator: a number in registers.
 
 The section ``modbus`` of the gauge says where it is and what a count of it is. Frames have a CRC-16; a late
-answer cannot be told from that to the next request, so the line is silent for a while after a time-out.
+answer looks like that to the next request, so the line is silent for a while after a time-out.
 """
 
 from __future__ import annotations

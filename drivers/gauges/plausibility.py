@@ -12,7 +12,7 @@ TRAVEL_MARGIN = 1.1
 """Instruments travel a little farther than they are sold for."""
 
 AGREEMENT_MM = 0.05
-"""Of readings in a row, where nothing is known of the gauge."""
+"""Largest difference of readings that agree, mm, where nothing is known of the gauge."""
 
 ROUNDING_MM = 1e-9
 
@@ -45,7 +45,7 @@ class DisplayHistory:
         self._range: tuple[float, float] | None = None
 
     def agreed(self, readings: Sequence[DisplayedValue]) -> DisplayedValue | None:
-        """What readings in a row agree on; none if the latest do not.
+        """What readings in a row agree on; None if the latest do not.
 
         Two that differ by hardly more than the last digits are enough. Where they differ by more, one may
         be damaged: a bit of the hundredths is 0.04 mm, and two such readings of five would outlast the
@@ -77,7 +77,7 @@ class DisplayHistory:
         self._range = None
 
     def other_decimals(self, shown: DisplayedValue) -> str | None:
-        """Why a value has another unit or resolution, in words; none if it has not."""
+        """Why a value has another unit or resolution, in words; None if it has not."""
         if self._decimals is None or shown.decimals == self._decimals:
             return None
         if self._stated is None:
@@ -87,7 +87,7 @@ class DisplayHistory:
         return f"shows {shown.decimals} decimals ({shown.text}), {before}"
 
     def beyond_travel(self, shown: DisplayedValue) -> str | None:
-        """Why a value is farther from the others than the plunger travels, in words; none if it is not."""
+        """Why a value is farther from the others than the plunger travels, in words; None if it is not."""
         lowest, highest = self._extended(shown)
         if highest - lowest <= self._span_mm:
             return None

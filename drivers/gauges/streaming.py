@@ -110,4 +110,4 @@ class StreamingGauge(ValueOnlyGauge):
         )
 
     def _require_silence(self) -> None:
-        """Nothing: frames that come unasked are told apart by their time."""
+        """Nothing: frames that come unasked are distinguished by their time."""

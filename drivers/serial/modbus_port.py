@@ -31,7 +31,7 @@ BROADCAST = 0
 NUL = b"\0"
 """Real lines send some before a frame, and no device has this address."""
 FRAME_BYTES, REGISTER_BYTES = 5, 2
-"""Of an answer: device, function, length and checksum; and what each register adds."""
+"""Bytes of an answer without registers (device, function, length, checksum), and of each register."""
 
 EXCEPTIONS = {
     1: "illegal function",
@@ -75,7 +75,7 @@ class ModbusPort(RequestPort):
             client = optional("pymodbus.client", EXTRA, self.subject).ModbusSerialClient(
                 self.url, retries=0, trace_packet=self._note, **self._line
             )
-            # Not by its own connect(), which tells no cause and configures a pseudo-terminal twice.
+            # Not by its own connect(), which gives no cause and configures a pseudo-terminal twice.
             client.socket = opened_port(
                 self.url, self._line, self.subject, self._closing, client.inter_byte_timeout or None
             )
@@ -85,10 +85,10 @@ class ModbusPort(RequestPort):
         return self.open_count
 
     def exchange(self, request: bytes, _terminator: bytes, timeout_s: float) -> bytes:
-        """Read registers; see the head of this file.
+        """Read registers: ``request`` is a PDU with its device and without checksum.
 
         Raises:
-            NoAnswer: none came in time, a damaged one, or more than one.
+            NoAnswer: no answer came in time, a damaged one, or more than one.
             RefusedRequest: the device answers with an exception.
             PortLost: the line is not open, or was lost.
         """
@@ -131,7 +131,7 @@ class ModbusPort(RequestPort):
                 client.close()
 
     def _is_alone(self, frame_bytes: int) -> bool:
-        """Whether what came is one frame, or copies of it, as some adapters send."""
+        """Whether what came is one frame, or copies of it, which some adapters send."""
         frames = self._received.lstrip(NUL)
         self._frame = frames[:frame_bytes]
         return is_copies(frames, self._frame)

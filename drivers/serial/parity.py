@@ -59,7 +59,7 @@ def in_software(settings: dict[str, object]) -> ParityInBit7 | None:
     ``settings`` are those of pyserial and ``parity_check``, which is removed from them.
 
     Raises:
-        FileError: ``parity_check`` is unknown, or the line is none of seven bits with a parity.
+        FileError: ``parity_check`` is unknown, or the line has not seven bits with a parity.
     """
     word = settings.pop("parity_check", ParityCheck.TERMINAL)
     if word not in set(ParityCheck):

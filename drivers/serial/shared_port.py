@@ -45,7 +45,7 @@ class SharedSerialPort:
 
     @property
     def surplus_count(self) -> int:
-        """See :class:`SerialPort`."""
+        """How often bytes had come before a request, copies of answers included."""
         return self._port.surplus_count
 
     def add_gauge(self, gauge: str, settings: Mapping[str, object], channel: int | None) -> None:
@@ -56,13 +56,13 @@ class SharedSerialPort:
         """
         others = {name: taken for name, taken in self._channels.items() if name != gauge}
         same = [name for name, taken in others.items() if channel is None or taken in {None, channel}]
-        problem = None
+        problem = ""
         if same:
             where = "" if channel is None else f", channel {channel},"
             problem = f"port {self.url}{where} already belongs to gauge {same[0]}"
         elif others and dict(settings) != dict(self._settings):
             problem = f"port {self.url} is shared with gauge {min(others)} under other serial settings"
-        if problem is not None:
+        if problem:
             action = "Correct port, channel or serial in the cell file"
             raise FileError(problem, subject=f"gauge {gauge}", action=action)
         self._channels[gauge] = channel
@@ -76,24 +76,24 @@ class SharedSerialPort:
         return bool(self._channels)
 
     async def open(self) -> int:
-        """As :meth:`SerialPort.open`."""
+        """Open the port unless it is open and usable; how often it has been opened."""
         return await self._run(self._port.open)
 
     async def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
-        """As :meth:`SerialPort.exchange`."""
+        """Send ``request``; the first complete frame after it, or ``NoAnswer``."""
         return await self._run(partial(self._port.exchange, request, terminator, timeout_s))
 
     async def listen(self) -> None:
-        """As :meth:`SerialPort.listen`."""
+        """Take what comes within one slice of time, unasked, into ``log``."""
         await self._run(self._serial_port.listen)
 
     @property
     def log(self) -> FrameLog:
-        """As that of :class:`SerialPort`: several gauges may find theirs in it."""
+        """The frames that came unasked, those of all gauges on the port."""
         return self._serial_port.log
 
     def now(self) -> float:
-        """As :meth:`SerialPort.now`."""
+        """The time, s, by which the frames in ``log`` are dated."""
         return self._serial_port.now()
 
     @property

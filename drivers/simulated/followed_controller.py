@@ -30,14 +30,14 @@ from hexacell.kinematics.rotations import Array
 from hexacell.storage.atomic_files import write_atomically
 
 LONGEST_STEP_MM = 5.0
-"""Of a joint variable between two solutions of the pose, so that the assembly mode is kept."""
+"""Longest step of a joint variable between two solutions of the pose: the assembly mode is kept."""
 MOVED_MM = 1e-4
 RESTING_S = 0.2
 """Without a change of the joints for longer, the robot stands."""
 RESTART_S = 0.5
 """Pause before the program is started again: it ends whenever the controller does."""
 BACKLOG_S = 0.3
-"""In which the program prints what was sampled before it was started; that is not where the joints are."""
+"""Time, s, in which the program prints old samples, from before its start."""
 KEPT = 10_000
 """Positions that nobody asked for, of which the oldest are dropped."""
 
@@ -95,7 +95,7 @@ class JointSource(Closeable):
 
 
 def joints_in(line: str) -> Array | None:
-    """The six numbers of a line; none if there are not six, or a seventh is 0."""
+    """The six numbers of a line; None if there are not six, or a seventh is 0."""
     try:
         numbers = np.array([float(word) for word in line.split()])
     except ValueError:

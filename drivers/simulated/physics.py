@@ -221,8 +221,8 @@ class RobotPhysics:
             scatter = motion.repeatability * self._random.standard_normal(6)
             actual = path / self._shown_per_mm + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
             actual[0] = self._motion.joints(self._update())
-            told_s = 0.0 if duration_s is None else duration_s + RAMP_S
-            duration = max(motion.minimum_s, distance / motion.speed, told_s)
+            stated_s = 0.0 if duration_s is None else duration_s + RAMP_S
+            duration = max(motion.minimum_s, distance / motion.speed, stated_s)
             self._motion, self._rows_passed = Motion(actual, self._clock.now(), duration), 0
             self._draw_noise()
             self.on_motion_start()

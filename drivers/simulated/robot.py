@@ -104,12 +104,12 @@ class SimulatedMachine:
             return self._home if self.fails_forward else self._pose_now().pose(0)
 
     def joints(self) -> tuple[float, ...]:
-        """The joints (6,), mm, that the controller tells: as commanded."""
+        """The joints (6,), mm, that the controller reports: as commanded."""
         with self._lock:
-            told = self._joints(self._pose_now())[0]
+            joints = self._joints(self._pose_now())[0]
             if self._includes_zeros:
-                told = told + joint_zeros(self._mechanism, self._geometry.geometry)
-            return tuple(float(value) for value in told)
+                joints = joints + joint_zeros(self._mechanism, self._geometry.geometry)
+            return tuple(float(value) for value in joints)
 
     def set_failing_forward(self, *, on: bool) -> None:
         """Let the forward kinematics fail, or no more."""

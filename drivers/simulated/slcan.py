@@ -44,7 +44,7 @@ def encode_frame(message: can.Message) -> bytes:
 
 
 def decode_frame(command: str) -> can.Message | None:
-    """The frame in a command (without CR); none if the command is no valid frame."""
+    """The frame in a command (without CR); None if the command is no valid frame."""
     match = _FRAME.fullmatch(command)
     if match is None:
         return None

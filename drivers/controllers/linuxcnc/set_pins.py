@@ -102,7 +102,7 @@ def _looked_up(reference: re.Match[str], inis: Sequence[IniText]) -> str | None:
 def _values(wanted: Iterable[str]) -> dict[str, str]:
     """What the pins are now.
 
-    LinuxCNC tells seven digits of them, which is enough to go back while the machine is off.
+    LinuxCNC shows seven digits of them, which is enough to go back while the machine is off.
     """
     shown = _shown("*")
     if absent := sorted(set(wanted) - shown.keys()):

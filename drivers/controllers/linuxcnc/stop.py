@@ -29,7 +29,7 @@ async def stop_in_place(
     """Send abort until successive joint positions agree within ``tolerance_mm``.
 
     A ``ready`` connection saves the time to open one; it is closed afterwards. A server that does not
-    answer is given up earlier than one whose machine still moves, so that the error tells which.
+    answer is given up earlier than one whose machine still moves, so that the error says which.
 
     Raises:
         DeviceError: It cannot be reached, or it still moves after ``timeouts.stop``.

@@ -16,7 +16,7 @@ from hexacell.cell.simulation import FaultKind
 from hexacell.errors import FileError
 
 PERIOD_S = 0.005
-"""Of what they send by themselves, in real time."""
+"""Period of what they send by themselves, s of real time."""
 
 JUMP = 400.0
 

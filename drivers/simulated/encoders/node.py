@@ -46,7 +46,7 @@ class SimulatedEncoder:
         self.counts = 0
         self._is_silent = self._is_frozen = self._is_doubled = False
         self._shift = 0
-        self._told_of_sync = False
+        self._has_reported_sync = False
         self._bus = bus
         self._vendor = vendor
         self._real_seconds = real_seconds
@@ -100,12 +100,12 @@ class SimulatedEncoder:
         self._is_doubled = on
 
     def set_two_steps(self, *, on: bool) -> None:
-        """Tell two measuring steps, one a tenth of the other, or one."""
+        """Report two measuring steps, one a tenth of the other, or one."""
         self._set(object_dictionary.MEASURING_STEP, struct.pack("<I", self.data.step // (10 if on else 1)))
 
     def set_sync_counter(self, *, on: bool) -> None:
         """Want a counter in each SYNC, or none."""
-        self._told_of_sync = False
+        self._has_reported_sync = False
         self._set(object_dictionary.SYNC_COUNTER, bytes((COUNTER_OVERFLOW * on,)))
 
     def switch_on_again(self, *, on: bool) -> None:
@@ -161,11 +161,11 @@ class SimulatedEncoder:
         self._bus.send_message(0x80 + self.data.node, struct.pack("<HB5x", code, register))
 
     def _misses_counter(self) -> bool:
-        """Whether it wants a counter in the SYNC, which this bus never has; told once."""
+        """Whether it wants a counter in the SYNC, which this bus never has; reported once."""
         if not self._value(object_dictionary.SYNC_COUNTER, 0):
             return False
-        if not self._told_of_sync:
-            self._told_of_sync = True
+        if not self._has_reported_sync:
+            self._has_reported_sync = True
             self._send_emergency(WRONG_SYNC, COMMUNICATION_ERROR)
         return True
 

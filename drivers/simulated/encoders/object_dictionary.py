@@ -66,7 +66,7 @@ EVENTS_AND_SYNC = Vendor(
 """TPDO1 on its event timer, TPDO2 with every SYNC."""
 
 ROTARY = replace(EVENTS_AND_SYNC, device_type=MULTI_TURN)
-"""The same of angles."""
+"""TPDO1 on its event timer, TPDO2 with every SYNC, of an encoder of angles."""
 
 POSITION = 0x6004
 POSITION_OF_MAGNET = 0x6020

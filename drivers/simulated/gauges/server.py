@@ -22,7 +22,7 @@ from hexacell.clock import CellClock
 
 COMMAND_LIMIT = 256
 SHORTEST_PERIOD_S = 0.005
-"""Of what is sent unasked, in real time, however quick the cell's clock is."""
+"""Shortest period of what is sent unasked, s of real time, however quick the cell's clock is."""
 JOB_TIMEOUT_S = 5.0
 _log = logging.getLogger(__name__)
 LATE_TIMEOUTS = 1.5
@@ -31,7 +31,7 @@ LATE_EVERY = 4
 DAMAGED_EVERY = 5
 NULS = b"\0\0"
 VALUE = re.compile(rb"\d\.\d|[\x03\x04]")
-"""Of an answer with a value: a number, or a function of Modbus that reads registers."""
+"""Found in an answer with a value: a number, or a function of Modbus that reads registers."""
 
 
 class LineFault(StrEnum):

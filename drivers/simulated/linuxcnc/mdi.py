@@ -33,7 +33,7 @@ class ModalState:
     """What a block leaves to those after it: G0, G1 or G80, G93 or G94, and the feed of G94, mm/min.
 
     ``work_offset`` is that of the coordinate system (G10 L2), and ``rotation_deg`` its rotation about z,
-    which no query tells; ``offset`` is added to it (G92).
+    which no query shows; ``offset`` is added to it (G92).
     """
 
     motion: int = 0
@@ -61,8 +61,8 @@ class ParsedBlock:
 
     Attributes:
         modes: those after it.
-        target: where it goes; none if nowhere.
-        duration_s: how long the move is to last; none of a rapid one.
+        target: where it goes; None if it moves nothing.
+        duration_s: how long the move is to last; None for a rapid one.
     """
 
     modes: ModalState
@@ -153,7 +153,7 @@ def _one_of_group(codes: Sequence[float], group: tuple[float, ...], before: int)
 
 
 def _duration(modes: ModalState, feed: float | None, start: Pose, end: Pose) -> float | None:
-    """Of a move in these modes: its share of a minute, or what X, Y and Z take at the feed."""
+    """Duration of a move in these modes, s: its share of a minute, or what X, Y and Z take at the feed."""
     if modes.motion == 0:
         return None
     if modes.motion == _NO_MOTION:

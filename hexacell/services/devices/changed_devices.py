@@ -1,7 +1,7 @@
 """Devices that are not what they were when the cell was last run: exchanged, set anew, plugged elsewhere.
 
 That may be on purpose, and a new run takes them as they are. But a preset, a reversed direction or an
-exchanged encoder changes what a robot is thought to do, so it is told with the device.
+exchanged encoder changes what a robot is thought to do, so it is a remark of the device.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def _last(cell: Cell) -> tuple[str, dict[str, DeviceIdentity]]:
 
 
 def _started(run: RunFolder) -> events.RunStarted | None:
-    """The first event of a run; none where it cannot be read."""
+    """The first event of a run; None where it cannot be read."""
     with suppress(OSError, HexacellError), run.journal.open("rb") as journal:
         entry = decode(journal.readline(), run.journal, 1)
         if entry is not None and isinstance(entry.event, events.RunStarted):
@@ -55,12 +55,12 @@ def _remarked(now: DeviceIdentity, then: DeviceIdentity, run: str) -> DeviceIden
     changes = list(_changes(now, then))
     if not changes:
         return now
-    told = f"since the run {run}: {', '.join(changes)}"
-    return replace(now, remark="; ".join(filter(None, (now.remark, told))))
+    remark = f"since the run {run}: {', '.join(changes)}"
+    return replace(now, remark="; ".join(filter(None, (now.remark, remark))))
 
 
 def _changes(now: DeviceIdentity, then: DeviceIdentity) -> Iterator[str]:
-    """What a run of before did not tell is no change."""
+    """The changes in words; what the earlier run did not know is no change."""
     for field, word in COMPARED.items():
         before, after = getattr(then, field), getattr(now, field)
         if before and before != after:

@@ -51,7 +51,7 @@ Read = Callable[[], Awaitable[tuple[float, ...]]]
 class SeriesFigures:
     """What one number did: its range and scatter, in ``unit``, and how many values were distinct.
 
-    ``scatter`` is one standard deviation about a straight line; none of fewer than three readings.
+    ``scatter`` is one standard deviation about a straight line; None with fewer than three readings.
     """
 
     name: str
@@ -180,8 +180,8 @@ class _Watched:
     problem: str = ""
 
     def failure_figures(self) -> tuple[FailureFigures, ...]:
-        """The same by kind: each damaged answer is damaged in its own way."""
-        return tuple(FailureFigures(kind, len(told), told[-1]) for kind, told in self.failures.items())
+        """Failures by kind: each damaged answer is damaged in its own way."""
+        return tuple(FailureFigures(kind, len(said), said[-1]) for kind, said in self.failures.items())
 
 
 async def _watched(read: Read, seconds: float) -> _Watched:

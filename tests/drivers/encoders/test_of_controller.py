@@ -65,5 +65,5 @@ async def test_joints_that_are_not_homed_are_no_positions() -> None:
 
 
 def test_a_controller_that_does_not_tell_its_joints_is_refused() -> None:
-    with pytest.raises(UsageError, match="does not tell where its joints are"):
+    with pytest.raises(UsageError, match="does not report where its joints are"):
         ControllerScales(settings(), object())

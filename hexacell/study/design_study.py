@@ -255,42 +255,30 @@ def design_trials_of(robots: int) -> dict[str, DesignTrial]:
 def _swept(name: str, robots: int) -> dict[float, list[DesignTrial]]:
     """The trials of a sweep by the value; the usual ones are those of the comparison."""
     field, values = SWEEPS[name]
-
-    def trial(number: int, value: float) -> DesignTrial:
-        changed: dict[str, Any] = {field: value}
-        return DesignTrial(number, **changed)
-
-    numbers = range(min(robots, SWEPT))
-    return {float(value): [trial(number, value) for number in numbers] for value in values}
+    usual = [DesignTrial(number) for number in range(min(robots, SWEPT))]
+    varied: dict[float, dict[str, Any]] = {float(value): {field: value} for value in values}
+    return {value: [replace(trial, **change) for trial in usual] for value, change in varied.items()}
 
 
 def design_summary(trials: Mapping[str, DesignTrial], outcomes: Mapping[str, DesignOutcome]) -> DesignStudy:
     """The figures of trials and their outcomes, by their keys."""
+    robots = sum(one == DesignTrial(one.number) for one in trials.values())
     compared = {
-        choice: {
-            one.number: outcomes[key]
-            for key, one in trials.items()
-            if one == DesignTrial(one.number, choice)
-        }
+        choice: [outcomes[DesignTrial(number, choice).key] for number in range(robots)]
         for choice in OrientationChoice
     }
-    robots = len(compared[OrientationChoice.ADAPTIVE])
-    sweeps = {
-        name: {
-            value: Spread.of([last for one in swept if (last := outcomes[one.key].last)])
-            for value, swept in _swept(name, robots).items()
-        }
-        for name in SWEEPS
-    }
     adaptive = compared[OrientationChoice.ADAPTIVE]
+    others = {choice: found for choice, found in compared.items() if found is not adaptive}
     return DesignStudy(
-        {choice.value: _curve(list(found.values())) for choice, found in compared.items()},
-        sweeps,
+        {choice.value: _curve(found) for choice, found in compared.items()},
         {
-            choice.value: _noise_ratio(adaptive, found)
-            for choice, found in compared.items()
-            if choice is not OrientationChoice.ADAPTIVE
+            name: {
+                value: Spread.of([last for one in swept if (last := outcomes[one.key].last)])
+                for value, swept in _swept(name, robots).items()
+            }
+            for name in SWEEPS
         },
+        {choice.value: _noise_ratio(adaptive, found) for choice, found in others.items()},
     )
 
 
@@ -305,8 +293,8 @@ def _curve(outcomes: Sequence[DesignOutcome]) -> ChoiceCurve:
     )
 
 
-def _noise_ratio(adaptive: Mapping[int, DesignOutcome], other: Mapping[int, DesignOutcome]) -> float:
-    both = [(one.last, adaptive[number].last) for number, one in other.items()]
+def _noise_ratio(adaptive: Sequence[DesignOutcome], other: Sequence[DesignOutcome]) -> float:
+    both = [(there.last, here.last) for there, here in zip(other, adaptive, strict=True)]
     return _quantile([there.sigma_mm / here.sigma_mm for there, here in both if there and here], 0.5)
 
 

@@ -75,7 +75,7 @@ def choose_among_few(patch: pytest.MonkeyPatch) -> None:
 
 @contextmanager
 def few_candidates() -> Iterator[None]:
-    """The same for a while."""
+    """Choose among few poses for a while."""
     with pytest.MonkeyPatch.context() as patch:
         choose_among_few(patch)
         yield

@@ -15,7 +15,7 @@ STARTUP_WORDS: tuple[StartupWord, ...] = ("reset-estop", "switch-on", "home")
 class FurtherFileSettings(Section):
     """A file beside ``config`` that has the rest of the geometry; the keys mean what they mean there."""
 
-    config: Text = Field(description="the file, relative to the cell file")
+    config: Text = Field(description="file with a part of the geometry, relative to the cell file")
     config_format: Text = Field(
         description="linuxcnc-ini, linuxcnc-hal, template, toml, or one that a plug-in adds"
     )
@@ -30,14 +30,18 @@ class FurtherFileSettings(Section):
 class ControllerSettings(Section):
     """The robot's controller and the file, or the files, with its geometry."""
 
-    protocol: Text = Field("linuxcncrsh", description="linuxcncrsh, or one that a plug-in adds")
-    host: Text = Field("127.0.0.1", description="its network name or address")
-    port: int | None = Field(None, ge=1, le=65535, description="TCP port")
+    protocol: Text = Field(
+        "linuxcncrsh", description="protocol of the controller: linuxcncrsh, or one that a plug-in adds"
+    )
+    host: Text = Field("127.0.0.1", description="network name or address of the controller")
+    port: int | None = Field(None, ge=1, le=65535, description="TCP port of the controller")
     connect_password: Password = Field(
-        SecretStr("EMC"), description="linuxcncrsh: sent on connecting; better in password_file"
+        SecretStr("EMC"),
+        description="password that linuxcncrsh gets on connecting; better in password_file",
     )
     enable_password: Password = Field(
-        SecretStr("EMCTOO"), description="linuxcncrsh: sent to enable commands; better in password_file"
+        SecretStr("EMCTOO"),
+        description="password that linuxcncrsh gets to enable commands; better in password_file",
     )
     password_file: Text | None = Field(
         None,
@@ -46,7 +50,7 @@ class ControllerSettings(Section):
         "others must not be able to read. HEXACELL_CONNECT_PASSWORD and HEXACELL_ENABLE_PASSWORD in the "
         "environment take precedence",
     )
-    config: Text = Field(description="the file with its geometry, relative to the cell file")
+    config: Text = Field(description="file with the controller's geometry, relative to the cell file")
     config_format: Text = Field(
         "toml", description="toml, linuxcnc-ini, linuxcnc-hal, template, or one that a plug-in adds"
     )
@@ -65,27 +69,33 @@ class ControllerSettings(Section):
         "must be in one of them, and in no other",
     )
     reload_command: tuple[Text, ...] = Field(
-        (), description="run with the machine off, so that the controller reads its config again"
+        (),
+        description="command run with the machine off, so that the controller reads its config again",
     )
     startup: tuple[StartupWord, ...] = Field(
         (),
         max_length=len(STARTUP_WORDS),
-        description="what the program may do by itself to make it ready, a person is asked about the rest: "
-        "reset-estop (the emergency stop that it starts in, before a run begins), switch-on, home",
+        description="what the program may do by itself to make the controller ready; a person "
+        "is asked about the "
+        "rest: reset-estop (the emergency stop that it starts in, before a run begins), switch-on, "
+        "home",
     )
-    homing_timeout_s: Positive = Field(60.0, description="longest wait until all joints are homed")
+    homing_timeout_s: Positive = Field(60.0, description="longest wait until all joints are homed, s")
     unit_mm: Positive = Field(
-        1.0, description="one unit of the positions that it tells; of an inch machine 25.4"
+        1.0,
+        description="one unit of the positions that the controller reports, mm; of an inch machine 25.4",
     )
     joints_include_zeros: bool = Field(
         False,
-        description="the joints that it tells, and their limits in its config, include the zeros of its "
-        "geometry: whole leg lengths, as LinuxCNC's genhexkins has them",
+        description="whether the joints that the controller reports, and their limits in its "
+        "config, include the "
+        "zeros of its geometry: whole leg lengths, as LinuxCNC's genhexkins has them",
     )
-    position_tolerance_mm: Positive = Field(0.01, description="arrival: largest position difference")
-    angle_tolerance_deg: Positive = Field(0.01, description="arrival: largest angle difference")
-    move_timeout_s: Positive | None = Field(
-        None, exclude=True, description="no longer used: how long a move may last follows from its duration"
+    position_tolerance_mm: Positive = Field(
+        0.01, description="largest position difference at which a move has arrived, mm"
+    )
+    angle_tolerance_deg: Positive = Field(
+        0.01, description="largest angle difference at which a move has arrived, deg"
     )
 
     @model_validator(mode="after")

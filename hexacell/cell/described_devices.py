@@ -25,11 +25,12 @@ class DescribedFrame(Section):
 
     answer: Text = Field(
         min_length=1,
-        description="regular expression of what it sends without line ends; group number, or the first: "
-        "the number",
+        description="regular expression of what the gauge sends, without line ends; the group "
+        "called number, or "
+        "the first group, is the number",
     )
-    example: Wire = Field(description="a typical one, which must match")
-    mm_per_unit: Positive = Field(1.0, description="what a unit of the number is, mm: 25.4 for inches")
+    example: Wire = Field(description="typical text that the gauge sends, which answer must match")
+    mm_per_unit: Positive = Field(1.0, description="one unit of the number, mm: 25.4 for inches")
     at_end: Wire | None = Field(
         None, description="regular expression of the answer with the plunger at an end of its travel"
     )
@@ -59,8 +60,8 @@ class DescribedFrame(Section):
 class RequestSettings(DescribedFrame):
     """What a gauge of protocol ``request`` is asked, and what it answers."""
 
-    ask: Wire = Field(description="what is sent for a value")
-    ends_with: Wire = Field("\r", description="the first line end of an answer")
+    ask: Wire = Field(description="text that is sent to ask for a value")
+    ends_with: Wire = Field("\r", description="first character of an answer's line end")
 
 
 class StreamSettings(DescribedFrame):
@@ -97,14 +98,16 @@ class VisaSettings(Section):
         min_length=1,
         description="SCPI query of the value: MEAS:DIST?, or READ? (@{channel}) where gauges share it",
     )
-    mm_per_unit: Positive = Field(1.0, description="what a unit of the number is, mm: 1000 for metres")
+    mm_per_unit: Positive = Field(1.0, description="one unit of the number, mm: 1000 for metres")
     expect: dict[Text, Text] = Field(
         default_factory=dict,
         max_length=20,
-        description='what it must answer to queries of its settings: { "UNIT:LENG?" = "M" }',
+        description='answers that queries of its settings must get: { "UNIT:LENG?" = "M" }',
     )
-    identify: bool = Field(True, description="it is asked *IDN?")
-    backend: Text = Field("@py", description="of PyVISA: @py is pure Python, @ivi the library of a maker")
+    identify: bool = Field(True, description="whether the instrument is asked *IDN?")
+    backend: Text = Field(
+        "@py", description="backend of PyVISA: @py is pure Python, @ivi the library of a maker"
+    )
 
     @property
     def has_channel(self) -> bool:
@@ -121,14 +124,18 @@ class ModbusSettings(Section):
 
     device: int = Field(1, ge=1, le=247, description="address of the device on the line")
     register_: int = Field(
-        alias="register", ge=0, le=65535, description="its first register, counted from 0"
+        alias="register", ge=0, le=65535, description="first register of the number, counted from 0"
     )
-    kind: Literal["input", "holding"] = Field("input", description="function 4 or 3")
+    kind: Literal["input", "holding"] = Field(
+        "input", description="kind of the registers: input (function 4) or holding (function 3)"
+    )
     type: Literal["int16", "uint16", "int32", "uint32", "float32"] = Field(
-        "int32", description="of the number, in one or two registers"
+        "int32", description="type of the number, in one or two registers"
     )
-    word_order: Literal["big", "little"] = Field("big", description="which of two registers comes first")
-    mm_per_unit: Positive = Field(0.001, description="what a count is, mm")
+    word_order: Literal["big", "little"] = Field(
+        "big", description="order of two registers: big if the first one has the upper half"
+    )
+    mm_per_unit: Positive = Field(0.001, description="one count, mm")
     at_end: tuple[int, ...] = Field(
         (), max_length=8, description="numbers that mean an end of the travel, or no value"
     )
@@ -189,19 +196,25 @@ MessageSignal = Annotated[str, Field(max_length=200, pattern=r"^\w+\.\w+$")]
 class DbcSettings(Section):
     """Encoders that send what a DBC file describes."""
 
-    file: Text = Field(min_length=1, description="the DBC file, relative to the cell file")
+    file: Text = Field(min_length=1, description="DBC file, relative to the cell file")
     signals: tuple[
         MessageSignal, MessageSignal, MessageSignal, MessageSignal, MessageSignal, MessageSignal
-    ] = Field(description="position of legs 1 to 6: Message.Signal each; its unit is that of the DBC file")
+    ] = Field(
+        description="signals with the positions of legs 1 to 6, as Message.Signal; their unit "
+        "is that of the DBC "
+        "file"
+    )
     request: str | None = Field(
         None,
         pattern=r"^[0-9A-Fa-f]{3}#([0-9A-Fa-f]{2}){0,8}$",
-        description="frame that asks all of them, as candump has it: 080#; without it they send unasked",
+        description="frame that asks all encoders, as candump has it: 080#; without it they send unasked",
     )
-    delay_s: NotNegative = Field(0.005, description="how old a position may be that comes unasked")
-    window_s: Positive = Field(0.02, description="the six positions of a sample come within this time")
+    delay_s: NotNegative = Field(0.005, description="how old a position may be that comes unasked, s")
+    window_s: Positive = Field(0.02, description="longest time between the six positions of a sample, s")
     must_be: dict[Text, int] = Field(
         default_factory=dict,
         max_length=20,
-        description="signals of these messages and their values where a position is valid: { Error = 0 }",
+        description="signals of these messages and the values that they have where a position "
+        "is valid: { Error ="
+        " 0 }",
     )

@@ -64,17 +64,20 @@ class GaugeAxis:
 class GaugeSettings(Section):
     """One dial indicator."""
 
-    name: Name = Field(description="its name on screens and in reports")
-    axis: Literal["x", "y", "z"] = Field(description="base axis along which its plunger moves")
-    sign: Literal[1, -1] = Field(1, description="1: the reading grows when the ball moves along +axis")
+    name: Name = Field(description="name of the gauge on screens and in reports")
+    axis: Literal["x", "y", "z"] = Field(description="base axis along which the gauge's plunger moves")
+    sign: Literal[1, -1] = Field(
+        1, description="1 if the reading grows when the ball moves along +axis, else -1"
+    )
     protocol: Text = Field(
-        description="sylvac, mux10, cdi and others of docs/drivers.md, or one that a plug-in adds"
+        description="protocol of the gauge: sylvac, mux10, cdi and others of docs/drivers.md, or one that a "
+        "plug-in adds"
     )
     port: Text | None = Field(
         None, description="device path, pyserial URL or VISA resource; gauges may share one"
     )
     serial: dict[str, Any] = Field(
-        default_factory=dict, description="passed to pyserial; overrides the protocol's defaults"
+        default_factory=dict, description="settings for pyserial in place of the protocol's defaults"
     )
     channel: int = Field(
         1,
@@ -82,32 +85,39 @@ class GaugeSettings(Section):
         le=9999,
         description="input of a multiplexer, from 1; the four digits of a U-WAVE",
     )
-    timeout_s: Positive = Field(0.5, description="longest wait for an answer")
+    timeout_s: Positive = Field(0.5, description="longest wait for an answer, s")
     delay_s: NotNegative | None = Field(
         None,
-        description="of gauges that send unasked: how old a value may be when it comes; by default 0.5 "
-        "of uwave, else 0.1",
+        description="how old a value may be when it comes from a gauge that sends unasked, s; by default 0.5 for "
+        "uwave, else 0.1",
     )
-    travel_mm: Positive = Field(12.5, description="the instrument's own measuring range")
+    travel_mm: Positive = Field(12.5, description="measuring range of the instrument, mm")
     resolution_mm: Positive | None = Field(
-        None, description="the last digit of its display in mm; one with other decimals is set to inches"
+        None,
+        description="last digit of the gauge's display, mm; a display with other decimals is set to inches",
     )
     agreement_mm: Positive | None = Field(
         None,
-        description="two readings in a row count if they hardly differ, or three that differ by no more "
-        "than this; by default from [noise]",
+        description="largest difference at which three readings in a row agree, mm, where two hardly differ they "
+        "count; by default from [noise]",
     )
     middle_mm: InRange | None = Field(
         None,
-        description="what it shows in the middle of its travel; without it, its display does not tell "
-        "where its plunger stands",
+        description="reading in the middle of the gauge's travel, mm; without it, the display does not show where"
+        " the plunger stands",
     )
-    serial_number: Text = Field("", description="of the instrument, where it does not tell it itself")
-    request: RequestSettings | None = Field(None, description="of protocol request: what is asked")
-    stream: StreamSettings | None = Field(None, description="of protocol stream: what it sends")
-    visa: VisaSettings | None = Field(None, description="of protocol visa: what it is asked")
-    modbus: ModbusSettings | None = Field(None, description="of protocol modbus: where it is")
-    certificate: CertificateSettings | None = Field(None, description="of its calibration")
+    serial_number: Text = Field(
+        "", description="serial number of the instrument, where it does not report it itself"
+    )
+    request: RequestSettings | None = Field(
+        None, description="question and answer of a gauge of protocol request"
+    )
+    stream: StreamSettings | None = Field(None, description="lines that a gauge of protocol stream sends")
+    visa: VisaSettings | None = Field(None, description="queries of an instrument of protocol visa")
+    modbus: ModbusSettings | None = Field(None, description="registers of a gauge of protocol modbus")
+    certificate: CertificateSettings | None = Field(
+        None, description="certificate of the gauge's calibration"
+    )
 
     @model_validator(mode="after")
     def _a_multiplexer_has_the_channel(self) -> Self:
@@ -144,37 +154,41 @@ class EncoderSettings(Section, ABC):
     """The bank of six joint encoders, but for what a count is."""
 
     protocol: Text = Field(
-        "cia406", description="cia406, controller, dbc, modbus, or one that a plug-in adds"
+        "cia406",
+        description="protocol of the encoders: cia406, controller, dbc, modbus, or one that a plug-in adds",
     )
-    bus: dict[str, Any] | None = Field(None, description="passed to python-can's Bus")
+    bus: dict[str, Any] | None = Field(None, description="settings for python-can's Bus")
     nodes: tuple[NodeId, NodeId, NodeId, NodeId, NodeId, NodeId] = Field(
         (1, 2, 3, 4, 5, 6), description="CANopen node ids of legs 1 to 6, each from 1 to 127"
     )
-    signed: bool = Field(True, description="positions are I32 (linear devices) rather than U32")
+    signed: bool = Field(True, description="whether positions are I32 (linear devices) rather than U32")
     direction: tuple[Direction, Direction, Direction, Direction, Direction, Direction] = Field(
-        (1, 1, 1, 1, 1, 1), description="1: counts grow with the joint variable, -1: against it"
+        (1, 1, 1, 1, 1, 1),
+        description="sense of each encoder: 1 if counts grow with the joint variable, else -1",
     )
     offset: SixInRange = Field(
         (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), alias="offset_mm", description="joint variable at count 0"
     )
     serial_numbers: tuple[Unsigned, Unsigned, Unsigned, Unsigned, Unsigned, Unsigned] | None = Field(
-        None, description="object 1018h:4 of each node; another device is refused"
+        None, description="serial number of each node, object 1018h:4; another device is refused"
     )
     eds: Text | None = Field(
         None,
-        description="EDS file of the devices, relative to the cell file: they must be what it describes; "
-        "settings that differ from it are told",
+        description="EDS file of the devices, relative to the cell file; they must be what it describes, and "
+        "settings that differ from it are reported",
     )
-    timeout_s: Positive = Field(0.5, description="longest wait for a complete round or an SDO answer")
+    timeout_s: Positive = Field(0.5, description="longest wait for a complete round or an SDO answer, s")
     heartbeat_ms: int = Field(500, ge=0, le=65535, description="heartbeat period written to the nodes, ms")
     largest_speed: Positive | None = Field(
         None,
         alias="largest_speed_mm_s",
         description="a joint that goes faster between two samples jumped; by default from [speed]",
     )
-    dbc: DbcSettings | None = Field(None, description="of protocol dbc: what they send")
+    dbc: DbcSettings | None = Field(None, description="messages of encoders of protocol dbc")
     modbus: ModbusEncoderSettings | None = Field(None, description="of protocol modbus: where they are")
-    certificate: CertificateSettings | None = Field(None, description="of the calibration of all six")
+    certificate: CertificateSettings | None = Field(
+        None, description="certificate of the calibration of all six encoders"
+    )
 
     @field_validator("nodes")
     @classmethod
@@ -246,8 +260,10 @@ class RotaryEncoderSettings(EncoderSettings):
 class ThermometerSettings(Section):
     """A thermometer at the machine or in the room; its readings are kept with every record."""
 
-    name: Name = Field(description="where it is: room, base, platform")
-    protocol: Text = Field("sysfs", description="sysfs, or one that a plug-in adds")
+    name: Name = Field(description="place of the thermometer: room, base, platform")
+    protocol: Text = Field(
+        "sysfs", description="protocol of the thermometer: sysfs, or one that a plug-in adds"
+    )
     path: Text = Field(
         min_length=1,
         description="sysfs: the file with the temperature in millidegrees, such as "
@@ -256,6 +272,6 @@ class ThermometerSettings(Section):
     legs: tuple[LegNumber, ...] = Field(
         (),
         max_length=6,
-        description="legs that it is on, from 1: their expansion is no drift",
+        description="legs that the thermometer is on, from 1: their expansion is no drift",
     )
-    timeout_s: Positive = Field(2.0, description="longest wait for a reading")
+    timeout_s: Positive = Field(2.0, description="longest wait for a reading, s")

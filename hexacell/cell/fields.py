@@ -168,12 +168,18 @@ GeometryDocument = dict[str, tuple[Finite | tuple[Finite, ...], ...]]
 class CertificateSettings(Section):
     """The certificate of an instrument, to which its readings are traceable."""
 
-    number: Text = Field(min_length=1, description="of the certificate, with who issued it")
+    number: Text = Field(min_length=1, description="number of the certificate, with who issued it")
     due: Day | None = Field(
-        None, description='day, as "2027-03-31", after which a person must approve what rests on it'
+        None,
+        description='last day on which the certificate holds, as "2027-03-31"; afterwards a person must approve '
+        "what rests on it",
     )
     expanded_um: float | None = Field(
-        None, gt=0, le=1000, allow_inf_nan=False, description="expanded uncertainty, k = 2, as certified"
+        None,
+        gt=0,
+        le=1000,
+        allow_inf_nan=False,
+        description="expanded uncertainty, k = 2, as certified, um",
     )
 
     def has_expired(self, day: date) -> bool:

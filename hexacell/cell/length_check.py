@@ -27,40 +27,52 @@ class LengthCheckSettings(Section):
     """A fixture with two parallel seats for the gauges, a certified distance apart."""
 
     first_seat: PointInRange = Field(
-        description="where the ball is measured in the first seat, mm, in the base"
+        description="position of the ball in the first seat, mm, in the base frame"
     )
     direction: PointInRange = Field(
         (1.0, 0.0, 0.0),
-        description="from the first seat to the second; a way on which all joints move alike is best",
+        description="direction from the first seat to the second; a way on which all joints move alike is best",
     )
-    distance_mm: float = Field(ge=20, le=5000, description="of the two places of the ball, as certified")
-    uncertainty_mm: Positive = Field(description="of that distance, expanded (k = 2), as certified")
-    certificate: CertificateSettings | None = Field(None, description="of that distance")
+    distance_mm: float = Field(
+        ge=20, le=5000, description="certified distance of the two places of the ball, mm"
+    )
+    uncertainty_mm: Positive = Field(
+        description="certified expanded uncertainty (k = 2) of that distance, mm"
+    )
+    certificate: CertificateSettings | None = Field(None, description="certificate of that distance")
     parallel_mrad: NotNegative = Field(
-        0.1, le=20, description="angle between the seats about each axis, 1 sigma"
+        0.1, le=20, description="angle between the seats about each axis, mrad, 1 sigma"
     )
     height_mm: NotNegative = Field(
-        50.0, description="of the ball above the line along which the distance is certified; 0: at the ball"
+        50.0,
+        description="height of the ball above the line along which the distance is certified, mm; 0: at the ball",
     )
     seating_um: NotNegative = Field(
-        5.0, le=1000, description="where the gauges sit in a seat, from one mounting to the next, 1 sigma"
+        5.0,
+        le=1000,
+        description="scatter of the gauges in a seat, from one mounting to the next, um, 1 sigma",
     )
-    certified_at_c: InRange = Field(20.0, description="temperature that the certificate holds for, deg C")
-    temperature_c: InRange = Field(20.0, description="of the fixture, deg C, where no thermometer tells it")
-    thermometer: Text | None = Field(
-        None, description="name of the one that tells the fixture's temperature"
+    certified_at_c: InRange = Field(20.0, description="temperature for which the certificate holds, deg C")
+    temperature_c: InRange = Field(
+        20.0, description="temperature of the fixture, deg C, where no thermometer shows it"
     )
-    temperature_sigma_k: NotNegative = Field(1.0, le=50, description="of that temperature, 1 sigma")
+    thermometer: Text | None = Field(None, description="name of the thermometer on the fixture")
+    temperature_sigma_k: NotNegative = Field(
+        1.0, le=50, description="uncertainty of that temperature, K, 1 sigma"
+    )
     expansion_um_m_k: MicrometresPerMetreKelvin = Field(
-        11.5, description="of the fixture: steel 11.5, aluminium 23, Invar 1.5"
+        11.5, description="thermal expansion of the fixture, um/m/K: steel 11.5, aluminium 23, Invar 1.5"
     )
     repeats: int = Field(1, ge=1, le=20, description="how often the second seat is measured")
     orientations: int = Field(
-        5, ge=1, le=25, description="of the platform with the ball in a seat's middle"
+        5, ge=1, le=25, description="orientations of the platform with the ball in the middle of a seat"
     )
-    tilt_deg: Positive = Field(10.0, le=45, description="of all of them but the first, which is level")
+    tilt_deg: Positive = Field(
+        10.0, le=45, description="tilt of all orientations but the first, which is level, deg"
+    )
     mounting: Literal["by-hand", "fixed"] = Field(
-        "by-hand", description="fixed: no person is needed to mount the gauges in the seats"
+        "by-hand",
+        description="how the gauges come into the seats: by-hand, or fixed where no person is needed",
     )
 
     @property

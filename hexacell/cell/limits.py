@@ -125,9 +125,13 @@ class ExclusionSettings(Section):
 class LimitSettings(Section):
     """Limits of every commanded pose, and of the way to it."""
 
-    gauge_travel_mm: Positive = Field(5.0, description="largest deviation from the zeroed reference")
-    tilt_deg: Positive = Field(45.0, le=80, description="largest tilt of the platform")
-    turn_deg: Positive = Field(180.0, le=180, description="largest turn of the platform about its normal")
+    gauge_travel_mm: Positive = Field(
+        5.0, description="largest deviation of the ball from the zeroed reference, mm"
+    )
+    tilt_deg: Positive = Field(45.0, le=80, description="largest tilt of the platform, deg")
+    turn_deg: Positive = Field(
+        180.0, le=180, description="largest turn of the platform about its normal, deg"
+    )
     joint_min: InRange = Field(
         -1000.0, alias="joint_min_mm", description="smallest joint variable of any leg"
     )
@@ -149,7 +153,7 @@ class LimitSettings(Section):
     )
     passive_joints: PassiveJointSettings = PassiveJointSettings()
     leg_distance_mm: NotNegative = Field(
-        0.0, description="smallest distance of two legs, from middle line to middle line; 0: any"
+        0.0, description="smallest distance of two legs, from middle line to middle line, mm; 0: any"
     )
     singularity_margin: Positive = Field(
         0.03, description="smallest singular value of the dimensionless pose Jacobian"
@@ -166,13 +170,15 @@ class LimitSettings(Section):
 class SpeedSettings(Section):
     """The largest speeds of a move; from the stricter of two, each move gets its duration."""
 
-    joint: Positive = Field(100.0, alias="joint_mm_s", description="of any joint variable")
-    edge_mm_s: Positive = Field(100.0, description="of the ball and of any joint of the platform")
+    joint: Positive = Field(100.0, alias="joint_mm_s", description="largest speed of any joint variable")
+    edge_mm_s: Positive = Field(
+        100.0, description="largest speed of the ball and of any joint of the platform, mm/s"
+    )
     joint_at_gauges: Positive = Field(
         25.0,
         alias="joint_at_gauges_mm_s",
-        description="of any joint variable, on a move that begins or ends with gauges at the ball",
+        description="largest speed of any joint variable on a move that begins or ends with gauges at the ball",
     )
     edge_at_gauges_mm_s: Positive = Field(
-        25.0, description="of the ball and of any joint of the platform, on such a move"
+        25.0, description="largest speed of the ball and of any joint of the platform on such a move, mm/s"
     )

@@ -67,8 +67,8 @@ class ToleranceSettings(Section):
 class CellSettings(Section):
     """A whole cell file."""
 
-    version: Literal[1] = Field(1, description="of this file's format")
-    name: Name = Field(description="of the cell, on screens and in reports")
+    version: Literal[1] = Field(1, description="version of the cell file's format")
+    name: Name = Field(description="name of the cell, on screens and in reports")
     robot: RobotSettings
     controller: ControllerSettings
     gauges: tuple[GaugeSettings, GaugeSettings, GaugeSettings]

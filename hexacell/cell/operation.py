@@ -19,8 +19,8 @@ class ArchiveSettings(Section):
 
     url: Text | None = Field(
         None,
-        description="postgresql://user@host/database, which several cells may share; without it, a file "
-        "beside the runs. A password belongs in the user's ~/.pgpass",
+        description="address of an archive that several cells may share, postgresql://user@host/database; without"
+        " it, a file beside the runs. A password belongs in the user's ~/.pgpass",
     )
 
     @field_validator("url")
@@ -45,12 +45,13 @@ def mistake_in_url(url: str) -> tuple[str, str] | None:
 class OpcUaSettings(Section):
     """The server that ``hexacell serve`` starts; its messages are always signed and encrypted."""
 
-    host: Text = Field("127.0.0.1", min_length=1, description="address it listens at")
-    port: int = Field(4840, ge=1, le=65535, description="TCP port")
+    host: Text = Field("127.0.0.1", min_length=1, description="address that the server listens at")
+    port: int = Field(4840, ge=1, le=65535, description="TCP port that the server listens at")
     folder: Text = Field(
         "opcua",
         min_length=1,
-        description="for its certificate and private key, relative to the cell file; made where absent",
+        description="folder of the server's certificate and private key, relative to the cell file; made where "
+        "absent",
     )
     password_file: Text | None = Field(
         None,
@@ -59,9 +60,9 @@ class OpcUaSettings(Section):
         "others must not be able to read. HEXACELL_OPCUA_USER and HEXACELL_OPCUA_PASSWORD in the "
         "environment take precedence",
     )
-    anonymous: bool = Field(False, description="whether anybody may read, without a password")
+    anonymous: bool = Field(False, description="whether anybody may read without a password")
     poll_s: float = Field(
-        2.0, ge=0.05, le=3600, allow_inf_nan=False, description="between looks for new runs"
+        2.0, ge=0.05, le=3600, allow_inf_nan=False, description="time between two looks for new runs, s"
     )
 
 
@@ -69,14 +70,14 @@ class ReportSettings(Section):
     """What a report of a run says beside what was measured; all of it may be left out."""
 
     machine: Text = Field("", description="maker and model of the robot")
-    serial_number: Text = Field("", description="of the robot")
-    laboratory: Text = Field("", description="who calibrates, with the address")
+    serial_number: Text = Field("", description="serial number of the robot")
+    laboratory: Text = Field("", description="name and address of who calibrates")
     country: Text = Field(
-        "", pattern="^([A-Z]{2})?$", description="of the laboratory, ISO 3166: two letters, as DE"
+        "", pattern="^([A-Z]{2})?$", description="country of the laboratory, ISO 3166: two letters, as DE"
     )
-    customer: Text = Field("", description="for whom, with the address")
-    place: Text = Field("", description="where the robot stands")
-    authorised_by: Text = Field("", description="who answers for reports of this cell")
+    customer: Text = Field("", description="name and address of the customer")
+    place: Text = Field("", description="place of the robot")
+    authorised_by: Text = Field("", description="name of who answers for reports of this cell")
 
 
 DAY_MINUTES = 24 * 60
@@ -91,22 +92,23 @@ class UnattendedSettings(Section):
     quiet_hours: tuple[Text, ...] = Field(
         (),
         max_length=20,
-        description="when none may begin and one that goes on ends, as 05:30-22:00, in the computer's time "
-        "zone; past midnight as 22:00-06:00",
+        description="times in which no run begins and one that goes on ends, as 05:30-22:00, in the computer's "
+        "time zone; past midnight as 22:00-06:00",
     )
     quiet_days: tuple[Weekday, ...] = Field(
         ("mon", "tue", "wed", "thu", "fri", "sat", "sun"),
-        description="on which quiet hours begin",
+        description="days on which quiet hours begin",
     )
     window_minutes: NotNegative = Field(
         0.0,
         le=DAY_MINUTES,
-        description="so long after its time a run that could not begin is tried again; 0: not at all",
+        description="minutes after its time in which a run that could not begin is tried again; 0: not at all",
     )
-    retry_minutes: Positive = Field(10.0, le=DAY_MINUTES, description="between two tries")
+    retry_minutes: Positive = Field(10.0, le=DAY_MINUTES, description="minutes between two tries")
     longest_minutes: Positive | None = Field(
         None,
-        description="a run that lasts longer goes back to its reference and ends; it can be resumed",
+        description="longest duration of a run, minutes; then it goes back to its reference and ends, and can be "
+        "resumed",
     )
 
     @field_validator("quiet_hours")
@@ -158,19 +160,22 @@ _WILD = re.compile(r"[#+\0]")
 class NotificationSettings(Section):
     """Somebody who is told of runs without a person; several may be."""
 
-    name: Name = Field(description="who or what is told")
+    name: Name = Field(description="name of the recipient")
     url: Text | None = Field(
         None,
-        description="https://host/path (webhook, JSON), mqtts://host (MQTT), mailto://host?from=...&to=... "
-        "or a chat service's address as apprise has it. One with a token in it belongs in password_file",
+        description="address: https://host/path (webhook, JSON), mqtts://host (MQTT), "
+        "mailto://host?from=...&to=... or a chat service's address as apprise has it. One with a "
+        "token in it belongs in password_file",
     )
     on: tuple[OccasionWord, ...] = Field(
         USUAL_OCCASIONS,
-        description="the runs that are told; no-pass are those with another verdict than a pass, failure "
-        "those without one",
+        description="runs that are reported: no-pass are those with another verdict than a pass, failure those "
+        "without one",
     )
     topic: Text | None = Field(
-        None, min_length=1, description="MQTT: below which state is kept; by default hexacell/NAME-OF-CELL"
+        None,
+        min_length=1,
+        description="MQTT topic below which the state is kept; by default hexacell/NAME-OF-CELL",
     )
     ca_file: Text | None = Field(
         None,

@@ -139,13 +139,14 @@ class RecoverySettings(Section):
     """How failures and interruptions are handled."""
 
     agreement_mm: Positive = Field(
-        0.05, description="largest change of a reference, gauges and encoders, with which a set continues"
+        0.05,
+        description="largest change of a reference, gauges and encoders, with which a set continues, mm",
     )
-    wait_s: NotNegative = Field(2.0, description="wait before a failed device is tried again")
+    wait_s: NotNegative = Field(2.0, description="wait before a failed device is tried again, s")
     away_minutes: Positive = Field(
         30.0,
-        description="a run that waits for a person ends, resumable, when nobody has been connected for so "
-        "long",
+        description="minutes without anybody connected after which a run that waits for a person ends; it can be "
+        "resumed",
     )
     attended: AttendedRecovery = AttendedRecovery()
     unattended: UnattendedRecovery = UnattendedRecovery()

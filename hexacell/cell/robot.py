@@ -33,12 +33,15 @@ SixDirections = tuple[Direction, Direction, Direction, Direction, Direction, Dir
 class ScrewSettings(Section):
     """Screws that are not held against turning, in legs between universal joints."""
 
-    lead_mm: InRange = Field(description="of one turn; below zero for left-handed threads")
+    lead_mm: InRange = Field(
+        description="lead of the screws, mm a turn; below zero for left-handed threads"
+    )
     base_axes: SixDirections = Field(
-        description="of the joints on the base that the legs turn about, in the base frame, legs 1 to 6"
+        description="axes of the joints on the base that the legs turn about, in the base frame, legs 1 to 6"
     )
     platform_axes: SixDirections = Field(
-        description="of those on the platform, in the platform frame, legs 1 to 6"
+        description="axes of the joints on the platform that the legs turn about, in the platform frame, legs 1 "
+        "to 6"
     )
 
 
@@ -47,16 +50,19 @@ class RobotSettings(Section):
 
     mechanism: Text = Field(
         DEFAULT_MECHANISM,
-        description="hexaglide, gough-stewart, six-rails, rotary-cranks, or one that a plug-in adds",
+        description="name of the mechanism: hexaglide, gough-stewart, six-rails, rotary-cranks, or one that a "
+        "plug-in adds",
     )
-    nominal: GeometrySettings = Field(description="the drawing; identification starts from it")
+    nominal: GeometrySettings = Field(
+        description="geometry by the drawing, with which identification starts"
+    )
     encoder_scales: bool = Field(
         False,
         description="whether errors of the encoders' scales are identified too: encoder_scale in drawing, "
         "tolerances and the controller's config, which needs a place for them",
     )
     screws: ScrewSettings | None = Field(
-        None, description="of a Gough-Stewart platform whose legs are screws that may turn in their nuts"
+        None, description="screws of a Gough-Stewart platform whose legs may turn in their nuts"
     )
 
     @model_validator(mode="after")

@@ -42,13 +42,6 @@ SIZES_OF_GRADES: Mapping[Grade, Mapping[str, float]] = {
 """Where the sizes of a grade differ from the defaults of the keys, which are those of ``precision``."""
 
 
-OLD_KEYS = {
-    "slider_repeatability_um": "stop_repeatability_um",
-    "slider_repeatability_acts": "stop_repeatability_acts",
-}
-"""What keys were called before there were mechanisms without sliders; cells of old runs have them."""
-
-
 def repeatability_key(unit: JointUnit) -> str:
     """The key of where a joint stops beside what its encoder shows."""
     return f"stop_repeatability_{unit.thousandth}"
@@ -63,23 +56,34 @@ class CommonUncertaintySettings(Section):
         "ordinary: magnetic scales and ordinary guides; ideal: none of the effects, as in a simulation",
     )
     stop_repeatability_acts: Literal["everywhere", "at work"] = Field(
-        "everywhere", description="at work: the noise of the records contains it already"
+        "everywhere",
+        description="when a joint's stop scatters: everywhere, or at work alone, where the noise of the records "
+        "contains it already",
     )
-    ball_roundness_um: NotNegative = Field(2.0, description="largest departure from the mean radius")
+    ball_roundness_um: NotNegative = Field(
+        2.0, description="largest departure of the ball from its mean radius, um"
+    )
     ball_beside_tool_mm: NotNegative = Field(
-        0.0, description="distance of the ball's centre from that of the tool, along each platform axis"
+        0.0, description="distance of the ball's centre from that of the tool along each platform axis, mm"
     )
-    temperature_at_work_k: NotNegative = Field(1.0, description="difference between work and measuring")
+    temperature_at_work_k: NotNegative = Field(
+        1.0, description="difference of the temperature between work and measuring, K"
+    )
     temperature_measuring_k: NotNegative = Field(
-        1.0, description="change while measuring; a run with thermometers takes their range instead"
+        1.0,
+        description="change of the temperature while measuring, K; a run with thermometers takes their range "
+        "instead",
     )
     expansion_base_um_m_k: NotNegative = Field(
-        23.0, description="of the base with its scales: aluminium 23, steel 11.5, granite 6"
+        23.0,
+        description="thermal expansion of the base with its scales, um/m/K: aluminium 23, steel 11.5, granite 6",
     )
-    expansion_platform_um_m_k: NotNegative = Field(23.0, description="of the platform")
-    expansion_legs_um_m_k: NotNegative = Field(23.0, description="of the legs")
-    load_n: NotNegative = Field(20.0, description="force on the tool at work, in each direction")
-    leg_compliance_um_n: NotNegative = Field(0.03, description="of a leg with its joints")
+    expansion_platform_um_m_k: NotNegative = Field(
+        23.0, description="thermal expansion of the platform, um/m/K"
+    )
+    expansion_legs_um_m_k: NotNegative = Field(23.0, description="thermal expansion of the legs, um/m/K")
+    load_n: NotNegative = Field(20.0, description="force on the tool at work in each direction, N")
+    leg_compliance_um_n: NotNegative = Field(0.03, description="compliance of a leg with its joints, um/N")
     sources: dict[str, Text] = Field({}, description="where a size comes from, by its key")
 
     @model_validator(mode="before")
@@ -91,7 +95,7 @@ class CommonUncertaintySettings(Section):
         grade = given.get("grade", "precision")
         of_grade = SIZES_OF_GRADES[grade] if grade in get_args(Grade) else {}
         sizes = {key: size for key, size in of_grade.items() if key in cls.model_fields}
-        return {**sizes, **{OLD_KEYS.get(key, key): value for key, value in given.items()}}
+        return {**sizes, **given}
 
     @model_validator(mode="after")
     def _sources_belong_to_sizes(self) -> Self:
@@ -118,10 +122,12 @@ class CommonUncertaintySettings(Section):
 class LinearUncertaintySettings(CommonUncertaintySettings):
     """The same of a machine whose joint variables are lengths."""
 
-    common_encoder_scale_um_m: NotNegative = Field(15.0, description="scale error of all encoders alike")
-    encoder_scale_um_m: NotNegative = Field(10.0, description="scale error of each encoder")
+    common_encoder_scale_um_m: NotNegative = Field(
+        15.0, description="scale error that all encoders have alike, um/m"
+    )
+    encoder_scale_um_m: NotNegative = Field(10.0, description="scale error of each encoder, um/m")
     stop_repeatability_um: NotNegative = Field(
-        2.0, description="where a joint stops beside what its encoder shows"
+        2.0, description="distance of a joint's stop from where its encoder shows it, um"
     )
 
     @property
@@ -134,10 +140,10 @@ class RotaryUncertaintySettings(CommonUncertaintySettings):
     """The same of a machine whose joints turn: a full circle has no error of scale."""
 
     encoder_eccentricity_mdeg: NotNegative = Field(
-        2.0, description="amplitude of each encoder's error over a turn, as its disc is off centre"
+        2.0, description="amplitude of each encoder's error over a turn, as its disc is off centre, mdeg"
     )
     stop_repeatability_mdeg: NotNegative = Field(
-        1.0, description="where a joint stops beside what its encoder shows"
+        1.0, description="distance of a joint's stop from where its encoder shows it, mdeg"
     )
 
 
@@ -145,12 +151,12 @@ class UncertaintySettings(LinearUncertaintySettings):
     """The same of a machine whose joints move along rails."""
 
     rail_direction_mrad: NotNegative = Field(
-        0.02, description="of each rail, horizontally and vertically, from parallel"
+        0.02, description="angle of each rail from parallel, horizontally and vertically, mrad"
     )
-    rail_wave_short_um: NotNegative = Field(3.0, description="amplitude of a short wave of each rail")
-    rail_wave_short_mm: Positive = Field(600.0, description="its length")
-    rail_wave_long_um: NotNegative = Field(5.0, description="amplitude of a long wave of each rail")
-    rail_wave_long_mm: Positive = Field(1500.0, description="its length")
+    rail_wave_short_um: NotNegative = Field(3.0, description="amplitude of a short wave of each rail, um")
+    rail_wave_short_mm: Positive = Field(600.0, description="length of the short wave, mm")
+    rail_wave_long_um: NotNegative = Field(5.0, description="amplitude of a long wave of each rail, um")
+    rail_wave_long_mm: Positive = Field(1500.0, description="length of the long wave, mm")
     rail_sag_um: NotNegative = Field(
-        10.0, description="depth to which all rails hang through alike, over the range of the joints"
+        10.0, description="depth to which all rails sag alike over the range of the joints, um"
     )

@@ -111,8 +111,7 @@ def _open(path: Path) -> int:
         descriptor = _created_or_opened(path)
     except OSError as error:
         raise _cannot_open(path, error) from error
-    # Whatever this process's umask is; earlier versions made files that everybody may write.
-    with suppress(OSError):
+    with suppress(OSError):  # a mode that does not depend on this process's umask
         os.fchmod(descriptor, _MODE)
     return descriptor
 

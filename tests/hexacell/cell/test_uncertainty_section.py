@@ -35,14 +35,6 @@ def test_every_grade_is_told_and_only_states_sizes_that_exist(load_section, grad
     assert {key: getattr(stated, key) for key in sizes} == sizes
 
 
-def test_keys_of_before_there_were_mechanisms_without_sliders_are_read(load_section) -> None:
-    """Cells of old runs have them, in their journals too."""
-    lines = 'slider_repeatability_um = 4.5\nslider_repeatability_acts = "at work"\n'
-    stated = load_section(f"[uncertainty]\n{lines}").settings.uncertainty
-    assert (stated.stop_repeatability_um, stated.stop_repeatability_acts) == (4.5, "at work")
-    assert stated.source("stop_repeatability_um") == "cell file"
-
-
 def test_an_ideal_machine_has_no_effect_at_all(load_section) -> None:
     stated = load_section(SECTION).settings.uncertainty
     constants = {key for key in SIZES if key.endswith("_mm") or "expansion" in key or "compliance" in key}

@@ -70,8 +70,8 @@ class GaugeSettings(Section):
         1, description="1 if the reading grows when the ball moves along +axis, else -1"
     )
     protocol: Text = Field(
-        description="protocol of the gauge: sylvac, mux10, cdi and others of docs/drivers.md, or one that a "
-        "plug-in adds"
+        description="protocol of the gauge: sylvac, mux10, cdi and others of docs/drivers.md, or one "
+        "that a plug-in adds"
     )
     port: Text | None = Field(
         None, description="device path, pyserial URL or VISA resource; gauges may share one"
@@ -88,8 +88,8 @@ class GaugeSettings(Section):
     timeout_s: Positive = Field(0.5, description="longest wait for an answer, s")
     delay_s: NotNegative | None = Field(
         None,
-        description="how old a value may be when it comes from a gauge that sends unasked, s; by default 0.5 for "
-        "uwave, else 0.1",
+        description="how old a value may be when it comes from a gauge that sends unasked, s; by default "
+        "0.5 for uwave, else 0.1",
     )
     travel_mm: Positive = Field(12.5, description="measuring range of the instrument, mm")
     resolution_mm: Positive | None = Field(
@@ -98,13 +98,13 @@ class GaugeSettings(Section):
     )
     agreement_mm: Positive | None = Field(
         None,
-        description="largest difference at which three readings in a row agree, mm, where two hardly differ they "
-        "count; by default from [noise]",
+        description="largest difference at which three readings in a row agree, mm, where two hardly "
+        "differ they count; by default from [noise]",
     )
     middle_mm: InRange | None = Field(
         None,
-        description="reading in the middle of the gauge's travel, mm; without it, the display does not show where"
-        " the plunger stands",
+        description="reading in the middle of the gauge's travel, mm; without it, the display does not "
+        "show where the plunger stands",
     )
     serial_number: Text = Field(
         "", description="serial number of the instrument, where it does not report it itself"
@@ -174,8 +174,8 @@ class EncoderSettings(Section, ABC):
     )
     eds: Text | None = Field(
         None,
-        description="EDS file of the devices, relative to the cell file; they must be what it describes, and "
-        "settings that differ from it are reported",
+        description="EDS file of the devices, relative to the cell file; they must be what it describes, "
+        "and settings that differ from it are reported",
     )
     timeout_s: Positive = Field(0.5, description="longest wait for a complete round or an SDO answer, s")
     heartbeat_ms: int = Field(500, ge=0, le=65535, description="heartbeat period written to the nodes, ms")

@@ -171,8 +171,8 @@ class CertificateSettings(Section):
     number: Text = Field(min_length=1, description="number of the certificate, with who issued it")
     due: Day | None = Field(
         None,
-        description='last day on which the certificate holds, as "2027-03-31"; afterwards a person must approve '
-        "what rests on it",
+        description='last day on which the certificate holds, as "2027-03-31"; afterwards a person must '
+        "approve what rests on it",
     )
     expanded_um: float | None = Field(
         None,

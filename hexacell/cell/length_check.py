@@ -31,7 +31,8 @@ class LengthCheckSettings(Section):
     )
     direction: PointInRange = Field(
         (1.0, 0.0, 0.0),
-        description="direction from the first seat to the second; a way on which all joints move alike is best",
+        description="direction from the first seat to the second; a way on which all joints move alike "
+        "is best",
     )
     distance_mm: float = Field(
         ge=20, le=5000, description="certified distance of the two places of the ball, mm"
@@ -45,7 +46,8 @@ class LengthCheckSettings(Section):
     )
     height_mm: NotNegative = Field(
         50.0,
-        description="height of the ball above the line along which the distance is certified, mm; 0: at the ball",
+        description="height of the ball above the line along which the distance is certified, mm; 0: at "
+        "the ball",
     )
     seating_um: NotNegative = Field(
         5.0,

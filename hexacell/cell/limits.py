@@ -177,7 +177,8 @@ class SpeedSettings(Section):
     joint_at_gauges: Positive = Field(
         25.0,
         alias="joint_at_gauges_mm_s",
-        description="largest speed of any joint variable on a move that begins or ends with gauges at the ball",
+        description="largest speed of any joint variable on a move that begins or ends with gauges at "
+        "the ball",
     )
     edge_at_gauges_mm_s: Positive = Field(
         25.0, description="largest speed of the ball and of any joint of the platform on such a move, mm/s"

@@ -34,8 +34,8 @@ class StationSettings(Section):
     )
     trial_mm: NotNegative = Field(
         1.0,
-        description="size of the small moves by which gauges are tried once they were placed or connected, mm; 0:"
-        " none",
+        description="size of the small moves by which gauges are tried once they were placed or "
+        "connected, mm; 0: none",
     )
     mounting_mm: NotNegative = Field(
         1.0, description="how far from the middle of its travel a plunger may stand when it is zeroed, mm"
@@ -191,8 +191,8 @@ class TaskSettings(Section):
     )
     work_frame: Literal["", "x", "y", "z", "xy", "xz", "yz", "xyz"] = Field(
         "xyz",
-        description="base axes about which the controller can turn a work frame; it can always shift it. Errors "
-        "that a work frame or a tool frame removes do not count",
+        description="base axes about which the controller can turn a work frame; it can always shift it. "
+        "Errors that a work frame or a tool frame removes do not count",
     )
 
 
@@ -229,7 +229,8 @@ class NoiseSettings(Section):
     )
     gauges_mm: tuple[Positive, Positive, Positive] | None = Field(
         None,
-        description="noise of the gauges x, y and z, mm, 1 sigma, where they differ; takes the place of gauge_mm",
+        description="noise of the gauges x, y and z, mm, 1 sigma, where they differ; takes the place of "
+        "gauge_mm",
     )
     figures: Literal["stated", "measured"] = Field(
         "stated",

@@ -19,8 +19,9 @@ class ArchiveSettings(Section):
 
     url: Text | None = Field(
         None,
-        description="address of an archive that several cells may share, postgresql://user@host/database; without"
-        " it, a file beside the runs. A password belongs in the user's ~/.pgpass",
+        description="address of an archive that several cells may share, "
+        "postgresql://user@host/database; without it, a file beside the runs. A password belongs in "
+        "the user's ~/.pgpass",
     )
 
     @field_validator("url")
@@ -50,8 +51,8 @@ class OpcUaSettings(Section):
     folder: Text = Field(
         "opcua",
         min_length=1,
-        description="folder of the server's certificate and private key, relative to the cell file; made where "
-        "absent",
+        description="folder of the server's certificate and private key, relative to the cell file; made "
+        "where absent",
     )
     password_file: Text | None = Field(
         None,
@@ -92,8 +93,8 @@ class UnattendedSettings(Section):
     quiet_hours: tuple[Text, ...] = Field(
         (),
         max_length=20,
-        description="times in which no run begins and one that goes on ends, as 05:30-22:00, in the computer's "
-        "time zone; past midnight as 22:00-06:00",
+        description="times in which no run begins and one that goes on ends, as 05:30-22:00, in the "
+        "computer's time zone; past midnight as 22:00-06:00",
     )
     quiet_days: tuple[Weekday, ...] = Field(
         ("mon", "tue", "wed", "thu", "fri", "sat", "sun"),
@@ -102,13 +103,14 @@ class UnattendedSettings(Section):
     window_minutes: NotNegative = Field(
         0.0,
         le=DAY_MINUTES,
-        description="minutes after its time in which a run that could not begin is tried again; 0: not at all",
+        description="minutes after its time in which a run that could not begin is tried again; 0: not "
+        "at all",
     )
     retry_minutes: Positive = Field(10.0, le=DAY_MINUTES, description="minutes between two tries")
     longest_minutes: Positive | None = Field(
         None,
-        description="longest duration of a run, minutes; then it goes back to its reference and ends, and can be "
-        "resumed",
+        description="longest duration of a run, minutes; then it goes back to its reference and ends, "
+        "and can be resumed",
     )
 
     @field_validator("quiet_hours")
@@ -169,8 +171,8 @@ class NotificationSettings(Section):
     )
     on: tuple[OccasionWord, ...] = Field(
         USUAL_OCCASIONS,
-        description="runs that are reported: no-pass are those with another verdict than a pass, failure those "
-        "without one",
+        description="runs that are reported: no-pass are those with another verdict than a pass, failure "
+        "those without one",
     )
     topic: Text | None = Field(
         None,

@@ -145,8 +145,8 @@ class RecoverySettings(Section):
     wait_s: NotNegative = Field(2.0, description="wait before a failed device is tried again, s")
     away_minutes: Positive = Field(
         30.0,
-        description="minutes without anybody connected after which a run that waits for a person ends; it can be "
-        "resumed",
+        description="minutes without anybody connected after which a run that waits for a person ends; "
+        "it can be resumed",
     )
     attended: AttendedRecovery = AttendedRecovery()
     unattended: UnattendedRecovery = UnattendedRecovery()

@@ -37,11 +37,12 @@ class ScrewSettings(Section):
         description="lead of the screws, mm a turn; below zero for left-handed threads"
     )
     base_axes: SixDirections = Field(
-        description="axes of the joints on the base that the legs turn about, in the base frame, legs 1 to 6"
+        description="axes of the joints on the base that the legs turn about, in the base frame, legs 1 "
+        "to 6"
     )
     platform_axes: SixDirections = Field(
-        description="axes of the joints on the platform that the legs turn about, in the platform frame, legs 1 "
-        "to 6"
+        description="axes of the joints on the platform that the legs turn about, in the platform frame, "
+        "legs 1 to 6"
     )
 
 
@@ -50,8 +51,8 @@ class RobotSettings(Section):
 
     mechanism: Text = Field(
         DEFAULT_MECHANISM,
-        description="name of the mechanism: hexaglide, gough-stewart, six-rails, rotary-cranks, or one that a "
-        "plug-in adds",
+        description="name of the mechanism: hexaglide, gough-stewart, six-rails, rotary-cranks, or one "
+        "that a plug-in adds",
     )
     nominal: GeometrySettings = Field(
         description="geometry by the drawing, with which identification starts"

@@ -132,8 +132,8 @@ class SimulatedFault(Section):
     kind: FaultKind = Field(description="kind of fault")
     device: Text = Field(
         "",
-        description="faulty device: a gauge's name, encoder 1 to encoder 6, or controller; empty where there is "
-        "one",
+        description="faulty device: a gauge's name, encoder 1 to encoder 6, or controller; empty where "
+        "there is one",
     )
     at_move: int | None = Field(
         None,
@@ -161,8 +161,8 @@ class SimulationSettings(Section):
     )
     joints_command: tuple[Text, ...] = Field(
         (),
-        description="command that prints six joint variables a line, mm: gauges and encoders are then simulated "
-        "at the real controller of [controller]",
+        description="command that prints six joint variables a line, mm: gauges and encoders are then "
+        "simulated at the real controller of [controller]",
     )
     gauges: SimulatedGauges = SimulatedGauges()
     encoders: SimulatedEncoders = SimulatedEncoders()

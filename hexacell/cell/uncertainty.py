@@ -57,8 +57,8 @@ class CommonUncertaintySettings(Section):
     )
     stop_repeatability_acts: Literal["everywhere", "at work"] = Field(
         "everywhere",
-        description="when a joint's stop scatters: everywhere, or at work alone, where the noise of the records "
-        "contains it already",
+        description="when a joint's stop scatters: everywhere, or at work alone, where the noise of the "
+        "records contains it already",
     )
     ball_roundness_um: NotNegative = Field(
         2.0, description="largest departure of the ball from its mean radius, um"
@@ -71,12 +71,13 @@ class CommonUncertaintySettings(Section):
     )
     temperature_measuring_k: NotNegative = Field(
         1.0,
-        description="change of the temperature while measuring, K; a run with thermometers takes their range "
-        "instead",
+        description="change of the temperature while measuring, K; a run with thermometers takes their "
+        "range instead",
     )
     expansion_base_um_m_k: NotNegative = Field(
         23.0,
-        description="thermal expansion of the base with its scales, um/m/K: aluminium 23, steel 11.5, granite 6",
+        description="thermal expansion of the base with its scales, um/m/K: aluminium 23, steel 11.5, "
+        "granite 6",
     )
     expansion_platform_um_m_k: NotNegative = Field(
         23.0, description="thermal expansion of the platform, um/m/K"

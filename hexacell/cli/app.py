@@ -12,10 +12,8 @@ from pathlib import Path
 
 from hexacell import __version__
 from hexacell.cli.console import Console, lost_output
-from hexacell.cli.fault_report import fault_line
 from hexacell.cli.parser import make_parser
-from hexacell.cli.platform_support import require_platform
-from hexacell.cli.signals import stop_signals_as_sigint
+from hexacell.cli.process import fault_line, require_platform, stop_signals_as_sigint
 from hexacell.errors import ExitCode, HexacellError, UsageError
 
 LOG_FILE = "HEXACELL_LOG_FILE"
@@ -80,7 +78,7 @@ def _carried_out(options: argparse.Namespace, typed: Sequence[str]) -> int:
 
 
 def _require_usable(typed: Sequence[str]) -> None:
-    """Refuse arguments that can name no file, and are nothing else either.
+    """Refuse arguments that are not valid file names, which nothing else may be either.
 
     Raises:
         UsageError: one is too long, or has characters that no file name has.
@@ -93,7 +91,7 @@ def _require_usable(typed: Sequence[str]) -> None:
         is_too_long = max(map(len, parts)) > LONGEST_NAME_BYTES or len(argument) > LONGEST_PATH
         if is_too_long or any(b"\0" in part for part in parts):
             raise UsageError(
-                f"'{argument[:20]}...' can be the name of no file", action="Shorten or correct it"
+                f"'{argument[:20]}...' is not a valid file name", action="Shorten or correct it"
             )
 
 

@@ -1,22 +1,29 @@
-"""Progress of a run as it happens: a bar on a terminal, a line for each set everywhere."""
+"""Progress of a run at a terminal: a bar, a line for each set, and answers to what a person asks."""
 
 from __future__ import annotations
 
+import asyncio
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
+from types import TracebackType
+from typing import Any, Self
 
 from rich.console import Console as RichConsole
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from hexacell.campaign.decisions import Forecast
 from hexacell.cli.console import Console
+from hexacell.run_process.live_devices import RunDeviceWatch
 from hexacell.text.events import EventFormatter, activity
 from hexacell.text.layout import wrapped
-from hexacell.text.line_face import record_text
+from hexacell.text.line_face import gauges_text, record_text, run_status_text
+from procedures.run.cancellation import cancel_and_wait
 from procedures.run.state import RunState
 from procedures.steps import events
 from procedures.steps.commit import Commit
+from procedures.steps.move import Move
 from procedures.steps.place import Place
 
 PLAIN_TERMINALS = {"dumb", "unknown"}
@@ -28,7 +35,7 @@ class RunProgress:
 
     Attributes:
         has_started: whether the run exists on the disk, and so can be resumed.
-        expected: how many records and closings of sets are planned.
+        expected: number of records and closings of sets that are planned.
     """
 
     def __init__(self, console: Console, expected_records: int) -> None:
@@ -64,7 +71,7 @@ class RunProgress:
 
 @contextmanager
 def task_bar(name: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar that is told how many tasks of how many are done."""
+    """A bar for tasks; call what it gives with the number done and the number of all."""
     with _bar() as bar:
         task = bar.add_task(name, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
@@ -99,3 +106,61 @@ def _bar() -> Progress:
         # Text for the same terminal goes above the bar; text for a file or a pipe goes there.
         redirect_stdout=sys.stdout is not None and sys.stdout.isatty(),
     )
+
+
+class RunAnswers:
+    """Answers what a person at a plain terminal asks during a run, without delaying it.
+
+    A listener of the engine, used as ``async with``.
+    """
+
+    def __init__(self, console: Console, watching: RunDeviceWatch, expected_records: int) -> None:
+        self._console, self._watching, self._expected = console, watching, expected_records
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._state = RunState()
+        self._doing: str | None = None
+        self._last: events.RecordTaken | None = None
+        self._forecast: Forecast | None = None
+
+    def __call__(self, event: events.Event, state: RunState) -> None:
+        """Remember where the run is."""
+        self._state = state
+        self._doing = activity(event) or self._doing
+        match event:
+            case events.RecordTaken():
+                self._last = event
+            case events.StepBegun(step=Move(expected=expected)) if expected is not None:
+                self._forecast = expected.forecast or self._forecast
+
+    async def __aenter__(self) -> Self:
+        self._begin(self._note_noise())
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._watching.close()
+        for task in tuple(self._tasks):
+            await cancel_and_wait(task)
+
+    def print_status(self) -> None:
+        """Print where the run is."""
+        self._console.print(
+            run_status_text(self._doing, self._state, self._expected, self._last, self._forecast)
+        )
+
+    def print_gauges(self) -> None:
+        """Print what the gauges show, as soon as they are read."""
+        self._begin(self._print_fresh())
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.ensure_future(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _print_fresh(self) -> None:
+        self._console.print(gauges_text(await self._watching.fresh_snapshot()))
+
+    async def _note_noise(self) -> None:
+        async for _ in self._watching.snapshots():
+            pass

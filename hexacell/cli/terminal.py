@@ -1,26 +1,34 @@
-"""A person at a plain terminal, who answers questions line by line and types commands as letters."""
+"""A person at a plain terminal, who answers questions line by line and types commands as letters or Ctrl-C.
+
+Signals become commands to the engine, never an exception in the middle of a step.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import signal
 import sys
 import termios
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Mapping
 from io import TextIOWrapper
+from types import FrameType
 from typing import Any, TextIO, TypeVar
 
 from hexacell.cli.console import Console
-from hexacell.errors import AnswerNeeded
+from hexacell.cli.process import STOP_SIGNALS, handled
+from hexacell.errors import AnswerNeeded, Interruption
 from hexacell.text.answers import request_text, typed_answer
 from hexacell.text.line_face import LETTERS
 from hexacell.text.run import question_text
-from procedures.engine.commands import Abort, Command, MeasureAgain, Pause, Resume, Undo
+from procedures.engine.commands import Abort, Command, CommandQueue, MeasureAgain, Pause, Resume, Stop, Undo
 from procedures.run.keys import SetKey
 from procedures.run.questions import Question
 from procedures.run.state import RunState
 from procedures.steps import events
 
 Result = TypeVar("Result")
+
+ENDING_SIGNALS = (signal.SIGINT, *STOP_SIGNALS)
 
 APPROVER = "a person at the terminal"
 """Who approves a change, as the journal has it."""
@@ -31,15 +39,71 @@ def is_interactive() -> bool:
     return sys.stdin is not None and sys.stdin.isatty()
 
 
+class SignalCommands:
+    """Turns signals into commands: the first is a clean stop, a second Ctrl-C stops motion at once."""
+
+    def __init__(self, console: Console) -> None:
+        self.queue = CommandQueue()
+        self._console = console
+        self._stop_requested = False
+
+    def run(self, work: Coroutine[Any, Any, Result]) -> Result:
+        """``asyncio.run`` with signals turned into commands.
+
+        Before an engine reads the queue, a signal cancels the work, which then cleans up. After the
+        engine has ended, a signal has no effect.
+
+        Raises:
+            Interruption: a signal cancelled the work.
+        """
+        # An ignored one stays so, as Ctrl-C in a script's background job.
+        heeded = [number for number in ENDING_SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+        early: list[int] = []
+        try:
+            # An exception while the loop is being made would leave a half-made loop behind.
+            with handled(heeded, lambda number, _: early.append(number)):
+                return asyncio.run(self._with_handlers(work, heeded, early))
+        except asyncio.CancelledError:
+            raise Interruption("interrupted") from None
+
+    async def _with_handlers(
+        self, work: Coroutine[Any, Any, Result], heeded: Iterable[signal.Signals], early: list[int]
+    ) -> Result:
+        loop, task = asyncio.get_running_loop(), asyncio.ensure_future(work)
+
+        def handle(number: int, _: FrameType | None) -> None:
+            loop.call_soon_threadsafe(self._handle, signal.Signals(number), task)
+
+        with handled(heeded, handle):
+            for number in early:
+                handle(number, None)
+            return await task
+
+    def _handle(self, number: signal.Signals, task: asyncio.Task[Any]) -> None:
+        if self.queue.is_over:
+            return
+        if not self.queue.is_attended:
+            task.cancel()
+        elif self._stop_requested and number is signal.SIGINT:
+            self.queue.put(Abort("interrupted"))
+        else:
+            self._stop(number)
+
+    def _stop(self, number: signal.Signals) -> None:
+        self._stop_requested = True
+        self.queue.put(Stop("interrupted"))
+        if number is signal.SIGINT:
+            self._console.print("Stopping after this step; Ctrl-C again stops motion at once.")
+
+
 class KeyboardCommands:
     """Turns typed letters into commands; listens to the engine to know which set they refer to.
 
     Args:
-        console: where is told what is asked.
+        console: where the letters are explained.
         put: takes the commands.
-        terminal: what is typed.
-        tell: further letters, each with what tells something.
-        letters: what is told of all of them.
+        terminal: the stream of what is typed.
+        answers: further letters, each with the function that prints an answer.
     """
 
     def __init__(
@@ -47,14 +111,12 @@ class KeyboardCommands:
         console: Console,
         put: Callable[[Command], None],
         terminal: TextIO,
-        tell: Mapping[str, Callable[[], None]],
-        letters: str = LETTERS,
+        answers: Mapping[str, Callable[[], None]],
     ) -> None:
         self._console = console
         self._put = put
         self._terminal = terminal
-        self._tell = tell
-        self._letters = letters
+        self._answers = answers
         self._at: SetKey | None = None
 
     def __call__(self, event: events.Event, _: RunState) -> None:
@@ -82,15 +144,15 @@ class KeyboardCommands:
         self.take(line)
 
     def take(self, line: str) -> None:
-        """Put the command that a line means into the queue; where it means none, say which there are."""
+        """Put the command that a line means into the queue; explain the letters where it means none."""
         word, _, number = line.strip().partition(" ")
-        tell, make = self._tell.get(word), self._commands(number).get(word)
-        if tell is not None:
-            tell()
+        answer, make = self._answers.get(word), self._commands(number).get(word)
+        if answer is not None:
+            answer()
         elif make is not None:
             self._put(make())
         elif word:
-            self._console.print(self._letters)
+            self._console.print(LETTERS)
 
     def _commands(self, number: str) -> dict[str, Callable[[], Command]]:
         """The commands by their letters; a number is that of a record of this point."""

@@ -1,4 +1,4 @@
-"""Who is connected to a run: all are told everything, and one of them gives the commands."""
+"""Who is connected to a run: all receive everything, and one of them gives the commands."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import asyncio
 import os
 import pwd
 from asyncio import StreamReader, StreamWriter
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -23,9 +24,69 @@ from hexacell.run_process.messages import (
     client_message,
     message_line,
 )
-from hexacell.run_process.outbox import STUCK_S, Outbox
 from hexacell.run_process.run_socket import peer_of
 from procedures.engine.commands import Command
+
+STUCK_S = 10.0
+"""A client that takes nothing for so long is let go, s."""
+
+
+class Outbox:
+    """Messages to one client, in order. Of snapshots only the latest waits, and only behind all others.
+
+    Args:
+        writer: the connection to the client.
+        stuck_s: how long the client may take nothing, s.
+    """
+
+    def __init__(self, writer: asyncio.StreamWriter, stuck_s: float = STUCK_S) -> None:
+        writer.transport.set_write_buffer_limits(high=0)
+        self._writer = writer
+        self._stuck_s = stuck_s
+        self._lines: deque[bytes] = deque()
+        self._latest: bytes | None = None
+        self._changed = asyncio.Event()
+        self._is_closed = False
+
+    def put(self, line: bytes) -> None:
+        """Add a message that must arrive."""
+        self._lines.append(line)
+        self._changed.set()
+
+    def offer(self, line: bytes) -> None:
+        """Add a snapshot, which replaces one that still waits."""
+        self._latest = line
+        self._changed.set()
+
+    def close(self) -> None:
+        """Nothing more is added: delivery ends when all is sent."""
+        self._is_closed = True
+        self._changed.set()
+
+    async def deliver(self) -> None:
+        """Send everything as the client takes it, until closed; raises ``OSError`` where it does not."""
+        while (line := await self._next()) is not None:
+            self._writer.write(line)
+            try:
+                await asyncio.wait_for(self._writer.drain(), self._stuck_s)
+            except TimeoutError as error:
+                self._writer.transport.abort()
+                raise ConnectionAbortedError("the client takes nothing") from error
+
+    async def end(self) -> None:
+        """Close the connection."""
+        self._writer.close()
+        with suppress(OSError):
+            await self._writer.wait_closed()
+
+    async def _next(self) -> bytes | None:
+        while not self._lines and self._latest is None and not self._is_closed:
+            self._changed.clear()
+            await self._changed.wait()
+        if self._lines:
+            return self._lines.popleft()
+        line, self._latest = self._latest, None
+        return None if self._is_closed else line
 
 
 @dataclass(eq=False)
@@ -37,7 +98,7 @@ class _Client:
 
 @dataclass(eq=False)
 class AudienceEvents:
-    """What a host is told of its audience."""
+    """Calls from the audience to the host."""
 
     on_command: Callable[[Command], None]
     on_control: Callable[[], None]
@@ -55,19 +116,19 @@ class Audience:
     is in control gets it.
 
     Args:
-        told: gives what a new client is told first, in order.
-        events: what to call.
-        stuck_s: see :class:`Outbox`.
+        opening: gives the lines that a new client receives first, in order.
+        events: the calls to the host.
+        stuck_s: how long a client may take nothing, s.
     """
 
     def __init__(
         self,
-        told: Callable[[], list[bytes]],
+        opening: Callable[[], list[bytes]],
         events: AudienceEvents,
         stuck_s: float = STUCK_S,
     ) -> None:
         self.first_came = asyncio.Event()
-        self._told = told
+        self._opening = opening
         self._events = events
         self._stuck_s = stuck_s
         self._clients: list[_Client] = []
@@ -105,20 +166,20 @@ class Audience:
             listening.cancel()
             await self._end(client, delivering)
 
-    def tell(self, message: HostMessage) -> None:
-        """Tell all clients."""
+    def send(self, message: HostMessage) -> None:
+        """Send a message to all clients."""
         line = message_line(message)
         for client in self._clients:
             client.outbox.put(line)
 
-    def tell_latest(self, message: HostMessage) -> None:
-        """Tell all clients who have been told everything else; the others get a later one."""
+    def send_latest(self, message: HostMessage) -> None:
+        """Send it to all clients who have received everything else; the others get a later one."""
         self._latest = message_line(message)
         for client in self._clients:
             client.outbox.offer(self._latest)
 
     async def dismiss(self) -> None:
-        """Tell all clients what waits for them, and let them go."""
+        """Send all clients what waits for them, and let them go."""
         self._over.set()
         for client in self._clients:
             client.outbox.close()
@@ -126,7 +187,7 @@ class Audience:
             await asyncio.wait(serving)
 
     def _enter(self, client: _Client) -> None:
-        for line in self._told():
+        for line in self._opening():
             client.outbox.put(line)
         if self._latest is not None:
             client.outbox.offer(self._latest)
@@ -134,7 +195,7 @@ class Audience:
         if self._in_control is None:
             self._give_control(client)
         else:
-            self._tell_control(client)
+            self._send_control(client)
         self.first_came.set()
 
     def _exit(self, client: _Client) -> None:
@@ -144,7 +205,7 @@ class Audience:
             return
         self._in_control = None
         for other in self._clients:
-            self._tell_control(other)
+            self._send_control(other)
         if client.leave is None:
             self._events.on_lost()
         else:
@@ -154,7 +215,7 @@ class Audience:
         client.outbox.close()
         if client.leave is not None:
             delivering.cancel()
-            if not client.leave.keep_running:  # the end of the connection tells that nothing is left
+            if not client.leave.keep_running:  # the end of the connection says that nothing is left
                 await self._over.wait()
         with suppress(OSError, asyncio.CancelledError):
             await delivering
@@ -192,10 +253,10 @@ class Audience:
     def _give_control(self, client: _Client) -> None:
         self._in_control = client
         for one in self._clients:
-            self._tell_control(one)
+            self._send_control(one)
         self._events.on_control()
 
-    def _tell_control(self, client: _Client) -> None:
+    def _send_control(self, client: _Client) -> None:
         changed = ControlChanged(is_in_control=client is self._in_control, who=self._who)
         client.outbox.put(message_line(changed))
 

@@ -1,4 +1,4 @@
-"""A connection to a run in another process, and how such a process is started."""
+"""A connection to a run, in another process or recorded, and how such a process is started."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from asyncio import StreamReader, StreamWriter
 from collections.abc import AsyncIterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Protocol
 
 from hexacell.errors import ExitCode, FileError, HexacellError
 from hexacell.run_process.messages import (
@@ -46,6 +46,30 @@ LOST = HostFailed(
 )
 
 
+class RunConnection(Protocol):
+    """What a screen needs of a run.
+
+    ``give``, ``take_control`` and ``leave`` return when the message is sent; what it causes comes as a
+    message. All raise ``HexacellError`` where the run cannot be reached any more.
+    """
+
+    def messages(self) -> AsyncIterator[HostMessage]:
+        """Everything that the run sends; ends when it is over. To be called once."""
+        ...
+
+    async def give(self, command: Command) -> None:
+        """Give the engine a command. Refused with ``HostFailed`` where another client is in control."""
+        ...
+
+    async def take_control(self) -> None:
+        """Become the one who gives commands, which ``ControlChanged`` confirms."""
+        ...
+
+    async def leave(self, *, keep_running: bool) -> None:
+        """Let the run go on without anybody, or have it stopped after its step; ends the messages."""
+        ...
+
+
 class HostNotStarted(HexacellError):
     """The process of a run could not begin; the exit code is that of the reason."""
 
@@ -55,7 +79,7 @@ class HostNotStarted(HexacellError):
 
 
 class HostConnection:
-    """A :class:`~hexacell.run_process.connection.RunConnection` over a socket."""
+    """A :class:`~hexacell.run_process.client.RunConnection` over a socket."""
 
     def __init__(self, reader: StreamReader, writer: StreamWriter) -> None:
         self._reader = reader
@@ -64,29 +88,29 @@ class HostConnection:
         self._goes_on_alone = False
 
     async def messages(self) -> AsyncIterator[HostMessage]:
-        """See :meth:`RunConnection.messages`; a connection that is lost ends with a failure."""
-        is_told = False
+        """Everything that the run sends; a connection that is lost ends with a failure."""
+        has_ended = False
         with suppress(ConnectionError):
             while (line := await self._reader.readline()).endswith(b"\n"):
                 if self._goes_on_alone:  # what it still says was on its way
                     continue
                 message = host_message(line)
-                is_told = is_told or _is_ending(message)
+                has_ended = has_ended or _is_ending(message)
                 yield message
         self._writer.close()
-        if not is_told and not self._is_left:
+        if not has_ended and not self._is_left:
             yield LOST
 
     async def give(self, command: Command) -> None:
-        """See :meth:`RunConnection.give`."""
+        """Give the engine a command."""
         await self._send(GiveCommand(command=command))
 
     async def take_control(self) -> None:
-        """See :meth:`RunConnection.take_control`."""
+        """Become the one who gives commands."""
         await self._send(TakeControl())
 
     async def leave(self, *, keep_running: bool) -> None:
-        """See :meth:`RunConnection.leave`; the run hangs up when it has heard, or when it has ended."""
+        """Leave the run, which hangs up when it has heard that, or when it has ended."""
         self._is_left, self._goes_on_alone = True, keep_running
         with suppress(HexacellError, TimeoutError):
             await self._send(Leave(keep_running=keep_running))
@@ -120,7 +144,7 @@ def _is_ending(message: HostMessage) -> bool:
 
 
 async def connect_to_run(path: Path) -> HostConnection | None:
-    """A connection to the run whose socket is there; none if there is no run.
+    """A connection to the run whose socket is there; None if there is no run.
 
     Raises:
         FileError: it is another user's.
@@ -151,26 +175,26 @@ async def start_host(path: Path, arguments: Sequence[str]) -> HostConnection:
 
 def _spawn(arguments: Sequence[str]) -> None:
     """Start the process and wait until it listens; it is no child of this one then."""
-    told, telling = os.pipe()
-    with tempfile.TemporaryFile() as errors, os.fdopen(told, "rb") as answers:
+    answered, answering = os.pipe()
+    with tempfile.TemporaryFile() as errors, os.fdopen(answered, "rb") as answers:
         command = [sys.executable, "-m", "hexacell", "host", *arguments]
         try:
             process = os.posix_spawn(
-                sys.executable, command, os.environ, file_actions=_streams(telling, errors), setsid=True
+                sys.executable, command, os.environ, file_actions=_streams(answering, errors), setsid=True
             )
         finally:
-            os.close(telling)
+            os.close(answering)
         os.waitpid(process, 0)
         answer = answers.readline()
         if answer != READY:
             raise HostNotStarted(_failure_in(answer, errors))
 
 
-def _streams(telling: int, errors: BinaryIO) -> list[tuple[int, ...] | tuple[int, int, str, int, int]]:
+def _streams(answering: int, errors: BinaryIO) -> list[tuple[int, ...] | tuple[int, int, str, int, int]]:
     """Nothing to read, the answer on stdout, and messages of the interpreter in a file."""
     return [
         (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
-        (os.POSIX_SPAWN_DUP2, telling, 1),
+        (os.POSIX_SPAWN_DUP2, answering, 1),
         (os.POSIX_SPAWN_DUP2, errors.fileno(), 2),
     ]
 

@@ -1,4 +1,4 @@
-"""The process that an engine runs in: it tells its clients everything and obeys one of them.
+"""The process that an engine runs in: it sends its clients everything and obeys one of them.
 
 It outlives the terminal that began the run. If that is gone without a word, the run pauses after the record
 in progress and goes on when somebody who has attached says so. Where nobody does for the time that the
@@ -12,7 +12,8 @@ from socket import socket
 
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.errors import ExitCode, HexacellError, SeveralErrors
-from hexacell.run_process.audience import Audience, AudienceEvents, audience_server
+from hexacell.run_process.audience import STUCK_S, Audience, AudienceEvents, audience_server
+from hexacell.run_process.live_devices import RunDeviceWatch
 from hexacell.run_process.messages import (
     EventRecorded,
     HostFailed,
@@ -22,13 +23,11 @@ from hexacell.run_process.messages import (
     StatusChanged,
     message_line,
 )
-from hexacell.run_process.outbox import STUCK_S
-from hexacell.run_process.run_device_watch import RunDeviceWatch
 from hexacell.services.run.calibration_run import RunRequest, calibrate
 from procedures.calibration.calibration import expected_records
 from procedures.devices.device_set import Devices
 from procedures.engine.command_loop import Status
-from procedures.engine.commands import Abort, Command, CommandQueue, Pause, Stop
+from procedures.engine.commands import Abort, CommandQueue, Pause, Stop
 from procedures.engine.engine import Engine
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import now
@@ -50,7 +49,7 @@ STOPPED = HostFailed(problem="stopped by who left it", exit_code=int(ExitCode.IN
 class RemoteOperator:
     """A person who answers by commands; nobody else does."""
 
-    async def ask(self, question: Question) -> str | None:  # noqa: ARG002 - clients are told of it
+    async def ask(self, question: Question) -> str | None:  # noqa: ARG002 - clients are sent it
         """Wait for ever."""
         await asyncio.Event().wait()
         return None
@@ -64,7 +63,7 @@ class RunHost:
         queue: the commands of the engine.
         away_s: how long the run waits for a person while nobody is in control, s; by default as the cell
             file has it.
-        stuck_s: see :class:`~hexacell.run_process.outbox.Outbox`.
+        stuck_s: how long a client may take nothing, s.
     """
 
     def __init__(
@@ -81,8 +80,8 @@ class RunHost:
         self._queue = queue
         self._away_s = 60.0 * settings.recovery.away_minutes if away_s is None else away_s
         self._audience = Audience(
-            self._told,
-            AudienceEvents(self._obey, self._on_control, self._on_leave, self._on_lost),
+            self._opening,
+            AudienceEvents(self._queue.put, self._on_control, self._on_leave, self._on_lost),
             stuck_s,
         )
         self._lines: list[bytes] = [message_line(self._description())]
@@ -145,7 +144,7 @@ class RunHost:
 
     def _fail(self, failure: HostFailed) -> None:
         self._failure = failure
-        self._audience.tell(failure)
+        self._audience.send(failure)
 
     async def _until_aborted(self, running: asyncio.Future[ExitCode]) -> None:
         """Ends a little after an abort, if all that is left of the run is a computation in a thread."""
@@ -163,51 +162,44 @@ class RunHost:
             case _:
                 return False
 
-    # What the engine says.
-
     def _watch(self, engine: Engine, devices: Devices) -> None:
-        """Called with the engine before it begins: what happened before is told first."""
+        """Called with the engine before it begins: what happened before is sent first."""
         for entry in read_entries(self._request.folder.journal):
-            self._tell_event(EventRecorded(sequence=entry.number, at=entry.at, event=entry.event))
+            self._send_event(EventRecorded(sequence=entry.number, at=entry.at, event=entry.event))
         self._watching.follow(engine, devices)
         engine.watch(self._on_status)
         engine.watch_questions(self._on_question)
 
     def _record(self, event: events.Event, _: RunState) -> None:
         at = now()[0]
-        self._tell_event(EventRecorded(sequence=self._sequence + 1, at=at, event=event))
+        self._send_event(EventRecorded(sequence=self._sequence + 1, at=at, event=event))
 
-    def _tell_event(self, recorded: EventRecorded) -> None:
+    def _send_event(self, recorded: EventRecorded) -> None:
         self._sequence, self._last = recorded.sequence, recorded.event
         self._lines.append(message_line(recorded))
-        self._audience.tell(recorded)
+        self._audience.send(recorded)
         self._watching.note(recorded.event)
 
     def _on_status(self, status: Status) -> None:
         self._status = status
-        self._audience.tell(StatusChanged(status=status))
+        self._audience.send(StatusChanged(status=status))
         if self._is_lost and status is Status.RUNNING:
             self._queue.put(Pause())
         self._reconsider()
 
     def _on_question(self, question: Question | None) -> None:
         self._question = question
-        self._audience.tell(QuestionClosed() if question is None else QuestionOpened(question=question))
+        self._audience.send(QuestionClosed() if question is None else QuestionOpened(question=question))
         self._reconsider()
 
-    # What the audience does.
-
-    def _told(self) -> list[bytes]:
-        """What a new client is told first."""
+    def _opening(self) -> list[bytes]:
+        """The lines that a new client receives first."""
         present = [message_line(StatusChanged(status=self._status))]
         if self._question is not None:
             present.append(message_line(QuestionOpened(question=self._question)))
         if self._failure is not None:
             present.append(message_line(self._failure))
         return [*self._lines, *present]
-
-    def _obey(self, command: Command) -> None:
-        self._queue.put(command)
 
     def _on_control(self) -> None:
         self._is_lost = False
@@ -225,8 +217,6 @@ class RunHost:
             self._queue.put(Pause())
         self._reconsider()
 
-    # What follows from both.
-
     def _reconsider(self) -> None:
         """Count the time while the run waits and nobody is there."""
         is_away = self._watching.is_waiting and not self._audience.is_controlled
@@ -242,7 +232,7 @@ class RunHost:
 
     async def _watch_devices(self) -> None:
         async for snapshot in self._watching.snapshots():
-            self._audience.tell_latest(snapshot)
+            self._audience.send_latest(snapshot)
 
     def _description(self) -> RunDescribed:
         request = self._request

@@ -2,7 +2,8 @@
 
 The first message to a client is :class:`RunDescribed`; then the whole journal follows as
 :class:`EventRecorded`, and each event as it is recorded. A later ``RunDescribed`` begins anew: what was
-received before it does not count. So a recorded run goes back in time.
+received before it does not count. So a recorded run goes back in time. Snapshots of the devices are for
+screens, never for records.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, TypeAdapter, Valid
 
 from hexacell.cell.fields import Frozen, first_mistake
 from hexacell.errors import UsageError
-from hexacell.run_process.snapshots import LiveSnapshot
+from hexacell.kinematics.parameters import JointUnit
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command
 from procedures.run.questions import Question
@@ -44,12 +45,74 @@ def _command_in(value: object) -> object:
     return _COMMANDS[value["name"]].validate_python({k: v for k, v in value.items() if k != "name"})
 
 
+SnapshotAge = float | None
+"""How long ago a device answered, s; None before its first answer."""
+
+
+class GaugeSnapshot(Frozen):
+    """One gauge, mm in its own zero and direction.
+
+    Attributes:
+        axis: the base axis along which its plunger moves.
+        sign: 1 where its reading grows along the positive axis, else -1.
+        shown_mm: its latest reading; None before the first one.
+        unit: the display's unit; a gauge that shows another one is refused, and ``problem`` says so.
+        noise_mm: standard deviation of its latest readings at standstill; None before there are some.
+        problem: why it did not answer since; empty if it did.
+        travel_mm: its measuring range.
+        middle_mm: what it shows in the middle of that; None where its display does not say.
+    """
+
+    name: str
+    axis: Literal["x", "y", "z"]
+    sign: Literal[1, -1] = 1
+    shown_mm: float | None = None
+    unit: Literal["mm"] = "mm"
+    age_s: SnapshotAge = None
+    noise_mm: float | None = None
+    problem: str = ""
+    travel_mm: float
+    middle_mm: float | None = None
+
+
+class EncoderSnapshot(Frozen):
+    """The six joint variables in their unit; None before the first answer."""
+
+    positions: tuple[float, ...] | None = None
+    unit: JointUnit = JointUnit.MM
+    age_s: SnapshotAge = None
+    problem: str = ""
+
+
+class ControllerSnapshot(Frozen):
+    """The state of the controller; ``estop`` and ``enabled`` are None before its first answer."""
+
+    estop: bool | None = None
+    enabled: bool | None = None
+    error_messages: tuple[str, ...] = ()
+    age_s: SnapshotAge = None
+    problem: str = ""
+
+
+class LiveSnapshot(Frozen):
+    """The latest values of all devices; at most ten a second, and none is kept for a slow reader.
+
+    ``stop_reason`` is why motion is forbidden, empty while it is not.
+    """
+
+    kind: Literal["live"] = "live"
+    gauges: tuple[GaugeSnapshot, ...]
+    encoders: EncoderSnapshot = Field(default_factory=EncoderSnapshot)
+    controller: ControllerSnapshot = Field(default_factory=ControllerSnapshot)
+    stop_reason: str = ""
+
+
 class RunDescribed(Frozen):
-    """Which run this is; what was received before it does not count any more.
+    """Which run this is; what was received before it no longer counts.
 
     Attributes:
         cell: the name of the cell; ``cell_file`` its file.
-        folder: of the run.
+        folder: the folder of the run.
         expected_records: how many records and closings of sets are planned.
         is_recorded: whether this is a recorded run, which takes no commands.
     """
@@ -116,7 +179,7 @@ class CursorMoved(Frozen):
 class HostFailed(Frozen):
     """The run could not begin or ended early, or a message was refused: why, and what to do next.
 
-    ``exit_code`` is that of the run; none where it goes on.
+    ``exit_code`` is that of the run; None where it goes on.
     """
 
     kind: Literal["failed"] = "failed"
@@ -173,12 +236,12 @@ def message_line(message: HostMessage | ClientMessage) -> bytes:
 
 
 def host_message(line: bytes) -> HostMessage:
-    """The message in a line from the host; raises ``UsageError`` where it is none."""
+    """The message in a line from the host; raises ``UsageError`` if it is not one."""
     return _read(_FROM_HOST, line)
 
 
 def client_message(line: bytes) -> ClientMessage:
-    """The message in a line from a client; raises ``UsageError`` where it is none."""
+    """The message in a line from a client; raises ``UsageError`` if it is not one."""
     return _read(_FROM_CLIENT, line)
 
 

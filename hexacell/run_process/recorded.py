@@ -29,7 +29,7 @@ from procedures.steps import events
 from procedures.steps.place import Place
 
 LONGEST_WAIT_S = 60.0
-"""Of recorded time between two events: a run that was resumed the next day is not waited for."""
+"""Longest wait between two events, s of recorded time: nobody waits for a run resumed the next day."""
 
 
 @dataclass
@@ -41,14 +41,14 @@ class _Cursor:
 
 
 class RecordedRun:
-    """A :class:`~hexacell.run_process.connection.RunConnection` that tells a journal up to its cursor.
+    """A :class:`~hexacell.run_process.client.RunConnection` that sends a journal up to its cursor.
 
-    Questions are told where the journal shows that they were asked: those to place gauges.
+    Questions are sent where the journal shows that they were asked: those to place gauges.
 
     Args:
-        folder: of the run; it may still be going on, and is told as far as it was.
+        folder: the folder of the run, which may still be going on; it is shown as far as it was.
         sequence: the line of the journal at which the cursor stands at first; 0 is the end.
-        clock: by which it advances.
+        clock: the clock by which it advances.
 
     Raises:
         FileError: the journal cannot be read, or is empty.
@@ -73,7 +73,7 @@ class RecordedRun:
 
     @property
     def sequence(self) -> int:
-        """The line of the journal that was told last, from 1."""
+        """The line of the journal that was sent last, from 1."""
         return self._cursor.sequence
 
     def step(self, count: int = 1) -> None:
@@ -89,27 +89,27 @@ class RecordedRun:
         """Advance by itself, ``speed`` times as fast as recorded; 0 stops there.
 
         Raises:
-            UsageError: the speed is no number from 0.
+            UsageError: the speed is not a number from 0.
         """
         if not 0.0 <= speed < float("inf"):
-            raise UsageError(f"{speed:g} is no speed", action="Give a number from 0")
+            raise UsageError(f"{speed:g} is not a speed", action="Give a number from 0")
         self._cursor.speed = speed
         self._moved.set()
 
     async def messages(self) -> AsyncIterator[HostMessage]:
-        """See :meth:`RunConnection.messages`; going back tells the run anew."""
-        told = 0
+        """The run up to the cursor; going back sends it anew."""
+        sent = 0
         while not self._is_left:
             self._moved.clear()
-            if told == 0 or told > self._cursor.sequence:
-                told = 0
+            if sent == 0 or sent > self._cursor.sequence:
+                sent = 0
                 yield self._description()
-            while told < self._cursor.sequence and not self._is_left:
-                told += 1
-                yield self._event(told)
-            for message in self._present(told):
+            while sent < self._cursor.sequence and not self._is_left:
+                sent += 1
+                yield self._event(sent)
+            for message in self._present(sent):
                 yield message
-            await self._until_moved(told)
+            await self._until_moved(sent)
 
     async def give(self, command: Command) -> None:
         """Refused: raises ``UsageError``."""
@@ -144,35 +144,35 @@ class RecordedRun:
         return EventRecorded(sequence=sequence, at=entry.at, event=entry.event)
 
     def _present(self, sequence: int) -> list[HostMessage]:
-        """What else a run tells: its status, its question, and where the cursor is."""
+        """What else a run sends: its status, its question, and where the cursor is."""
         entry = self._entries[sequence - 1]
         at_cursor = CursorMoved(sequence=sequence, last=self.last, at=entry.at, speed=self._cursor.speed)
         status = StatusChanged(status=_status_after(entry.event))
         return [status, _question_after(entry.event), at_cursor]
 
-    async def _until_moved(self, told: int) -> None:
+    async def _until_moved(self, sent: int) -> None:
         """Wait until the cursor is moved, or moves by itself."""
         if self._moved.is_set():
             return
         moved = asyncio.ensure_future(self._moved.wait())
-        advancing = asyncio.ensure_future(self._advance(told))
+        advancing = asyncio.ensure_future(self._advance(sent))
         try:
             await asyncio.wait([moved, advancing], return_when=asyncio.FIRST_COMPLETED)
         finally:
             moved.cancel()
             advancing.cancel()
 
-    async def _advance(self, told: int) -> None:
-        if self._cursor.speed == 0.0 or told >= self.last:
+    async def _advance(self, sent: int) -> None:
+        if self._cursor.speed == 0.0 or sent >= self.last:
             await self._moved.wait()
             return
-        await self._clock.sleep(self._wait_s(told) / self._cursor.speed)
-        if self._cursor.sequence == told:
-            self._cursor.sequence = told + 1
+        await self._clock.sleep(self._wait_s(sent) / self._cursor.speed)
+        if self._cursor.sequence == sent:
+            self._cursor.sequence = sent + 1
 
-    def _wait_s(self, told: int) -> float:
+    def _wait_s(self, sent: int) -> float:
         """The recorded time from one event to the next, s."""
-        here, following = self._entries[told - 1], self._entries[told]
+        here, following = self._entries[sent - 1], self._entries[sent]
         elapsed = (following.at - here.at).total_seconds()
         if here.monotonic_s is not None and following.monotonic_s is not None:
             by_clock = following.monotonic_s - here.monotonic_s

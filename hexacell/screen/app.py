@@ -1,4 +1,4 @@
-"""The application: five screens over one backend, keys, palette, themes, overlays, and quitting."""
+"""The application: five screens over one model, keys, palette, themes, overlays, and quitting."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from textual.app import App, SystemCommand
 from textual.binding import BindingType
@@ -16,29 +16,34 @@ from textual.css.query import NoMatches
 from textual.screen import Screen
 
 from hexacell.errors import HexacellError
-from hexacell.screen.assistant_screen import Assistant, AssistantScreen
-from hexacell.screen.backend import ONCE, Backend, ScreenAction
-from hexacell.screen.cell_screen import CellScreen
-from hexacell.screen.digits_screen import DigitsScreen
-from hexacell.screen.history_screen import HistoryScreen
-from hexacell.screen.key_map import KEYS, THEMES, ScreenPreferences
-from hexacell.screen.measure_screen import MeasureScreen
-from hexacell.screen.overlays.confirm_overlay import ConfirmOverlay
-from hexacell.screen.overlays.fault_overlay import FaultOverlay
-from hexacell.screen.overlays.help_overlay import HelpOverlay
-from hexacell.screen.overlays.question_overlay import QuestionOverlay
-from hexacell.screen.overlays.quit_overlay import Leaving, QuitOverlay
-from hexacell.screen.plan_screen import PlanScreen
-from hexacell.screen.preflight_screen import PreflightScreen
-from hexacell.screen.review_screen import ReviewScreen
-from hexacell.screen.tab_screen import TabScreen
-from hexacell.screen.themes import SCREEN_THEMES
-from hexacell.screen.widgets.key_line import KeyLine
+from hexacell.screen.further_screens import AssistantScreen, DigitsScreen, PlanScreen
+from hexacell.screen.overlays import (
+    ConfirmOverlay,
+    FaultOverlay,
+    HelpOverlay,
+    Leaving,
+    QuestionOverlay,
+    QuitOverlay,
+)
+from hexacell.screen.preferences import KEYS, ONCE, SCREEN_THEMES, THEMES, ScreenAction, ScreenPreferences
+from hexacell.screen.tabs import (
+    CellScreen,
+    HistoryScreen,
+    MeasureScreen,
+    PreflightScreen,
+    ReviewScreen,
+    TabScreen,
+)
+from hexacell.screen.widgets import KeyLine
 from hexacell.text.screens.views import FaultView
+
+if TYPE_CHECKING:
+    from hexacell.screen.model import ScreenModel
+    from hexacell.text.screens.first_questions import FirstCellAssistant
 
 DRAWN_EVERY_S = 0.1
 LEAVING_TAKES_S = 6.0
-"""The host is told that one leaves, and answers; nothing is waited for longer."""
+"""Longest wait for the host's answer when a person leaves, s."""
 
 SCREENS: tuple[type[TabScreen], ...] = (
     CellScreen,
@@ -54,11 +59,11 @@ class FirstCell:
     """A cell file that does not exist yet, and what makes the assistant for it."""
 
     path: Path
-    make: Callable[[], Assistant]
+    make: Callable[[], FirstCellAssistant]
 
 
 class TechnicianApp(App[int]):
-    """Loads its backend behind the first screen and draws what that knows ten times a second."""
+    """Loads its model behind the first screen and draws what that knows ten times a second."""
 
     TITLE = "hexacell"
     CSS_PATH = "styles.tcss"
@@ -69,7 +74,7 @@ class TechnicianApp(App[int]):
 
     def __init__(
         self,
-        load: Callable[[], Backend],
+        load: Callable[[], ScreenModel],
         preferences: ScreenPreferences | None = None,
         *,
         first_cell: FirstCell | None = None,
@@ -77,7 +82,7 @@ class TechnicianApp(App[int]):
         self.preferences = preferences or ScreenPreferences()
         self.keys_in_use = {str(one.id): one.key_display or one.key for one in KEYS} | self.preferences.keys
         self._load, self._first_cell = load, first_cell
-        self._backend: Backend | None = None
+        self._model: ScreenModel | None = None
         self._question_seen, self._fault_seen, self._runs_seen = 0, 0, 0
         super().__init__()
         for theme in SCREEN_THEMES:
@@ -88,9 +93,9 @@ class TechnicianApp(App[int]):
         self.set_keymap(self.preferences.keys)
 
     @property
-    def backend(self) -> Backend | None:
-        """What is shown; none while it loads."""
-        return self._backend
+    def model(self) -> ScreenModel | None:
+        """What is shown; None while it loads."""
+        return self._model
 
     def on_mount(self) -> None:
         """Load what is behind the screens once the first one is drawn."""
@@ -105,13 +110,13 @@ class TechnicianApp(App[int]):
             if not await self._has_cell():
                 self.exit(0)
                 return
-            self._backend = await asyncio.to_thread(self._load)
+            self._model = await asyncio.to_thread(self._load)
             self.draw()
             self.set_interval(DRAWN_EVERY_S, self.draw)
             self.run_worker(self._make_screens(), exit_on_error=False, group="make")
-            await self._backend.attend()
+            await self._model.attend()
         except HexacellError as error:
-            self._tell(error)
+            self._show_error(error)
 
     async def _make_screens(self) -> None:
         """Make the screens behind the first one before somebody wants them, one at a time."""
@@ -131,15 +136,15 @@ class TechnicianApp(App[int]):
 
     def draw(self) -> None:
         """Show what is so now in the screen in front, and in what lies below it."""
-        if self._backend is None or not self.screen_stack:  # it is loading, or being closed
+        if self._model is None or not self.screen_stack:  # it is loading, or being closed
             return
         for screen in self.screen_stack:
             if isinstance(screen, TabScreen | DigitsScreen | PlanScreen | QuestionOverlay):
                 with suppress(NoMatches):  # it is being composed, or taken away
-                    screen.draw(self._backend)
-        if not self._goes_to_new_run(self._backend) and self._is_whole:
-            self._overlay_question(self._backend)
-            self._overlay_fault(self._backend)
+                    screen.draw(self._model)
+        if not self._goes_to_new_run(self._model) and self._is_whole:
+            self._overlay_question(self._model)
+            self._overlay_fault(self._model)
 
     @property
     def _is_whole(self) -> bool:
@@ -148,17 +153,17 @@ class TechnicianApp(App[int]):
             return True
         return any(line.outer_size.width == self.size.width for line in self.screen.query(KeyLine))
 
-    def _goes_to_new_run(self, backend: Backend) -> bool:
+    def _goes_to_new_run(self, model: ScreenModel) -> bool:
         """Whether the screen changes because a run is followed anew; overlays come after that."""
-        is_new = backend.runs_followed != self._runs_seen
+        is_new = model.runs_followed != self._runs_seen
         if is_new:
-            self._runs_seen = backend.runs_followed
+            self._runs_seen = model.runs_followed
             self.action_show("measure")
         return is_new
 
-    def _overlay_question(self, backend: Backend) -> None:
+    def _overlay_question(self, model: ScreenModel) -> None:
         """Show a new question; take away one that was answered."""
-        number, view = backend.question_number, backend.question()
+        number, view = model.question_number, model.question()
         shown = next((one for one in self.screen_stack if isinstance(one, QuestionOverlay)), None)
         if shown is not None and (view is None or shown.number != number) and shown.is_current:
             shown.dismiss()
@@ -166,38 +171,38 @@ class TechnicianApp(App[int]):
             self._question_seen = number
             self.push_screen(QuestionOverlay(view, number, self._answer))
 
-    def _overlay_fault(self, backend: Backend) -> None:
-        view, number = backend.fault(), backend.fault_number
+    def _overlay_fault(self, model: ScreenModel) -> None:
+        view, number = model.fault(), model.fault_number
         if view is not None and number != self._fault_seen:
             self.push_screen(FaultOverlay(view))
         self._fault_seen = number
 
     async def _answer(self, value: str | None) -> None:
-        if self._backend is not None:
-            self._start(self._backend.answer(value))
+        if self._model is not None:
+            self._start(self._model.answer(value))
 
     def _start(self, work: Coroutine[Any, Any, str | None]) -> None:
         """Do something without waiting for it, so that the next key is heard at once."""
-        self.run_worker(self._telling(work), exit_on_error=False)
+        self.run_worker(self._waiting_for(work), exit_on_error=False)
 
-    async def _telling(self, work: Coroutine[Any, Any, str | None]) -> None:
+    async def _waiting_for(self, work: Coroutine[Any, Any, str | None]) -> None:
         """Wait for some work; say what it says, or what went wrong."""
         try:
             if said := await work:
                 self.notify(said, markup=False)
         except HexacellError as error:
-            self._tell(error)
+            self._show_error(error)
 
-    def _tell(self, error: HexacellError) -> None:
+    def _show_error(self, error: HexacellError) -> None:
         """Show an error that a person can act on."""
         cause = str(error).removesuffix(f". {error.action}") if error.action else str(error)
         self.push_screen(FaultOverlay(FaultView("That did not work", cause, error.action or "")))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Whether a key has an effect now."""
-        if action != "perform" or not parameters or self._backend is None:
+        if action != "perform" or not parameters or self._model is None:
             return True
-        return True if self._backend.allows(ScreenAction(str(parameters[0]))) else None
+        return True if self._model.allows(ScreenAction(str(parameters[0]))) else None
 
     def action_show(self, tab: str) -> None:
         """Go to another screen."""
@@ -206,22 +211,22 @@ class TechnicianApp(App[int]):
 
     def action_perform(self, action: str, argument: str = "") -> None:
         """Ask for something."""
-        if self._backend is not None:
-            self._start(self._confirmed(self._backend, ScreenAction(action), argument))
+        if self._model is not None:
+            self._start(self._confirmed(self._model, ScreenAction(action), argument))
 
-    async def _confirmed(self, backend: Backend, action: ScreenAction, argument: str) -> str:
+    async def _confirmed(self, model: ScreenModel, action: ScreenAction, argument: str) -> str:
         """Do something, once a person has confirmed it where that is needed."""
-        question = await backend.confirmation(action, argument) if backend.allows(action) else None
+        question = await model.confirmation(action, argument) if model.allows(action) else None
         if question is not None and not await self.push_screen_wait(ConfirmOverlay(question)):
             return ""
-        return await backend.perform(action, argument)
+        return await model.perform(action, argument)
 
     def action_answer(self) -> None:
         """Show the open question again, or ask whether to write what the run in front has proposed."""
         self._question_seen = 0
-        backend = self._backend
-        if backend is not None and backend.question() is None and backend.proposing_run:
-            self.action_perform("apply", backend.proposing_run)
+        model = self._model
+        if model is not None and model.question() is None and model.proposing_run:
+            self.action_perform("apply", model.proposing_run)
 
     def action_digits(self) -> None:
         """Show the gauges in large figures."""
@@ -229,7 +234,7 @@ class TechnicianApp(App[int]):
 
     def action_plan(self) -> None:
         """Show the poses of the plan; it is tried first where it was not yet."""
-        if self._backend is not None:
+        if self._model is not None:
             self.push_screen(PlanScreen())
             self.action_perform("preview", ONCE)
 
@@ -243,13 +248,13 @@ class TechnicianApp(App[int]):
 
     def action_leave(self) -> None:
         """Quit; while a run goes on, ask what becomes of it."""
-        if self._backend is not None and self._backend.may_leave_run:
+        if self._model is not None and self._model.may_leave_run:
             self.push_screen(QuitOverlay(), self._leave)
         else:
             self._leave("leave")
 
     async def action_quit(self) -> None:
-        """The same for Textual's own key, ctrl+q."""
+        """Quit by Textual's own key, ctrl+q, too."""
         if not isinstance(self.screen, QuitOverlay):
             self.action_leave()
 
@@ -264,10 +269,10 @@ class TechnicianApp(App[int]):
             self.run_worker(self._quit(keep_running=leaving == "leave"), exit_on_error=False)
 
     async def _quit(self, *, keep_running: bool) -> None:
-        if self._backend is not None:
+        if self._model is not None:
             with suppress(HexacellError, TimeoutError):
                 async with asyncio.timeout(LEAVING_TAKES_S):
-                    await self._backend.leave(keep_running=keep_running)
+                    await self._model.leave(keep_running=keep_running)
         self.exit(0)
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:  # noqa: ARG002 - the same everywhere

@@ -1,17 +1,42 @@
-"""What a session needs of a real cell; tests have one of their own."""
+"""The cell behind a screen: its file, devices, preflight, plan, runs and config."""
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
-from typing import Protocol
+from pathlib import Path
 
-from hexacell.cell.loader import Cell
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.passwords import password_warnings
+from hexacell.config.pending_write import settle_config
 from hexacell.dry_run.campaign import VisitedPose
-from hexacell.run_process.connection import RunConnection
-from hexacell.run_process.snapshots import LiveSnapshot
-from hexacell.text.screens.views import ChecklistItem, HistoryEntry
+from hexacell.errors import UsageError
+from hexacell.kinematics.pose import Pose
+from hexacell.run_process.client import RunConnection, connect_to_run, start_host
+from hexacell.run_process.live_devices import watch_devices
+from hexacell.run_process.messages import LiveSnapshot
+from hexacell.run_process.recorded import RecordedRun
+from hexacell.run_process.run_socket import socket_path
+from hexacell.runs.run_folder import find_run, new_run
+from hexacell.screen.child import run_child
+from hexacell.screen.preferences import RESUME, WITH_LENGTH
+from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
+from hexacell.services.history.run_index import PastRun
+from hexacell.services.preflight.exclusions import toggle_exclusion
+from hexacell.services.preflight.warnings import exposure_warnings
+from hexacell.services.recorded.journal_soundness import require_sound
+from hexacell.services.recorded.resumption import LATEST, run_to_resume
+from hexacell.services.write_back.config_rollback import roll_back_config
+from hexacell.services.write_back.proposals import apply_proposal, approval_question, read_proposal
+from hexacell.text.config_changes import applied_text, rollback_text
+from hexacell.text.history import comparison_text, drift_text
+from hexacell.text.screens.reviewing import history_entries
+from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
+from procedures.calibration.calibration import Mode
+from procedures.journal.journal import read_journal
 from procedures.run.questions import Question
+from procedures.steps.events import RunStarted
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,92 +49,145 @@ class Preflight:
 
 @dataclass(frozen=True, slots=True)
 class TriedPlan:
-    """What a plan gives in lines of text, and its poses; empty where it could not be tried."""
+    """The forecast of a plan in lines of text, and its poses; empty where it could not be tried."""
 
     lines: tuple[str, ...] = ()
     poses: tuple[VisitedPose, ...] = ()
 
 
-class Workplace(Protocol):
-    """A cell, its devices, its run and its history. All raise ``HexacellError``."""
+def mode_of(what: str) -> Mode:
+    """The mode of what a person starts; a run that is resumed is checked as a calibration."""
+    return Mode.OPTIMISE if what in {RESUME, WITH_LENGTH} else Mode(what)
 
-    @property
-    def cell(self) -> Cell:
-        """Its file."""
-        ...
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a person should change in it."""
-        ...
+class ConsentGiven:
+    """An operator who has been asked on the screen already, and has consented."""
+
+    def __init__(self, by: str) -> None:
+        self._by = by
+
+    async def ask(self, question: Question) -> str | None:  # noqa: ARG002 - it was answered on the screen
+        """Who has consented."""
+        return self._by
+
+
+class Workplace:
+    """The cell at a path: its devices, its run and its history. All methods raise ``HexacellError``.
+
+    Attributes:
+        cell: the cell as its file states it now.
+        warnings: what a person should change in it.
+
+    Raises:
+        FileError: its file cannot be read, or has one mistake.
+        SeveralErrors: it has more than one.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.cell: Cell = load_cell(path)
+        settled = settle_config(*self.cell.config_paths)
+        self.warnings = (
+            *password_warnings(self.cell),
+            *exposure_warnings(self.cell),
+            *([] if settled is None else [settled]),
+        )
 
     def watch(self) -> AsyncIterator[LiveSnapshot]:
         """What the devices show while no run has them; cancelling lets them go."""
-        ...
+        return watch_devices(self.cell)
 
     async def attach(self) -> RunConnection | None:
         """The run that goes on in this cell, if one does."""
-        ...
+        return await connect_to_run(socket_path(self.cell))
 
     async def start(self, what: str) -> RunConnection:
-        """Begin a run in a process of its own: the name of a mode; or resume the latest interrupted one."""
-        ...
+        """Begin a run of a mode in a process of its own, or resume the latest interrupted one."""
+        if what == RESUME:
+            folder = run_to_resume(self.cell, LATEST)
+            started = next(iter(read_journal(folder.journal)))
+            mode = started.mode if isinstance(started, RunStarted) else Mode.OPTIMISE.value
+            more = ["--resume"]
+        else:
+            folder, mode = new_run(self.cell), mode_of(what).value
+            more = ["--length-check"] if what == WITH_LENGTH else []
+        arguments = [str(self.cell.path), "--mode", mode, "--folder", str(folder.path), *more]
+        return await start_host(socket_path(self.cell), arguments)
 
     async def check(self, what: str) -> Preflight:
-        """Look at everything that must hold before the motion of a mode; needs the devices."""
-        ...
+        """Check everything that must hold before the motion of a mode; needs the devices."""
+        found = await run_child("preflight", self.cell.path, mode_of(what).value)
+        items = tuple(ChecklistItem(**{**one, "mark": Mark(one["mark"])}) for one in found["items"])
+        return Preflight(items, bool(found["is_ready"]))
 
     async def preview(self) -> TriedPlan:
         """Carry the plan out on simulated robots."""
-        ...
+        found = await run_child("plan", self.cell.path)
+        poses = tuple((point, number, Pose(*pose)) for point, number, pose in found["poses"])
+        return TriedPlan(tuple(found["lines"]), poses)
 
     async def toggle_exclusion(self, name: str, planned: tuple[VisitedPose, ...]) -> None:
         """Write an exclusion into the cell file, or remove it."""
-        ...
+        self.cell = await asyncio.to_thread(toggle_exclusion, self.cell, name, planned)
 
     async def runs(self) -> tuple[HistoryEntry, ...]:
         """The runs of the cell, the latest first."""
-        ...
+        return history_entries(await self._past_runs())
 
     async def compare(self, run: str) -> tuple[str, ...]:
         """A run beside the one before it."""
-        ...
+        identified = [one.name for one in await self._past_runs() if one.summary.has_result]
+        earlier = identified[identified.index(run) + 1 :] if run in identified else []
+        if not earlier:
+            raise UsageError(f"no run before {run} identified a geometry", action="Choose a later one")
+        compared = await asyncio.to_thread(compare_runs, self.cell, earlier[0], run)
+        return tuple(comparison_text(*compared).splitlines())
 
     async def drift(self) -> tuple[str, ...]:
         """The drift of each parameter over all runs."""
-        ...
+        found = await asyncio.to_thread(parameter_trends, self.cell, await self._past_runs())
+        return tuple(drift_text(found).splitlines())
 
     async def is_in_controller(self, run: str) -> bool:
         """Whether the controller's config is the one that a run wrote."""
-        ...
+        return any(one.name == run and one.is_in_controller for one in await self._past_runs())
 
     async def approval(self, run: str) -> Question:
-        """What a person is asked before the open proposal of a run is written.
-
-        Raises:
-            UsageError: it has none.
-        """
-        ...
+        """The question that a person is asked before the open proposal of a run is written."""
+        if not any(one.name == run and one.summary.has_proposal for one in await self._past_runs()):
+            raise UsageError(f"{run} has no proposal that could be written", action="Choose one that has")
+        return approval_question(read_proposal(find_run(self.cell, run)))
 
     async def apply(self, run: str, by: str) -> tuple[str, ...]:
-        """Write the proposal of a run, which a person has approved; what was done.
+        """Write the proposal of a run, which a person has approved; the lines say what was done.
 
         Raises:
             ConfigEditedSince: somebody has edited the config since.
             LimitError: a gate refuses it.
         """
-        ...
+        proposal = await asyncio.to_thread(read_proposal, find_run(self.cell, run))
+        applied = await apply_proposal(proposal, ConsentGiven(by), typed_by=by)
+        return tuple(applied_text(applied).splitlines())
 
     async def roll_back(self, run: str, by: str) -> tuple[str, ...]:
-        """Put back the config that a run wrote, or of before it if the controller has it; what was done.
+        """Restore the config that a run wrote, or the previous one if the controller has it.
 
-        ``by`` is who decided on it, as the history of the config is to have it.
+        ``by`` is who decided on it, for the history of the config. The lines say what was done.
 
         Raises:
             ConfigEditedSince: somebody has edited the config since.
         """
-        ...
+        to = None if await self.is_in_controller(run) else run
+        done = await asyncio.to_thread(roll_back_config, self.cell, to, by=by)
+        return tuple(rollback_text(done).splitlines())
+
+    async def _past_runs(self) -> tuple[PastRun, ...]:
+        return await asyncio.to_thread(past_runs, self.cell)
 
     async def open_run(self, run: str) -> RunConnection:
         """A recorded run."""
-        ...
+        return await asyncio.to_thread(self._recorded_run, run)
+
+    def _recorded_run(self, run: str) -> RecordedRun:
+        folder = find_run(self.cell, run)
+        require_sound(read_journal(folder.journal), self.cell.settings, folder.journal, follows_plan=False)
+        return RecordedRun(folder)

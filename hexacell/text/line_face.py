@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from hexacell.campaign.decisions import Forecast
-from hexacell.run_process.snapshots import GaugeSnapshot, LiveSnapshot
+from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot
 from hexacell.text.layout import duration, wrapped
-from procedures.engine.command_loop import Status
 from procedures.run.state import RunState
 from procedures.steps import events
 
@@ -22,12 +21,10 @@ def run_status_text(
     expected: int,
     last: events.RecordTaken | None,
     forecast: Forecast | None,
-    status: Status | None = None,
 ) -> str:
     """Where a run is: what it does, how far it is, its last record, its accuracy and the time left."""
-    now = " ".join(filter(None, (doing or "connecting", f"({status.value})" if status else "")))
     lines = [
-        f"Now: {now}",
+        f"Now: {doing or 'connecting'}",
         f"Done: {state.completed} of {max(expected, state.completed)} records and closings of points",
         *([] if last is None else [f"Last record: {record_text(last)}"]),
         *([] if forecast is None else [_forecast_text(forecast)]),

@@ -18,9 +18,8 @@ import pytest
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.run_process.client import HostConnection, connect_to_run, start_host
-from hexacell.run_process.messages import EventRecorded, HostMessage
+from hexacell.run_process.messages import EventRecorded, HostMessage, LiveSnapshot
 from hexacell.run_process.run_socket import socket_path
-from hexacell.run_process.snapshots import LiveSnapshot
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.journal.journal import read_entries
 from procedures.steps import events

@@ -109,4 +109,4 @@ def test_a_warning_of_numpy_reaches_no_user(monkeypatch, capsys):
 )
 def test_an_argument_that_can_name_no_file_is_refused(capsys, command, argument):
     assert app.main([*command, argument]) == 2
-    assert "can be the name of no file" in capsys.readouterr().err
+    assert "is not a valid file name" in capsys.readouterr().err

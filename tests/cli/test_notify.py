@@ -71,7 +71,7 @@ def test_it_changes_nothing_if_telling_has_a_fault(typed_here, quick_cell, monke
     def fail(*_: object) -> None:
         raise RuntimeError(TOKEN)
 
-    monkeypatch.setattr("hexacell.cli.told_afterwards.notify_all", fail)
+    monkeypatch.setattr("hexacell.cli.unattended.notify_all", fail)
     tell(quick_cell, "hall", "http://127.0.0.1:1/")
     with cell_lock(quick_cell.controller):
         outcome = typed_here("run", quick_cell.cell, *CHECK)
@@ -153,7 +153,7 @@ def test_a_stop_signal_while_it_is_told_leaves_the_exit_code(typed_here, quick_c
     def stopped(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hexacell.cli.told_afterwards.notify_all", stopped)
+    monkeypatch.setattr("hexacell.cli.unattended.notify_all", stopped)
     tell(quick_cell, "hall", "http://127.0.0.1:1/")
     with cell_lock(quick_cell.controller):
         outcome = typed_here("run", quick_cell.cell, *CHECK)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from hexacell.cli.console import Console
-from hexacell.cli.signal_commands import ENDING_SIGNALS, SignalCommands
+from hexacell.cli.terminal import ENDING_SIGNALS, SignalCommands
 from hexacell.errors import Interruption
 from procedures.engine.commands import Abort, Command, Stop
 from procedures.run.cancellation import shielded

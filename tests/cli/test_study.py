@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.cli.arguments import studies
+from hexacell.cli.arguments import runs as studies
 from hexacell.errors import ExitCode
 from hexacell.text.studies import STUDIES
 

@@ -19,7 +19,7 @@ def test_without_a_terminal_it_is_a_usage_error(tmp_path: Path) -> None:
         command, cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
     )
     assert ended.returncode == 2
-    problem, action = "the screen needs a terminal, and this is none", "Use `hexacell run`"
+    problem, action = "the screen needs a terminal", "Use `hexacell run`"
     assert ended.stderr == f"hexacell: {problem}. {action}, which asks line by line\n"
 
 

@@ -16,9 +16,9 @@ from textual.pilot import Pilot
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.screen.app import TechnicianApp
-from hexacell.screen.key_map import ScreenPreferences
-from hexacell.screen.session import ScreenSession
-from hexacell.screen.widgets.text_panel import TextList
+from hexacell.screen.model import ScreenModel
+from hexacell.screen.preferences import ScreenPreferences
+from hexacell.screen.widgets import TextList
 from procedures.steps.events import Event
 from tests.screen.drawing import is_all_drawn
 from tests.screen.told_run import ToldWorkplace
@@ -63,9 +63,9 @@ def opened() -> Opened:
         size: tuple[int, int] = (80, 24),
         preferences: ScreenPreferences | None = None,
     ) -> AsyncIterator[Pilot[int]]:
-        app = TechnicianApp(lambda: ScreenSession(workplace, lambda: 0.0), preferences)
+        app = TechnicianApp(lambda: ScreenModel(workplace, lambda: 0.0), preferences)
         async with app.run_test(size=size) as pilot:
-            await until(lambda: app.backend is not None)
+            await until(lambda: app.model is not None)
             await settled(pilot)
             yield pilot
 

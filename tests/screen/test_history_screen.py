@@ -14,12 +14,11 @@ from textual.pilot import Pilot
 from hexacell.cell.loader import Cell
 from hexacell.config.write_back import commit
 from hexacell.errors import FileError
-from hexacell.run_process.snapshots import LiveSnapshot
+from hexacell.run_process.messages import LiveSnapshot
 from hexacell.screen.app import TechnicianApp
-from hexacell.screen.cell_workplace import CellWorkplace
-from hexacell.screen.overlays.confirm_overlay import ConfirmOverlay
-from hexacell.screen.overlays.fault_overlay import FaultOverlay
-from hexacell.screen.session import ScreenSession
+from hexacell.screen.model import ScreenModel
+from hexacell.screen.overlays import ConfirmOverlay, FaultOverlay
+from hexacell.screen.workplace import Workplace
 from hexacell.services.write_back.config_history import config_history
 from hexacell.text.config_changes import RELOAD
 from hexacell.text.screens.questions import PERSON
@@ -31,7 +30,7 @@ from tests.screen.test_job import press, shown, until_shown
 from tests.waiting import until
 
 
-class WithoutDevices(CellWorkplace):
+class WithoutDevices(Workplace):
     """The cell itself; its devices are not there."""
 
     async def watch(self) -> AsyncIterator[LiveSnapshot]:
@@ -57,11 +56,11 @@ def runs(cell: Cell) -> list[ProposedRun]:
 
 @asynccontextmanager
 async def opened_history(cell: Cell) -> AsyncIterator[Pilot[int]]:
-    app = TechnicianApp(lambda: ScreenSession(WithoutDevices(cell.path)))
+    app = TechnicianApp(lambda: ScreenModel(WithoutDevices(cell.path)))
     async with app.run_test(size=(100, 30)) as pilot:
-        await until(lambda: app.backend is not None)
+        await until(lambda: app.model is not None)
         await press(pilot, "5")
-        await until(lambda: app.backend is not None and bool(app.backend.history().entries))
+        await until(lambda: app.model is not None and bool(app.model.history().entries))
         await settled(pilot)
         yield pilot
 
@@ -122,9 +121,9 @@ async def test_a_history_that_cannot_be_read_says_why_and_the_devices_stay(
     cell: Cell, runs: list[ProposedRun]
 ) -> None:
     cell.config_path.unlink()
-    app = TechnicianApp(lambda: ScreenSession(WithoutDevices(cell.path)))
+    app = TechnicianApp(lambda: ScreenModel(WithoutDevices(cell.path)))
     async with app.run_test(size=(100, 30)) as pilot:
-        await until(lambda: app.backend is not None)
+        await until(lambda: app.model is not None)
         await press(pilot, "5")
         await until_shown(pilot, "cannot be read")
         assert not isinstance(app.screen, FaultOverlay)
@@ -158,8 +157,8 @@ def left(cell: Cell) -> ProposedRun:
 def latest_line(pilot: Pilot[int]) -> str:
     app = pilot.app
     assert isinstance(app, TechnicianApp)
-    assert app.backend is not None
-    return app.backend.history().entries[0].line
+    assert app.model is not None
+    return app.model.history().entries[0].line
 
 
 async def until_asked(pilot: Pilot[int]) -> None:
@@ -260,5 +259,5 @@ async def test_a_forged_run_is_not_opened(cell: Cell, runs: list[ProposedRun]) -
     del record["crc"]
     journal.write_bytes(with_checksum(record) + b"".join(others))
     with pytest.raises(FileError, match="a geometry has other parameters"):
-        await CellWorkplace(cell.path).open_run(runs[1].folder.path.name)
-    await CellWorkplace(cell.path).open_run(runs[0].folder.path.name)
+        await Workplace(cell.path).open_run(runs[1].folder.path.name)
+    await Workplace(cell.path).open_run(runs[0].folder.path.name)

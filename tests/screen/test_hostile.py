@@ -12,10 +12,9 @@ from textual.widgets import Input
 
 from hexacell.cell.loader import Cell
 from hexacell.screen.app import FirstCell, TechnicianApp
-from hexacell.screen.assistant import FirstCellAssistant
-from hexacell.screen.assistant_screen import AssistantScreen
-from hexacell.screen.overlays.question_overlay import QuestionOverlay
-from hexacell.screen.overlays.quit_overlay import QuitOverlay
+from hexacell.screen.further_screens import AssistantScreen
+from hexacell.screen.overlays import QuestionOverlay, QuitOverlay
+from hexacell.text.screens.first_questions import FirstCellAssistant
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.run.questions import ask_approval
 from procedures.steps import events

@@ -13,9 +13,8 @@ from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import ControlChanged, HostFailed, StatusChanged
 from hexacell.screen.app import TechnicianApp
-from hexacell.screen.overlays.fault_overlay import FaultOverlay
-from hexacell.screen.overlays.question_overlay import QuestionOverlay
-from hexacell.screen.widgets.text_panel import TextList, TextPanel
+from hexacell.screen.overlays import FaultOverlay, QuestionOverlay
+from hexacell.screen.widgets import TextList, TextPanel
 from hexacell.screen.workplace import Preflight
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
 from hexacell.verdict.acceptance_gates import AcceptanceGate
@@ -373,11 +372,11 @@ async def test_a_run_that_is_over_is_in_the_history(cell: Cell, run: ToldRun, op
     async with opened(workplace) as pilot:
         app = pilot.app
         assert isinstance(app, TechnicianApp)
-        assert app.backend is not None
+        assert app.model is not None
         workplace.entries = (HistoryEntry("2026-03-02T080000Z", "it passed"),)
         run.tell(StatusChanged(status=Status.ENDED))
         run.end()
-        backend = app.backend
+        backend = app.model
         await until(lambda: backend.history().entries == workplace.entries)
 
 

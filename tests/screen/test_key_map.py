@@ -8,7 +8,7 @@ import pytest
 
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError
-from hexacell.screen.key_map import KEYS, ScreenPreferences, preferences_path, read_preferences
+from hexacell.screen.preferences import KEYS, ScreenPreferences, preferences_path, read_preferences
 from procedures.engine.commands import Pause
 from procedures.steps.events import Event
 from tests.screen.conftest import Opened, settled

@@ -11,9 +11,9 @@ from textual.events import Key
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.kinematics.pose import Pose
-from hexacell.screen.overlays.fault_overlay import FaultOverlay
-from hexacell.screen.plan_screen import PlanScreen
-from hexacell.screen.widgets.row_list import RowList
+from hexacell.screen.further_screens import PlanScreen
+from hexacell.screen.overlays import FaultOverlay
+from hexacell.screen.widgets import RowList
 from hexacell.screen.workplace import TriedPlan
 from hexacell.services.preflight.exclusions import toggle_exclusion
 from tests.screen.conftest import Opened

@@ -14,10 +14,10 @@ from hexacell.cell.loader import Cell
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import StatusChanged
 from hexacell.screen.app import FirstCell, TechnicianApp
-from hexacell.screen.assistant import FirstCellAssistant
-from hexacell.screen.assistant_screen import AssistantScreen
-from hexacell.screen.key_map import THEMES
+from hexacell.screen.further_screens import AssistantScreen
+from hexacell.screen.preferences import THEMES
 from hexacell.screen.workplace import Preflight, TriedPlan
+from hexacell.text.screens.first_questions import FirstCellAssistant
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.command_loop import Status

@@ -10,23 +10,21 @@ from pathlib import Path
 
 from hexacell.cell.loader import Cell
 from hexacell.dry_run.campaign import VisitedPose
-from hexacell.run_process.connection import RunConnection
+from hexacell.run_process.client import RunConnection
 from hexacell.run_process.messages import (
     ControlChanged,
+    ControllerSnapshot,
+    EncoderSnapshot,
     EventRecorded,
+    GaugeSnapshot,
     HostMessage,
+    LiveSnapshot,
     QuestionClosed,
     QuestionOpened,
     RunDescribed,
     StatusChanged,
 )
-from hexacell.run_process.snapshots import (
-    ControllerSnapshot,
-    EncoderSnapshot,
-    GaugeSnapshot,
-    LiveSnapshot,
-)
-from hexacell.screen.workplace import Preflight, TriedPlan
+from hexacell.screen.workplace import Preflight, TriedPlan, Workplace
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command
@@ -133,7 +131,7 @@ class ToldRun:
 
 
 @dataclass
-class ToldWorkplace:
+class ToldWorkplace(Workplace):
     """A workplace without devices and processes."""
 
     cell: Cell

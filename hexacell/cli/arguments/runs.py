@@ -1,11 +1,21 @@
-"""Arguments of the commands that measure, or show a run."""
+"""Arguments of the commands that measure, show a run, or work on records, and of the studies."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from hexacell.cli.arguments.commands import add_cell, add_command, add_file, add_json, add_resume
+from hexacell.cli.arguments.commands import (
+    add_cell,
+    add_command,
+    add_file,
+    add_json,
+    add_parser,
+    add_resume,
+    add_run,
+    not_negative,
+    positive,
+)
 
 
 def add_run_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
@@ -115,3 +125,124 @@ def _host(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument("--mode", choices=("check", "quick", "optimise", "length"), required=True)
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--length-check", action="store_true")
+
+
+def add_record_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
+    """Add those to the commands of a parser."""
+    _next(commands)
+    _fit(commands)
+    _replay(commands)
+
+
+def _next(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "next", "print the pose worth measuring next", "records.propose_next")
+    add_cell(parser)
+    add_file(parser, "--measurements", "the records so far (CSV)", is_required=True)
+    parser.add_argument(
+        "--refused",
+        type=not_negative,
+        default=0,
+        metavar="N",
+        help="how many poses at this point could not be measured; proposes another",
+    )
+    add_json(parser)
+
+
+def _fit(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "fit", "identify the geometry from a measurement file", "records.fit")
+    add_cell(parser)
+    add_file(parser, "--measurements", "the records (CSV)", is_required=True)
+    parser.add_argument(
+        "--identify",
+        choices=("all", "zeros"),
+        help="all parameters, or the encoders' zeros alone (default: as the cell file says)",
+    )
+    add_json(parser)
+
+
+def _replay(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "replay", "repeat a recorded run's decisions and results, and compare")
+    add_run(parser, "a run folder, or a journal")
+    parser.add_argument(
+        "--only",
+        choices=("decisions", "results", "identification"),
+        help="repeat only these, and take everything else as recorded",
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="T",
+        help="allowed difference of a number, relative above 1 (default: 1e-9)",
+    )
+    parser.add_argument(
+        "--export",
+        type=Path,
+        metavar="FOLDER",
+        help="replay nothing; copy the run folder there with every password masked, to be given to others",
+    )
+    add_json(parser)
+
+
+class _StudyArguments(NamedTuple):
+    name: str
+    summary: str
+    draws: int
+    drawn: str
+
+
+STUDIES = (
+    _StudyArguments(
+        "paper",
+        "figures 4 and 5 and table 2 of Abtahi et al. (2010)",
+        20,
+        "of orientations and noise, for each case",
+    ),
+    _StudyArguments(
+        "experiment",
+        "its experiment, figures 8 and 9, by the robot's repeatability",
+        20,
+        "of orientations and noise, for each case",
+    ),
+    _StudyArguments(
+        "design",
+        "accuracy by records, choice of orientations, travel, tilt, noise and points",
+        20,
+        "robots, each measured in every way",
+    ),
+)
+"""Each a row of ``hexacell.text.studies``, which would take long to import here."""
+
+
+def add_study_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
+    """Add them to the commands of a parser."""
+    parser = add_parser(commands, "study", "repeat what was published of the method, on simulated robots")
+    studies = parser.add_subparsers(title="studies", metavar="STUDY", required=True)
+    for study in STUDIES:
+        _add_study(studies, study)
+
+
+def _add_study(studies: Any, study: _StudyArguments) -> None:  # noqa: ANN401
+    parser = add_command(studies, study.name, study.summary, target="study.main")
+    parser.set_defaults(study=study.name)
+    parser.add_argument(
+        "--draws",
+        type=positive,
+        default=study.draws,
+        metavar="N",
+        help=f"{study.drawn} (default: %(default)s)",
+    )
+    workers = parser.add_mutually_exclusive_group()
+    workers.add_argument(
+        "--processes", type=positive, metavar="N", help="at a time (default: one for each processor)"
+    )
+    workers.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT, instead of processes"
+    )
+    parser.add_argument(
+        "--folder",
+        type=Path,
+        default=Path("hexacell-study"),
+        help="keeps each result, so that a study can be interrupted, and gets a picture "
+        "(default: %(default)s)",
+    )
+    add_json(parser)

@@ -13,7 +13,6 @@ from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import is_interactive
 from hexacell.errors import AnswerNeeded, ExitCode, FileError, UsageError
-from hexacell.screen.assistant import FirstCellAssistant
 from hexacell.services.devices.device_diagnosis import diagnose
 from hexacell.services.devices.device_search import SearchFindings, SearchRequest, draft_of, search_devices
 from hexacell.storage.atomic_files import require_creatable
@@ -25,6 +24,7 @@ from hexacell.text.found_devices import (
     search_lines,
 )
 from hexacell.text.layout import wrapped
+from hexacell.text.screens.first_questions import FirstCellAssistant
 
 TCP_PORTS = 1 << 16
 

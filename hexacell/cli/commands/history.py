@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 
 from hexacell.cell.loader import Cell
-from hexacell.cli.archive_argument import archive_url
-from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.cell_argument import archive_url, cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.runs.run_folder import RunFolder, find_run

@@ -15,7 +15,7 @@ from socket import socket
 
 from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
-from hexacell.cli.signal_commands import SignalCommands
+from hexacell.cli.terminal import SignalCommands
 from hexacell.errors import ExitCode, HexacellError
 from hexacell.run_process.client import READY
 from hexacell.run_process.host import RemoteOperator, RunHost, failure_message

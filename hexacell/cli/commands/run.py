@@ -12,15 +12,11 @@ from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.cli.cell_argument import cell_with_devices_at
 from hexacell.cli.console import Console
-from hexacell.cli.progress import RunProgress
-from hexacell.cli.run_status import RunStatus
-from hexacell.cli.signal_commands import SignalCommands
-from hexacell.cli.telling import Telling
-from hexacell.cli.terminal import KeyboardCommands, TerminalOperator, is_interactive
-from hexacell.cli.told_afterwards import told_afterwards
-from hexacell.cli.unattended_start import begun_in_window
+from hexacell.cli.progress import RunAnswers, RunProgress
+from hexacell.cli.terminal import KeyboardCommands, SignalCommands, TerminalOperator, is_interactive
+from hexacell.cli.unattended import begun_in_window, notified_afterwards
 from hexacell.errors import ExitCode, HexacellError, UsageError
-from hexacell.run_process.run_device_watch import RunDeviceWatch
+from hexacell.run_process.live_devices import RunDeviceWatch
 from hexacell.runs.run_folder import new_run
 from hexacell.services.notify.notice import RunEnd
 from hexacell.services.recorded.resumption import run_to_resume
@@ -118,7 +114,7 @@ def _run_to_end(request: RunRequest, console: Console, stream: EventStream | Non
     factor = request.cell.settings.timing.clock_factor
     if factor != 1.0:
         console.print(clock_notice(factor))
-    with told_afterwards(request, console) as news:
+    with notified_afterwards(request, console) as news:
         news.end = end = _run_and_repeat(request, console, stream)
     console.document(run_document(end.request, end.ended, end.state))
     for line in closing_lines(end.request, end.ended):
@@ -184,14 +180,14 @@ async def _calibrate(
     if not isinstance(request.operator, TerminalOperator):
         with ended_in_time(request, queue):
             return await calibrate(request, [*further, progress], queue)
-    watching, status = RunDeviceWatch(request.cell.settings.gauges), RunStatus(progress.expected)
-    telling = Telling(console, watching)
-    tell = {"g": telling.gauges, "s": lambda: console.print(status.text())}
-    keys = KeyboardCommands(console, queue.put, sys.stdin, tell)
+    watching = RunDeviceWatch(request.cell.settings.gauges)
+    answers = RunAnswers(console, watching, progress.expected)
+    letters = {"g": answers.print_gauges, "s": answers.print_status}
+    keys = KeyboardCommands(console, queue.put, sys.stdin, letters)
     request.operator.before_question, request.operator.after_question = progress.hide, keys.listen
     request.operator.type_command = keys.take
     console.print(LETTERS)
-    listeners: list[Listener] = [*further, progress, keys, status, watching.note]
+    listeners: list[Listener] = [*further, progress, keys, answers, watching.note]
     run = calibrate(request, listeners, queue, watching.live, watching.follow)
-    async with telling:
+    async with answers:
         return await keys.listen_during(run)

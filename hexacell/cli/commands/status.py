@@ -7,11 +7,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hexacell.cell.loader import is_cell_file
-from hexacell.cli.archive_argument import archive_url, publish_or_warn
-from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.cell_argument import archive_url, cell_at
 from hexacell.cli.console import Console
-from hexacell.errors import ExitCode, HexacellError, UsageError
-from hexacell.services.history.cell_status import CellStatus, UnreadableCell, cell_status, fleet_cells
+from hexacell.errors import ExitCode, FileError, HexacellError, UsageError
+from hexacell.services.history.cell_status import (
+    CellStatus,
+    UnreadableCell,
+    cell_status,
+    fleet_cells,
+    publish_status,
+)
 from hexacell.storage.atomic_files import write_atomically
 from hexacell.text.cells import fleet_document, fleet_text, metrics_text, status_document, status_text
 
@@ -25,7 +30,10 @@ def main(options: argparse.Namespace) -> ExitCode:
         raise UsageError("--archive is for all of its cells", action="Name no cell, or leave it away")
     found, unreadable = _all(options.cells, console)
     for one in found:
-        publish_or_warn(one, console)
+        try:
+            publish_status(one)
+        except FileError as error:
+            console.warn(" ".join(str(error).split()))
     if options.metrics is not None:
         write_atomically(options.metrics, metrics_text(found).encode(), for_everybody=True)
     console.document(status_document(found, unreadable))

@@ -5,19 +5,20 @@ from __future__ import annotations
 import argparse
 import gc
 import os
+import select
 import sys
+import threading
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hexacell.errors import ExitCode, UsageError
 from hexacell.screen.app import FirstCell, TechnicianApp
-from hexacell.screen.key_map import preferences_path, read_preferences
-from hexacell.screen.terminal_watch import end_with_terminal
+from hexacell.screen.preferences import preferences_path, read_preferences
 
 if TYPE_CHECKING:
-    from hexacell.screen.assistant_screen import Assistant
-    from hexacell.screen.backend import Backend
+    from hexacell.screen.model import ScreenModel
+    from hexacell.text.screens.first_questions import FirstCellAssistant
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -31,7 +32,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     end_with_terminal(sys.stdin.fileno())
     path: Path = options.cell
     first = None if path.exists() else FirstCell(path, partial(_assistant, path))
-    app = TechnicianApp(partial(_session, path), read_preferences(preferences_path()), first_cell=first)
+    app = TechnicianApp(partial(_model, path), read_preferences(preferences_path()), first_cell=first)
     app.run()
     if app.return_code:
         return ExitCode.FAULT  # Textual has said why
@@ -44,22 +45,38 @@ def _require_terminal() -> None:
     """Refuse what Textual would draw on all the same; raises ``UsageError``."""
     action = "Use `hexacell run`, which asks line by line"
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise UsageError("the screen needs a terminal, and this is none", action=action)
+        raise UsageError("the screen needs a terminal", action=action)
     if os.environ.get("TERM") == "dumb":
         raise UsageError("this terminal cannot draw a screen (TERM is dumb)", action=action)
 
 
-def _assistant(path: Path) -> Assistant:
-    from hexacell.screen.assistant import FirstCellAssistant  # noqa: PLC0415 - behind the first screen
+def _assistant(path: Path) -> FirstCellAssistant:
+    from hexacell.text.screens.first_questions import FirstCellAssistant  # noqa: PLC0415 - loaded late
 
     return FirstCellAssistant(path)
 
 
-def _session(path: Path) -> Backend:
+def _model(path: Path) -> ScreenModel:
     """Loaded behind the first screen: numpy and scipy take a second."""
-    from hexacell.screen.cell_workplace import CellWorkplace  # noqa: PLC0415
-    from hexacell.screen.session import ScreenSession  # noqa: PLC0415
+    from hexacell.screen.model import ScreenModel  # noqa: PLC0415
+    from hexacell.screen.workplace import Workplace  # noqa: PLC0415
 
-    session = ScreenSession(CellWorkplace(path))
+    model = ScreenModel(Workplace(path))
     gc.freeze()  # what is loaded stays: to look through it for garbage would keep a key waiting for 0.1 s
-    return session
+    return model
+
+
+def end_with_terminal(terminal: int) -> None:
+    """End this process as soon as a terminal is gone, whether or not a signal says so.
+
+    What is drawn then can be written nowhere: Textual's queue of it fills, and the process would wait for
+    ever. Its run notices that nobody is there, and pauses.
+    """
+    threading.Thread(target=_wait_and_end, args=(terminal,), daemon=True).start()
+
+
+def _wait_and_end(terminal: int) -> None:
+    waiting = select.poll()
+    waiting.register(terminal, 0)  # a hang-up is reported even where nothing is asked for
+    waiting.poll()
+    os._exit(int(ExitCode.INTERRUPTED))

@@ -1,4 +1,4 @@
-"""Views as lines of fixed width. Only the standard library is imported."""
+"""Views as lines of fixed width, and figures large enough to be read across a room."""
 
 from __future__ import annotations
 
@@ -13,6 +13,29 @@ from hexacell.text.screens.views import (
 
 NEVER = "never"
 """The age of what has not answered yet."""
+
+ROWS = 5
+"""Height of a figure in rows, at scale 1."""
+
+_SHAPES = {
+    "0": ("###", "# #", "# #", "# #", "###"),
+    "1": (" # ", "## ", " # ", " # ", "###"),
+    "2": ("###", "  #", "###", "#  ", "###"),
+    "3": ("###", "  #", "###", "  #", "###"),
+    "4": ("# #", "# #", "###", "  #", "  #"),
+    "5": ("###", "#  ", "###", "  #", "###"),
+    "6": ("###", "#  ", "###", "# #", "###"),
+    "7": ("###", "  #", "  #", "  #", "  #"),
+    "8": ("###", "# #", "###", "# #", "###"),
+    "9": ("###", "# #", "###", "  #", "###"),
+    "+": ("   ", " # ", "###", " # ", "   "),
+    "-": ("   ", "   ", "###", "   ", "   "),
+    ".": (" ", " ", " ", " ", "#"),
+    "x": ("   ", "# #", " # ", "# #", "   "),
+    "y": ("   ", "# #", "###", "  #", "## "),
+    "z": ("   ", "###", " # ", "#  ", "###"),
+    " ": (" ", " ", " ", " ", " "),
+}
 
 
 def device_lines(live: LiveView, *, for_mounting: bool = False) -> list[tuple[str, Urgency]]:
@@ -47,3 +70,14 @@ def checklist_lines(item: ChecklistItem) -> list[str]:
     finding = f": {item.finding}" if item.finding else ""
     lines = [f"{item.mark}  {item.name}{finding}"]
     return [*lines, f"    -> {item.action}"] if item.action and item.mark is Mark.FAILED else lines
+
+
+def block_text(text: str, scale: int = 1) -> list[str]:
+    """A short text of figures, signs and axes in lines of blocks; anything else is left blank.
+
+    A point of a figure is ``2 * scale`` columns wide and ``scale`` rows high.
+    """
+    shapes = [_SHAPES.get(letter, _SHAPES[" "]) for letter in text]
+    rows = [" ".join(shape[row] for shape in shapes) for row in range(ROWS)]
+    wide = ["".join(("█" if cell == "#" else " ") * 2 * scale for cell in row).rstrip() for row in rows]
+    return [row for row in wide for _ in range(scale)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hexacell.errors import HexacellError, flatten_errors
-from hexacell.run_process.snapshots import (
+from hexacell.run_process.messages import (
     ControllerSnapshot,
     EncoderSnapshot,
     GaugeSnapshot,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hexacell.run_process.snapshots import LiveSnapshot
+from hexacell.run_process.messages import LiveSnapshot
 from hexacell.text.screens.views import Choice, QuestionView, Urgency
 from hexacell.text.verdict import teaching_sentence
 from hexacell.verdict.acceptance_gates import AcceptanceGate

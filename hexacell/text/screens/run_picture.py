@@ -13,12 +13,12 @@ from hexacell.run_process.messages import (
     EventRecorded,
     HostFailed,
     HostMessage,
+    LiveSnapshot,
     QuestionClosed,
     QuestionOpened,
     RunDescribed,
     StatusChanged,
 )
-from hexacell.run_process.snapshots import LiveSnapshot
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import Question

@@ -12,12 +12,13 @@ from hexacell.errors import FileError
 from hexacell.run_process.client import LOST, connect_to_run
 from hexacell.run_process.messages import (
     ControlChanged,
+    GaugeSnapshot,
     GiveCommand,
     HostFailed,
+    LiveSnapshot,
     StatusChanged,
     message_line,
 )
-from hexacell.run_process.snapshots import GaugeSnapshot, LiveSnapshot
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import MeasureAgain, Pause, Resume, Undo
 from procedures.run.keys import Phase, SetKey
@@ -70,7 +71,7 @@ async def test_all_are_told_everything(scripted_run) -> None:
         clients = [await run.client() for _ in range(3)]
         for client in clients:
             await client.until(lambda one: isinstance(one, ControlChanged))
-        run.audience.tell(StatusChanged(status=Status.RUNNING))
+        run.audience.send(StatusChanged(status=Status.RUNNING))
         for client in clients:
             await client.until(lambda one: one == StatusChanged(status=Status.RUNNING))
 
@@ -137,10 +138,10 @@ async def test_a_slow_client_misses_snapshots_and_no_events(scripted_run) -> Non
         await client.until_control(is_in_control=True)
         statuses = [Status.RUNNING, Status.PAUSED] * 10
         for number in range(1000):
-            run.audience.tell_latest(numbered(number))
-            run.audience.tell(BULKY)
+            run.audience.send_latest(numbered(number))
+            run.audience.send(BULKY)
             if number % 50 == 0:
-                run.audience.tell(StatusChanged(status=statuses[number // 50]))
+                run.audience.send(StatusChanged(status=statuses[number // 50]))
             await asyncio.sleep(0)
         await client.until(lambda one: one == numbered(999))
         told = client.told
@@ -157,7 +158,7 @@ async def test_a_stuck_client_is_let_go_and_delays_nobody(scripted_run, path) ->
         await asyncio.get_running_loop().run_in_executor(None, stuck.connect, str(path))
         await until(lambda: run.audience.is_controlled)
         while run.audience.is_controlled:
-            run.audience.tell(BULKY)
+            run.audience.send(BULKY)
             await asyncio.sleep(0)
         assert [await run.calls.get() for _ in range(2)] == ["control", "lost"]
         stuck.close()
@@ -170,7 +171,7 @@ async def test_what_waits_is_told_before_the_end(scripted_run) -> None:
         client = await run.client()
         await client.until_control(is_in_control=True)
         for _ in range(100):
-            run.audience.tell(BULKY)
+            run.audience.send(BULKY)
         ending = asyncio.ensure_future(run.audience.dismiss())
         assert (await client.until_over()).count(BULKY) == 100
         await ending

@@ -18,13 +18,13 @@ from hexacell.run_process.messages import (
     EventRecorded,
     HostFailed,
     HostMessage,
+    LiveSnapshot,
     QuestionClosed,
     QuestionOpened,
     RunDescribed,
     StatusChanged,
 )
 from hexacell.run_process.run_socket import listening_socket
-from hexacell.run_process.snapshots import LiveSnapshot
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.run.calibration_run import RunRequest
 from procedures.calibration.calibration import Mode

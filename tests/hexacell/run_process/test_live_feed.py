@@ -7,7 +7,7 @@ import pytest
 from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
-from hexacell.run_process.live_feed import NOISE_READINGS, LiveFeed
+from hexacell.run_process.live_devices import NOISE_READINGS, LiveFeed
 from procedures.devices.live_values import LiveValues
 from tests.procedures.fakes import ManualClock
 

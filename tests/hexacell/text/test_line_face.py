@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from hexacell.campaign.decisions import Forecast
-from hexacell.run_process.snapshots import EncoderSnapshot, GaugeSnapshot, LiveSnapshot
+from hexacell.run_process.messages import EncoderSnapshot, GaugeSnapshot, LiveSnapshot
 from hexacell.text.line_face import gauges_text, record_text, run_status_text
-from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
 from procedures.steps import events
@@ -22,9 +21,9 @@ def test_a_record_in_a_line() -> None:
 
 def test_where_the_run_is() -> None:
     assert isinstance(RECORD, events.RecordTaken)
-    text = run_status_text("point 2, orientation 4", RunState(), 61, RECORD, FORECAST, Status.PAUSED)
+    text = run_status_text("point 2, orientation 4", RunState(), 61, RECORD, FORECAST)
     assert text.splitlines() == [
-        "Now: point 2, orientation 4 (paused)",
+        "Now: point 2, orientation 4",
         "Done: 0 of 61 records and closings of points",
         "Last record: point 2, orientation 3: x +0.123, y -0.500, z +2.000 mm",
         "Predicted error at the task: 0.311 mm now, 0.063 at the end, 12 minutes left",

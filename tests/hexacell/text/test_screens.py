@@ -12,17 +12,19 @@ from hexacell.checks.check_result import CheckResult, ParameterChange
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import (
     ControlChanged,
+    ControllerSnapshot,
+    EncoderSnapshot,
     EventRecorded,
+    GaugeSnapshot,
     HostFailed,
     HostMessage,
+    LiveSnapshot,
     QuestionOpened,
     RunDescribed,
     StatusChanged,
 )
-from hexacell.run_process.snapshots import ControllerSnapshot, EncoderSnapshot, GaugeSnapshot, LiveSnapshot
 from hexacell.text.parameters import parameter_table, rows_of_run
-from hexacell.text.screens.block_digits import block_text
-from hexacell.text.screens.lines import device_lines
+from hexacell.text.screens.lines import block_text, device_lines
 from hexacell.text.screens.live import live_view, mounting_advice, travel_bar
 from hexacell.text.screens.measuring import fault_view, guidance, record_lines
 from hexacell.text.screens.questions import question_view

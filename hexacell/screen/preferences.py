@@ -1,4 +1,4 @@
-"""The keys of the screens, and the file in which a person may choose others."""
+"""The keys and the colours of the screens, and the file in which a person may choose others."""
 
 from __future__ import annotations
 
@@ -6,11 +6,92 @@ import os
 import tomllib
 from collections import Counter
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 
 from textual.binding import Binding
+from textual.theme import Theme
 
 from hexacell.errors import FileError, did_you_mean
+
+SCREEN_THEMES = (
+    Theme(
+        name="dark",
+        primary="#7aa2f7",
+        secondary="#9ece6a",
+        accent="#e0af68",
+        warning="#e0af68",
+        error="#f7768e",
+        success="#9ece6a",
+        foreground="#d5daf0",
+        background="#16181f",
+        surface="#1d2029",
+        panel="#272b37",
+        dark=True,
+    ),
+    Theme(
+        name="light",
+        primary="#1f4fa3",
+        secondary="#2f6b1d",
+        accent="#8a5300",
+        warning="#8a5300",
+        error="#b00020",
+        success="#2f6b1d",
+        foreground="#14161a",
+        background="#ffffff",
+        surface="#f4f5f7",
+        panel="#e3e6eb",
+        dark=False,
+    ),
+    Theme(
+        name="monochrome",
+        primary="#ffffff",
+        secondary="#ffffff",
+        accent="#ffffff",
+        warning="#ffffff",
+        error="#ffffff",
+        success="#ffffff",
+        foreground="#e0e0e0",
+        background="#000000",
+        surface="#000000",
+        panel="#303030",
+        dark=True,
+    ),
+)
+
+
+RESUME = "resume"
+"""In the place of a mode: go on with the latest run that was interrupted."""
+
+WITH_LENGTH = "optimise with length check"
+"""In the place of a mode: a calibration which checks the length scale before its verdict."""
+
+
+ONCE = "once"
+"""The plan is not tried again where it was, or is being tried."""
+
+
+class ScreenAction(StrEnum):
+    """What a person may ask for with one key."""
+
+    PAUSE = "pause"
+    PAUSE_AT_ONCE = "pause at once"
+    UNDO = "undo"
+    MEASURE_AGAIN = "measure again"
+    ABORT = "abort"
+    TAKE_CONTROL = "take control"
+    CHECK = "check"
+    START = "start"
+    PREVIEW = "preview"
+    EXCLUDE = "exclude"
+    COMPARE = "compare"
+    ROLL_BACK = "roll back"
+    APPLY = "apply"
+    OPEN = "open"
+    DRIFT = "drift"
+    STEP = "step"
+    PLAY = "play"
+
 
 KEYS = (
     Binding("1", "show('cell')", "Cell", id="cell", show=False),

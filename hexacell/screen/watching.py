@@ -1,13 +1,14 @@
-"""Follows one run at a time: folds what its host says, and passes commands on."""
+"""What a screen follows: one run at a time, and the devices while no run has them."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 
 from hexacell.errors import HexacellError, UsageError
-from hexacell.run_process.connection import RunConnection
-from hexacell.run_process.messages import HostFailed, HostMessage, StatusChanged
+from hexacell.run_process.client import RunConnection
+from hexacell.run_process.messages import HostFailed, HostMessage, LiveSnapshot, StatusChanged
 from hexacell.text.screens.run_picture import RunPicture, picture_after
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command
@@ -22,17 +23,21 @@ FEW_MESSAGES = 50
 """After so many at once, as on attaching, the screen is drawn before the next."""
 
 
+AGAIN_AFTER_S = 3.0
+"""Devices that could not be opened are tried again."""
+
+
 class RunFollower:
     """A run as a screen sees it.
 
     Args:
-        now: seconds, for the age of values.
-        on_end: called when a run has told everything.
+        now: gives seconds, for the age of values.
+        on_end: called when a run has sent everything.
 
     Attributes:
         picture: what is known of it; stays when the run is over.
-        questions: how many were opened, so that none is taken for another.
-        runs: how many were followed.
+        questions: number of questions opened, so that none is taken for another.
+        runs: number of runs followed.
     """
 
     def __init__(self, now: Callable[[], float], on_end: Callable[[], None]) -> None:
@@ -46,7 +51,7 @@ class RunFollower:
 
     @property
     def connection(self) -> RunConnection | None:
-        """The run that is followed; none when it is over."""
+        """The run that is followed; None when it is over."""
         return self._connection
 
     async def follow(self, connection: RunConnection) -> None:
@@ -57,7 +62,7 @@ class RunFollower:
         self._following = asyncio.create_task(self._follow(connection))
 
     async def stop(self) -> None:
-        """Follow no run; it is not told."""
+        """Follow no run any more, without a word to it."""
         following, self._following, self._connection = self._following, None, None
         if following is not None:
             await cancel_and_wait(following)
@@ -102,3 +107,50 @@ class RunFollower:
         self.picture = picture_after(self.picture, message, self._now())
         if self.picture.question not in {None, question}:
             self.questions += 1
+
+
+class DeviceWatcher:
+    """Watches until it is stopped; lets the devices go while they are needed elsewhere.
+
+    Attributes:
+        live: the latest values, and ``live_at_s`` when they came.
+        problem: why there are no values; empty if there are.
+    """
+
+    def __init__(self, watch: Callable[[], AsyncIterator[LiveSnapshot]], now: Callable[[], float]) -> None:
+        self.live: LiveSnapshot | None = None
+        self.live_at_s = 0.0
+        self.problem = ""
+        self._watch, self._now = watch, now
+        self._task: asyncio.Task[None] | None = None
+
+    def start(self) -> None:
+        """Watch the devices, unless it does."""
+        if self._task is None:
+            self._task = asyncio.create_task(self._keep_watching())
+
+    async def stop(self) -> None:
+        """Let the devices go."""
+        task, self._task, self.live = self._task, None, None
+        if task is not None:
+            await cancel_and_wait(task)
+
+    @asynccontextmanager
+    async def released(self) -> AsyncIterator[None]:
+        """Within this context others may have the devices."""
+        was_watching = self._task is not None
+        await self.stop()
+        try:
+            yield
+        finally:
+            if was_watching:
+                self.start()
+
+    async def _keep_watching(self) -> None:
+        while True:
+            try:
+                async for snapshot in self._watch():
+                    self.live, self.live_at_s, self.problem = snapshot, self._now(), ""
+            except HexacellError as error:
+                self.live, self.problem = None, str(error)
+            await asyncio.sleep(AGAIN_AFTER_S)

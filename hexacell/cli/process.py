@@ -1,0 +1,113 @@
+"""What every command needs of its process: signals, the platform, and reports of faults of the program.
+
+SIGTERM and SIGHUP do what Ctrl-C does. ``docs/platforms.md`` says what is tested where. Nothing
+slow is imported.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import shlex
+import signal
+import socket
+import tempfile
+import threading
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from types import FrameType
+
+from hexacell import __version__
+from hexacell.errors import UsageError
+
+STOP_SIGNALS = tuple(
+    number for name in ("SIGTERM", "SIGHUP") if (number := getattr(signal, name, None)) is not None
+)
+"""Sent by a service manager, or when the terminal is closed. Windows has no SIGHUP."""
+
+ANYWHERE = {"completion.main"}
+"""Commands that work on any system, by module and function."""
+
+OVER_A_SOCKET = {"tui.main", "host.main"}
+"""Commands that run, or reach, a run in another process."""
+
+
+@contextmanager
+def handled(
+    numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType | None], object]
+) -> Iterator[None]:
+    """Handle signals within this context.
+
+    Python handles signals in the main thread only; elsewhere nothing changes.
+    """
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    before = {number: signal.signal(number, handler) for number in numbers} if in_main_thread else {}
+    try:
+        yield
+    finally:
+        for number, former in before.items():
+            signal.signal(number, former)
+
+
+def stop_signals_as_sigint() -> AbstractContextManager[None]:
+    """Let SIGTERM and SIGHUP do what Ctrl-C does: motion stops, devices and files are released.
+
+    A signal that is already handled or ignored, as under ``nohup``, is left alone.
+    """
+    free = [number for number in STOP_SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
+    return handled(free, _forward_to_sigint)
+
+
+def _forward_to_sigint(_number: int, frame: FrameType | None) -> None:
+    # Within asyncio.run this is the loop's own handler, which cancels the running task. It is not
+    # callable in a script's background job, where Ctrl-C is ignored.
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler):
+        raise KeyboardInterrupt
+    handler(signal.SIGINT, frame)
+
+
+def fault_line(error: Exception, typed: Sequence[str]) -> str:
+    """The line for a person about a fault, which is kept in a file that only this user can read."""
+    what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    line = f"this is a fault of the program: {' '.join(what.split())}"
+    try:
+        kept = _keep(error, typed)
+    except OSError as refusal:
+        return f"{line}. No report could be written: {refusal.strerror}"
+    return f"{line}. Please report it with {kept}"
+
+
+def _keep(error: Exception, typed: Sequence[str]) -> Path:
+    handle, name = tempfile.mkstemp(prefix="hexacell-fault-", suffix=".txt")
+    head = f"hexacell {__version__}, Python {platform.python_version()}, {platform.platform()}\n"
+    command = f"hexacell {shlex.join(typed)}\n"
+    with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as report:
+        report.write(head + command + "".join(traceback.format_exception(error)))
+    return Path(name)
+
+
+def require_platform(target: str) -> None:
+    """Refuse a command that this operating system cannot carry out; imports nothing of it.
+
+    Args:
+        target: the command, by module and function in ``hexacell.cli.commands``.
+
+    Raises:
+        UsageError: it has no POSIX locks and terminals (Windows), or does not report who is at the other
+            end of a local socket as Linux does (macOS).
+    """
+    if target not in ANYWHERE and find_spec("fcntl") is None:
+        raise UsageError(
+            "this system has no POSIX file locks, terminals and signals, by which hexacell protects a cell",
+            action="Use Linux; on Windows install it there with `wsl --install`",
+        )
+    if target in OVER_A_SOCKET and not hasattr(socket, "SO_PEERCRED"):
+        raise UsageError(
+            "this system does not tell as Linux does who is at the other end of a local socket, without "
+            "which nobody may reach a run in another process",
+            action="Use `hexacell run` at this terminal, or Linux",
+        )

@@ -1,0 +1,243 @@
+"""What the devices show now: while no run has them, and while a run reads them or waits for a person."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections import deque
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from contextlib import AsyncExitStack, aclosing, suppress
+from functools import partial
+from statistics import stdev
+from typing import Any
+
+from drivers.interfaces import GaugeReading
+from drivers.serial.shared_port import SharedSerialPorts
+from drivers.wire_trace import WireTrace
+from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.loader import Cell
+from hexacell.errors import HexacellError
+from hexacell.kinematics.parameters import JointUnit
+from hexacell.run_process.messages import ControllerSnapshot, EncoderSnapshot, GaugeSnapshot, LiveSnapshot
+from hexacell.runs.cell_lock import cell_lock
+from hexacell.services.devices.device_setup import device_addresses, devices_of
+from procedures.devices.device_set import Devices
+from procedures.devices.live_polling import poll_for_screens
+from procedures.devices.live_values import SAMPLE_PERIOD_S, LiveValue, LiveValues
+from procedures.engine.command_loop import Status
+from procedures.engine.engine import Engine
+from procedures.run.cancellation import cancel_and_wait
+from procedures.run.questions import Question
+from procedures.run.state import RunState
+from procedures.steps import events
+from procedures.steps.move import Move
+
+NOISE_READINGS = 10
+"""Number of readings at standstill that the noise is computed from, at most; half of them suffice."""
+
+READ_EVERY_S = 0.2
+OPEN_EVERY_S = 1.0
+"""A device that could not be opened is tried again."""
+
+FRESH_S = 1.0
+"""How long a device that does not answer is waited for when somebody asks what it shows, s."""
+
+
+class LiveFeed:
+    """Makes snapshots of the live values; to be asked for one after each change.
+
+    Attributes:
+        is_moving: whether the robot moves, so that readings say nothing of the noise.
+    """
+
+    def __init__(self, live: LiveValues, gauges: Sequence[GaugeSettings]) -> None:
+        self.is_moving = False
+        self._live = live
+        self._gauges = tuple(gauges)
+        self._recent: dict[str, deque[tuple[float, float]]] = {
+            gauge.name: deque(maxlen=NOISE_READINGS) for gauge in gauges
+        }
+
+    @property
+    def gauges(self) -> tuple[LiveValue[GaugeReading], ...]:
+        """The live values of the gauges."""
+        return tuple(self._live.gauge(gauge.name) for gauge in self._gauges)
+
+    def snapshot(self) -> LiveSnapshot:
+        """The latest values of all devices."""
+        live, sample = self._live, self._live.encoders.value
+        return LiveSnapshot(
+            gauges=tuple(map(self._gauge, self._gauges)),
+            encoders=EncoderSnapshot(
+                positions=None if sample is None else sample.positions,
+                unit=JointUnit.MM if sample is None else sample.unit,
+                age_s=_age(live.encoders),
+                problem=live.encoders.problem,
+            ),
+            controller=self._controller(),
+            stop_reason=live.stop_reason.value or live.stop_reason.problem,
+        )
+
+    def _gauge(self, settings: GaugeSettings) -> GaugeSnapshot:
+        shown = self._live.gauge(settings.name)
+        return GaugeSnapshot(
+            name=settings.name,
+            axis=settings.axis,
+            sign=settings.sign,
+            shown_mm=None if shown.value is None else shown.value.value_mm,
+            age_s=_age(shown),
+            noise_mm=self._noise(settings.name),
+            problem=shown.problem,
+            travel_mm=settings.travel_mm,
+            middle_mm=settings.middle_mm,
+        )
+
+    def _controller(self) -> ControllerSnapshot:
+        shown = self._live.controller
+        if shown.value is None:
+            return ControllerSnapshot(problem=shown.problem)
+        return ControllerSnapshot(
+            estop=shown.value.estop,
+            enabled=shown.value.enabled,
+            error_messages=shown.value.error_messages,
+            age_s=_age(shown),
+            problem=shown.problem,
+        )
+
+    def _noise(self, name: str) -> float | None:
+        """Standard deviation of the latest readings; forgotten whenever the robot moves."""
+        recent, shown = self._recent[name], self._live.gauge(name)
+        if self.is_moving:
+            recent.clear()
+        elif shown.value is not None and (not recent or recent[-1][0] != shown.at_s):
+            recent.append((shown.at_s, shown.value.value_mm))
+        values = [value for _, value in recent]
+        return stdev(values) if len(values) >= NOISE_READINGS // 2 else None
+
+
+def _age(shown: LiveValue[Any]) -> float | None:
+    return None if math.isinf(shown.age_s) else shown.age_s
+
+
+async def watch_devices(cell: Cell) -> AsyncIterator[LiveSnapshot]:
+    """What the devices show, at most ten times a second, until the iterator is closed; nothing moves.
+
+    Raises:
+        CellBusy: a run has them.
+        HexacellError: a protocol has no driver, or a simulated cell cannot start.
+    """
+    with cell_lock(*cell.config_paths), device_addresses(cell) as settings:
+        links = SharedSerialPorts(trace=WireTrace())
+        devices = devices_of(settings, links, WireTrace(), cell.path.parent)
+        feed = LiveFeed(devices.live, settings.gauges)
+        async with AsyncExitStack() as closing:
+            closing.push_async_callback(links.close)
+            closing.push_async_callback(devices.close)
+            for keep in _keepers(devices):
+                closing.push_async_callback(cancel_and_wait, asyncio.ensure_future(keep))
+            yield feed.snapshot()
+            async for _ in devices.live.changes():
+                yield feed.snapshot()
+
+
+def _keepers(devices: Devices) -> Iterator[Awaitable[None]]:
+    live = devices.live
+    for one in devices.gauges:
+        read = partial(devices.read_gauge_once, one.gauge)
+        yield _keep_reading(live.gauge(one.gauge.name), one.gauge.open, read)
+    yield _keep_reading(live.encoders, devices.encoders.open, devices.read_encoders)
+    yield _keep_reading(live.controller, devices.controller.open, devices.controller_status)
+    yield _keep_reading(live.stop_reason, devices.stop_input.open, devices.stop_reason)
+
+
+async def _keep_reading(
+    shown: LiveValue[Any], connect: Callable[[], Awaitable[Any]], read: Callable[[], Awaitable[Any]]
+) -> None:
+    """Open a device, as often as it takes, and read it; its live value says what is wrong."""
+    while not await _is_open(shown, connect):  # noqa: ASYNC110 - nothing reports when it is plugged in
+        await asyncio.sleep(OPEN_EVERY_S)
+    while True:
+        with suppress(HexacellError):  # the live value says why
+            await read()
+        await asyncio.sleep(READ_EVERY_S)
+
+
+async def _is_open(shown: LiveValue[Any], connect: Callable[[], Awaitable[Any]]) -> bool:
+    try:
+        await connect()
+    except HexacellError as error:
+        shown.fail(str(error))
+        return False
+    return True
+
+
+class RunDeviceWatch:
+    """Follows one engine, whose devices keep their values in ``live``."""
+
+    def __init__(self, gauges: Sequence[GaugeSettings]) -> None:
+        self.live = LiveValues()
+        self._feed = LiveFeed(self.live, gauges)
+        self._devices: Devices | None = None
+        self._polling: asyncio.Task[None] | None = None
+        self._is_asking = False
+        self._is_paused = False
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether the run waits for a person: a question is open, or it is paused."""
+        return self._is_asking or self._is_paused
+
+    def follow(self, engine: Engine, devices: Devices) -> None:
+        """Follow an engine that has not begun; ``devices`` are those that it uses."""
+        self._devices = devices
+        engine.watch(self._on_status)
+        engine.watch_questions(self._on_question)
+
+    def note(self, event: events.Event, _: RunState | None = None) -> None:
+        """Take an event of the run, as its listener: while the robot moves, noise is unknown."""
+        match event:
+            case events.StepBegun(step=step):
+                self._feed.is_moving = isinstance(step, Move)
+            case _:
+                self._feed.is_moving = False
+
+    def snapshot(self) -> LiveSnapshot:
+        """What the devices show now."""
+        return self._feed.snapshot()
+
+    async def fresh_snapshot(self) -> LiveSnapshot:
+        """What they show once the gauges were read anew; at once if the run itself reads them."""
+        if self.is_waiting:
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._until_fresh(), FRESH_S)
+        return self.snapshot()
+
+    async def _until_fresh(self) -> None:
+        async with aclosing(self.live.changes(0.0)) as changes:
+            while any(gauge.age_s > SAMPLE_PERIOD_S for gauge in self._feed.gauges):
+                await anext(changes)
+
+    async def snapshots(self) -> AsyncIterator[LiveSnapshot]:
+        """Snapshots after each change, until cancelled; noise is known only while they are taken."""
+        async for _ in self.live.changes():
+            yield self.snapshot()
+
+    def close(self) -> None:
+        """Read nothing any more."""
+        self._is_asking = self._is_paused = False
+        self._reconsider()
+
+    def _on_status(self, status: Status) -> None:
+        self._is_paused = status is Status.PAUSED
+        self._reconsider()
+
+    def _on_question(self, question: Question | None) -> None:
+        self._is_asking = question is not None
+        self._reconsider()
+
+    def _reconsider(self) -> None:
+        if self.is_waiting and self._polling is None and self._devices is not None:
+            self._polling = asyncio.ensure_future(poll_for_screens(self._devices))
+        elif not self.is_waiting and self._polling is not None:
+            self._polling.cancel()
+            self._polling = None

@@ -1,0 +1,383 @@
+"""The model behind the screens: a cell, the run in it, and what a person may ask for."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+from functools import partial
+
+from hexacell.cell.loader import Cell, describe
+from hexacell.config.receipt import ConfigEditedSince
+from hexacell.errors import HexacellError, UsageError
+from hexacell.run_process.recorded import RecordedRun
+from hexacell.screen.preferences import ONCE, ScreenAction
+from hexacell.screen.watching import DeviceWatcher, RunFollower
+from hexacell.screen.workplace import TriedPlan, Workplace
+from hexacell.text.config_changes import RELOAD, versions_text
+from hexacell.text.screens.headers import header_view
+from hexacell.text.screens.live import RUNNING, STARTING, TRYING, checklist_view, live_view
+from hexacell.text.screens.measuring import fault_view, measure_view
+from hexacell.text.screens.planned_poses import plan_view
+from hexacell.text.screens.questions import PERSON, question_view
+from hexacell.text.screens.reviewing import PROPOSAL_WAITS, history_view, review_view, rollback_question
+from hexacell.text.screens.views import (
+    CellView,
+    ChecklistItem,
+    ChecklistView,
+    FaultView,
+    HeaderView,
+    HistoryEntry,
+    HistoryView,
+    LiveView,
+    MeasureView,
+    PlanView,
+    QuestionView,
+    ReviewView,
+)
+from procedures.calibration.calibration import Mode
+from procedures.engine.command_loop import Status
+from procedures.engine.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo
+
+OF_A_RUN = {
+    ScreenAction.PAUSE,
+    ScreenAction.PAUSE_AT_ONCE,
+    ScreenAction.UNDO,
+    ScreenAction.MEASURE_AGAIN,
+    ScreenAction.ABORT,
+}
+WITHOUT_A_RUN = {
+    ScreenAction.CHECK,
+    ScreenAction.START,
+    ScreenAction.EXCLUDE,
+    ScreenAction.ROLL_BACK,
+    ScreenAction.APPLY,
+}
+OF_A_RECORDING = {ScreenAction.STEP, ScreenAction.PLAY}
+SPEEDS = (0.0, 1.0, 10.0, 60.0, 600.0)
+"""Speeds of a recorded run, as multiples of that at which it was recorded; the first is standstill."""
+
+
+class ScreenModel:
+    """Views to be shown, and actions that may be asked for; ``now`` gives seconds.
+
+    The views are those of this moment and cost a few milliseconds at most; what takes longer is awaited.
+    Everything that is awaited raises ``HexacellError``.
+    """
+
+    def __init__(self, workplace: Workplace, now: Callable[[], float] = time.monotonic) -> None:
+        self._workplace, self._now = workplace, now
+        self._run = RunFollower(now, self._after_run)
+        self._devices = DeviceWatcher(workplace.watch, now)
+        self._run_is_over = asyncio.Event()
+        self._is_checking, self._is_starting, self._is_ready = False, False, False
+        self._checked: tuple[ChecklistItem, ...] | None = None
+        self._entries: tuple[HistoryEntry, ...] | None = None
+        self._compared: tuple[str, ...] = ()
+        self._tried: TriedPlan | None = None
+        self._trial: asyncio.Future[TriedPlan] | None = None
+        self._described: tuple[Cell | None, tuple[str, ...]] = (None, ())
+        self._reviewed: tuple[object, ReviewView] | None = None
+        self._does: dict[ScreenAction, Callable[[str], Awaitable[str | None]]] = {
+            ScreenAction.PAUSE: self._pause,
+            ScreenAction.PAUSE_AT_ONCE: partial(self._give, Pause(at_once=True)),
+            ScreenAction.UNDO: partial(self._give, Undo()),
+            ScreenAction.MEASURE_AGAIN: self._measure_again,
+            ScreenAction.ABORT: partial(self._give, Abort()),
+            ScreenAction.TAKE_CONTROL: self._take_control,
+            ScreenAction.CHECK: self._check,
+            ScreenAction.START: self._start,
+            ScreenAction.PREVIEW: self._preview,
+            ScreenAction.EXCLUDE: self._exclude,
+            ScreenAction.COMPARE: self._compare,
+            ScreenAction.ROLL_BACK: self._roll_back,
+            ScreenAction.APPLY: self._apply,
+            ScreenAction.OPEN: self._open,
+            ScreenAction.DRIFT: self._drift,
+            ScreenAction.STEP: self._step,
+            ScreenAction.PLAY: self._play,
+        }
+
+    async def attend(self) -> None:
+        """Follow the cell and its run until cancelled."""
+        try:
+            running = await self._workplace.attach()
+            if running is None:
+                self._devices.start()
+            else:
+                await self._run.follow(running)
+            while True:
+                await self._read_history()
+                await self._run_is_over.wait()
+                self._run_is_over.clear()
+        finally:
+            await self._run.stop()
+            await self._devices.stop()
+
+    def _after_run(self) -> None:
+        """The devices are free, and there is one more run in the history."""
+        self._devices.start()
+        self._run_is_over.set()
+
+    # Views.
+
+    @property
+    def question_number(self) -> int:
+        """Number of questions so far, so that none is taken for another."""
+        return self._run.questions
+
+    @property
+    def fault_number(self) -> int:
+        """A number that changes with every fault."""
+        return 1000 * self._run.runs + self._run.picture.setbacks
+
+    @property
+    def runs_followed(self) -> int:
+        """Number of runs that were shown so far."""
+        return self._run.runs
+
+    @property
+    def may_leave_run(self) -> bool:
+        """Whether a run goes on that can be stopped or left."""
+        return self._is_running and self._run.picture.may_command
+
+    @property
+    def proposing_run(self) -> str:
+        """The recorded run in front, if its proposal can be applied; else empty."""
+        described = self._run.picture.described
+        if described is None or not described.is_recorded:
+            return ""
+        name = described.folder.name
+        return name if any(one.name == name and one.has_proposal for one in self._entries or ()) else ""
+
+    @property
+    def _recording(self) -> RecordedRun | None:
+        """The recorded run that is shown; None if a run goes on, or nothing is shown."""
+        connection = self._run.connection
+        return connection if isinstance(connection, RecordedRun) else None
+
+    @property
+    def _is_running(self) -> bool:
+        """Whether a run goes on that has the devices."""
+        return self._run.connection is not None and self._recording is None
+
+    def header(self) -> HeaderView:
+        """The first line of every screen."""
+        return header_view(self._workplace.cell.settings.name, self._run.picture)
+
+    def cell(self) -> CellView:
+        """The cell and its devices."""
+        cell, live = self._workplace.cell, self._live()
+        if self._devices.problem and not live.gauges:
+            live = LiveView(note=self._devices.problem)
+        if self._described[0] is not cell:
+            self._described = (cell, tuple(describe(cell).splitlines()))
+        title = f"What {cell.path.name} says; behind each value its line in the file, or default"
+        return CellView(title, live, self._described[1], self._workplace.warnings)
+
+    def _live(self) -> LiveView:
+        if self._is_running:
+            return live_view(self._run.picture.live, self._now() - self._run.picture.live_at_s)
+        return live_view(self._devices.live, self._now() - self._devices.live_at_s)
+
+    def checklist(self) -> ChecklistView:
+        """Everything that must hold before motion."""
+        return checklist_view(
+            self._run.picture.live if self._is_running else self._devices.live,
+            self._checked,
+            (TRYING,) if self._trial is not None else () if self._tried is None else self._tried.lines,
+            is_checking=self._is_checking,
+            refusal=RUNNING if self._is_running else STARTING if self._is_starting else "",
+            has_fixture=self._workplace.cell.settings.length_check is not None,
+        )
+
+    def plan(self) -> PlanView:
+        """The poses of the plan, and what the cell file excludes."""
+        poses = () if self._tried is None else self._tried.poses
+        return plan_view(self._workplace.cell.settings, poses, is_trying=self._trial is not None)
+
+    def measure(self) -> MeasureView:
+        """The run that is being measured; its devices are shown even where none has begun."""
+        view = measure_view(self._run.picture, self._workplace.cell.settings, self._now())
+        is_shown_live = self._run.connection is not None or self._devices.live is None
+        return view if is_shown_live else replace(view, live=self._live())
+
+    def review(self) -> ReviewView:
+        """The result; made again where something has changed beside the live values."""
+        picture = self._run.picture
+        if self._reviewed is None or self._reviewed[0] != (id(picture.state), id(picture.question)):
+            view = review_view(picture, self._workplace.cell.settings)
+            self._reviewed = ((id(picture.state), id(picture.question)), view)
+        shown = self._reviewed[1]
+        if not self.proposing_run:
+            return shown
+        return replace(shown, approval=f"{shown.approval} {PROPOSAL_WAITS}")
+
+    def history(self) -> HistoryView:
+        """The runs of the cell."""
+        return history_view(self._entries, self._compared)
+
+    def question(self) -> QuestionView | None:
+        """The question that waits, if one does and may be answered here."""
+        picture = self._run.picture
+        if picture.question is None or not picture.may_command:
+            return None
+        return question_view(picture.question, picture.live)
+
+    def fault(self) -> FaultView | None:
+        """The latest fault; those of a recorded run are long past."""
+        picture = self._run.picture
+        return None if picture.setback is None or picture.is_recorded else fault_view(picture.setback)
+
+    # Actions.
+
+    def allows(self, action: ScreenAction) -> bool:
+        """Whether an action has an effect now."""
+        if action in OF_A_RUN:
+            is_over = self._run.picture.status is Status.ENDED
+            return self._is_running and self._run.picture.may_command and not is_over
+        if action in OF_A_RECORDING:
+            return self._recording is not None
+        if action is ScreenAction.TAKE_CONTROL:
+            return self._is_running and not self._run.picture.may_command
+        if action in WITHOUT_A_RUN:
+            return not (self._is_running or self._is_checking or self._is_starting)
+        return True
+
+    async def perform(self, action: ScreenAction, argument: str = "") -> str:
+        """Do what was asked for; a remark about it, or an empty text."""
+        if not self.allows(action):
+            raise UsageError(f"{action} has no effect now")
+        return await self._does[action](argument) or ""
+
+    async def confirmation(self, action: ScreenAction, argument: str) -> QuestionView | None:
+        """What a person must consent to before an action; None if to nothing."""
+        match action:
+            case ScreenAction.APPLY:
+                return question_view(await self._workplace.approval(argument), None)
+            case ScreenAction.ROLL_BACK:
+                is_there = await self._workplace.is_in_controller(argument)
+                return rollback_question(argument, is_in_controller=is_there)
+            case _:
+                return None
+
+    async def answer(self, value: str | None) -> None:
+        """Answer the question."""
+        await self._run.give(Answer(value))
+
+    async def leave(self, *, keep_running: bool) -> None:
+        """Let the run go on alone, or have it stopped."""
+        if self._is_running:
+            await self._run.leave(keep_running=keep_running)
+
+    async def _give(self, command: Command, _: str = "") -> None:
+        await self._run.give(command)
+
+    async def _pause(self, _: str) -> None:
+        is_paused = self._run.picture.status in {Status.PAUSED, Status.PAUSING}
+        await self._give(Resume() if is_paused else Pause())
+
+    async def _measure_again(self, _: str) -> None:
+        at = self._run.picture.at
+        if at is None:
+            raise UsageError("no point is being measured now")
+        await self._give(MeasureAgain(at))
+
+    async def _take_control(self, _: str) -> None:
+        if self._run.connection is not None:
+            await self._run.connection.take_control()
+
+    async def _check(self, what: str) -> None:
+        self._checked, self._is_ready, self._is_checking = None, False, True
+        try:
+            async with self._devices.released():
+                preflight = await self._workplace.check(what or Mode.OPTIMISE)
+            self._checked, self._is_ready = preflight.items, preflight.is_ready
+        finally:
+            self._is_checking = False
+
+    async def _start(self, what: str) -> None:
+        """Checked again, as anything may have changed since somebody looked."""
+        await self._check(what)
+        if not self._is_ready:
+            raise UsageError("not everything holds that must hold", action="Look at 2 Preflight")
+        await self._devices.stop()
+        self._is_starting = True
+        try:
+            await self._run.follow(await self._workplace.start(what))
+        except BaseException:
+            self._devices.start()
+            raise
+        finally:
+            self._is_starting = False
+
+    async def _preview(self, how_often: str) -> None:
+        """Try the plan; an earlier trial is given up."""
+        if how_often == ONCE and (self._trial is not None or self._tried is not None):
+            return
+        if self._trial is not None:
+            self._trial.cancel()
+        trial = self._trial = asyncio.ensure_future(self._workplace.preview())
+        try:
+            await asyncio.wait([trial])
+            if trial is self._trial:
+                self._trial = None
+                self._tried = trial.result()
+        finally:
+            trial.cancel()
+
+    async def _exclude(self, name: str) -> None:
+        await self._workplace.toggle_exclusion(name, () if self._tried is None else self._tried.poses)
+        await self._preview("")
+
+    async def _compare(self, run: str) -> None:
+        self._compared = await self._workplace.compare(run)
+
+    async def _drift(self, _: str) -> None:
+        self._compared = await self._workplace.drift()
+
+    async def _roll_back(self, run: str) -> str:
+        return await self._change_config(partial(self._workplace.roll_back, run, PERSON))
+
+    async def _apply(self, run: str) -> str:
+        return await self._change_config(partial(self._workplace.apply, run, PERSON))
+
+    async def _change_config(self, change: Callable[[], Awaitable[tuple[str, ...]]]) -> str:
+        """Where somebody has edited the config since, the three versions are shown."""
+        try:
+            async with self._devices.released():
+                self._compared = await change()
+        except ConfigEditedSince as edited:
+            self._compared = tuple(versions_text(edited.versions).splitlines())
+            raise
+        await self._read_history()
+        return RELOAD if RELOAD in " ".join(self._compared) else self._compared[-1]
+
+    async def _open(self, run: str) -> None:
+        await self._run.follow(await self._workplace.open_run(run))
+
+    async def _read_history(self) -> None:
+        """Read which runs there are; where that fails, the history says why."""
+        try:
+            self._entries = await self._workplace.runs()
+        except HexacellError as error:
+            self._entries, self._compared = (), tuple(str(error).splitlines())
+
+    async def _step(self, argument: str) -> None:
+        """To an end, or by a number of events."""
+        if (recording := self._recording) is not None:
+            ends = {"first": 1, "last": recording.last}
+            if argument in ends:
+                recording.jump(ends[argument])
+            else:
+                recording.step(int(argument or 1))
+
+    async def _play(self, argument: str) -> None:
+        """Halt or go on; ``+`` faster, ``-`` slower."""
+        cursor = self._run.picture.cursor
+        speed = 0.0 if cursor is None else cursor.speed
+        place = SPEEDS.index(speed) if speed in SPEEDS else 0
+        wanted = {"+": place + 1, "-": place - 1}.get(argument, 0 if place else 1)
+        if self._recording is not None:
+            self._recording.set_speed(SPEEDS[min(max(wanted, 0), len(SPEEDS) - 1)])

@@ -1,0 +1,213 @@
+"""What is shown above a screen: questions, confirmations, faults, help, and quitting."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Awaitable, Callable, Mapping
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from textual.app import ComposeResult
+from textual.binding import BindingType
+from textual.containers import Vertical, VerticalScroll
+from textual.events import Key
+from textual.screen import ModalScreen, ScreenResultType
+from textual.widgets import Input
+
+from hexacell.screen.preferences import KEYS, preferences_path, shown_path
+from hexacell.screen.widgets import DevicePanel, TextList, TextPanel
+from hexacell.text.screens.help_texts import (
+    KEYS_NOTE,
+    KEYS_TITLE,
+    REPLAY_HELP,
+    SCREEN_HELP,
+    reflowed,
+)
+from hexacell.text.screens.views import Choice, FaultView, QuestionView
+
+if TYPE_CHECKING:
+    from hexacell.screen.model import ScreenModel
+
+Leaving = Literal["stop", "leave", "stay"]
+
+LONGEST_TYPED = 200
+"""What is pasted by mistake may be a whole file."""
+
+
+class AnswerOverlay(ModalScreen[ScreenResultType]):
+    """Consent is one key, or a text that must be typed in full."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("pagedown", "scroll_text(1)", "Scroll on"),
+        ("pageup", "scroll_text(-1)", "Scroll back"),
+    ]
+    AUTO_FOCUS = "#question-text"
+
+    def __init__(self, view: QuestionView) -> None:
+        super().__init__()
+        self.view = view
+
+    @abstractmethod
+    async def give(self, value: str | None) -> None:
+        """Give an answer."""
+
+    def compose(self) -> ComposeResult:
+        """The question, the gauges where they matter, and what to press."""
+        view = self.view
+        with Vertical(id="question", classes=f"overlay overlay-{view.urgency}"):
+            yield TextPanel(view.title, classes="overlay-title")
+            with VerticalScroll(id="question-text"):
+                yield TextPanel("\n\n".join(view.paragraphs))
+            if view.shows_gauges:
+                yield DevicePanel(id="mounting", for_mounting=True)
+            if view.refusal:
+                yield TextPanel(view.refusal, id="refusal")
+            yield TextPanel(view.instruction, id="instruction")
+            for choice in view.choices:
+                yield TextPanel(_line(choice, view), classes=_classes(choice, view))
+            if view.typed and not view.refusal:
+                yield Input(placeholder=view.typed, id="typed", compact=True, max_length=LONGEST_TYPED)
+
+    def on_mount(self) -> None:
+        """What is typed goes into the field, if there is one."""
+        for field in self.query(Input):
+            field.cursor_blink = False
+            field.focus()
+
+    def action_scroll_text(self, pages: int) -> None:
+        """Scroll what is asked, also while a name is typed."""
+        text = self.query_one("#question-text", VerticalScroll)
+        text.scroll_relative(y=pages * text.size.height, animate=False)
+
+    async def on_key(self, event: Key) -> None:
+        """Take an answer of one key."""
+        for choice in self.view.choices:
+            if event.key == choice.key and self._may_be_given(choice):
+                event.stop()
+                await self.give(choice.value)
+
+    async def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Take consent that is typed in full."""
+        if event.value.strip().lower() == self.view.typed.lower():
+            await self.give(self.view.consent)
+
+    def _may_be_given(self, choice: Choice) -> bool:
+        is_typing = isinstance(self.focused, Input) and len(choice.key) == 1
+        return not is_typing and not (choice.is_consent and bool(self.view.refusal))
+
+
+def _line(choice: Choice, view: QuestionView) -> str:
+    blocked = choice.is_consent and view.refusal
+    key = choice.key if len(choice.key) == 1 else choice.key.capitalize()
+    return f"  {'--' if blocked else key:8} {choice.label}"
+
+
+def _classes(choice: Choice, view: QuestionView) -> str:
+    return "choice refused" if choice.is_consent and view.refusal else "choice"
+
+
+class ConfirmOverlay(AnswerOverlay[bool]):
+    """Gives whether the person consented."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [("escape", "dismiss(False)", "No")]
+
+    async def give(self, value: str | None) -> None:
+        """Give an answer."""
+        self.dismiss(value is not None)
+
+
+class QuestionOverlay(AnswerOverlay[None]):
+    """Stays until the run has the answer."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("escape", "dismiss", "Look at the screens first"),
+        ("a", "abort", "Abort"),
+    ]
+
+    def __init__(
+        self, view: QuestionView, number: int, answer: Callable[[str | None], Awaitable[None]]
+    ) -> None:
+        super().__init__(view)
+        self.number = number
+        self._answer = answer
+
+    async def give(self, value: str | None) -> None:
+        """Give an answer."""
+        await self._answer(value)
+
+    async def action_abort(self) -> None:
+        """Abort the run; not where a name is typed, which may have this letter."""
+        if not self.view.typed:
+            await self.run_action("app.perform('abort')")
+
+    def draw(self, model: ScreenModel) -> None:
+        """Show the gauges as they are now."""
+        if self.view.shows_gauges:
+            self.query_one(DevicePanel).show(model.measure().live)
+
+
+class FaultOverlay(ModalScreen[None]):
+    """Stays until it was read."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("enter,escape,space", "dismiss", "Read"),
+        ("a", "app.perform('abort')", "Abort"),
+    ]
+
+    def __init__(self, view: FaultView) -> None:
+        super().__init__()
+        self._view = view
+
+    def compose(self) -> ComposeResult:
+        """Title, cause, next action."""
+        with Vertical(id="fault", classes="overlay overlay-alarm"):
+            yield TextPanel(self._view.title, classes="overlay-title")
+            with VerticalScroll(id="fault-cause"):
+                yield TextPanel(self._view.cause)
+            if self._view.action:
+                yield TextPanel(f"What to do: {self._view.action}", id="fault-action")
+            yield TextPanel("Enter closes this.", classes="hint")
+
+
+class HelpOverlay(ModalScreen[None]):
+    """What the screen is for, and the keys."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [("enter,escape,question_mark,q", "dismiss", "Close")]
+    AUTO_FOCUS = "#help-text"
+
+    def __init__(self, tab: str, keys: Mapping[str, str]) -> None:
+        super().__init__()
+        self._tab, self._keys = tab, keys
+
+    def compose(self) -> ComposeResult:
+        """The texts."""
+        with Vertical(id="help", classes="overlay"):
+            yield TextPanel(f"Help: {self._tab}", classes="overlay-title")
+            yield TextList(id="help-text")
+            yield TextPanel("Escape closes this, the arrows scroll.", classes="hint")
+
+    def on_mount(self) -> None:
+        """Show the texts."""
+        keys = [f"  {self._keys[str(one.id)]:8} {one.description}" for one in KEYS]
+        note = KEYS_NOTE.format(path=shown_path(preferences_path()))
+        about = [*reflowed(SCREEN_HELP[self._tab]), ""]
+        replay = ["", *reflowed(REPLAY_HELP)]
+        self.query_one(TextList).show([*about, f"{KEYS_TITLE}:", *keys, "", note, *replay])
+
+
+class QuitOverlay(ModalScreen[Leaving]):
+    """Asks what becomes of the run."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        ("s", "dismiss('stop')", "Stop it and quit"),
+        ("l", "dismiss('leave')", "Leave it running"),
+        ("escape,enter", "dismiss('stay')", "Stay"),
+    ]
+
+    def compose(self) -> ComposeResult:
+        """The question."""
+        with Vertical(id="quitting", classes="overlay"):
+            yield TextPanel("A run goes on here", classes="overlay-title")
+            yield TextPanel("What is to become of it?")
+            yield TextPanel("  s        stop it after its step, and quit; it can be resumed")
+            yield TextPanel("  l        quit and leave it running; `hexacell tui` comes back to it")
+            yield TextPanel("  Escape   stay here")

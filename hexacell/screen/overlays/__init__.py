@@ -1,1 +1,0 @@
-"""What is shown above a screen until it is answered or read."""

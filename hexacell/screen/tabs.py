@@ -1,0 +1,243 @@
+"""The five screens: cell, preflight, measure, review, history; each draws views of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.screen import Screen
+
+from hexacell.screen.preferences import WITH_LENGTH
+from hexacell.screen.widgets import (
+    DevicePanel,
+    GuidancePanel,
+    KeyLine,
+    PlotPanel,
+    RowList,
+    TabLine,
+    TextList,
+    TextPanel,
+    TopLine,
+)
+from hexacell.text.screens.lines import checklist_lines
+
+if TYPE_CHECKING:
+    from hexacell.screen.model import ScreenModel
+
+
+class TabScreen(Screen[None]):
+    """One of the five screens; drawn ten times a second while it is in front."""
+
+    TAB: ClassVar[str]
+
+    def __init__(self, keys: Mapping[str, str]) -> None:
+        super().__init__()
+        self._keys = keys
+
+    def compose(self) -> ComposeResult:
+        """The first lines, what is its own, and the footer."""
+        yield TopLine()
+        yield TabLine(self.TAB, self._keys)
+        yield from self.compose_body()
+        yield KeyLine(self._keys)
+
+    def compose_body(self) -> ComposeResult:
+        """What this screen has of its own."""
+        yield from ()
+
+    def draw(self, model: ScreenModel) -> None:
+        """Show what is so now."""
+        self.query_one(TopLine).show(model.header())
+        self.draw_body(model)
+        self.query_one(KeyLine).show(model.allows)
+
+    def draw_body(self, model: ScreenModel) -> None:
+        """Show what this screen has of its own."""
+
+
+class CellScreen(TabScreen):
+    """Devices above, the file below."""
+
+    TAB = "cell"
+    AUTO_FOCUS = "#settings"
+
+    def compose_body(self) -> ComposeResult:
+        """The parts of this screen."""
+        yield TextPanel("Devices, as they show now", classes="title")
+        yield DevicePanel(id="devices")
+        yield TextPanel("Cell file", id="settings-title", classes="title")
+        yield TextList(id="settings")
+
+    def draw_body(self, model: ScreenModel) -> None:
+        """Show the cell."""
+        view = model.cell()
+        self.query_one(DevicePanel).show(view.live)
+        self.query_one("#settings-title", TextPanel).show(view.title)
+        self.query_one("#settings", TextList).show([*view.problems, *view.warnings, *view.settings])
+
+
+class PreflightScreen(TabScreen):
+    """The checklist above, the plan below."""
+
+    TAB = "preflight"
+    AUTO_FOCUS = "#checklist"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("enter", "app.perform('check')", "Look at everything", show=False),
+        Binding("v", "app.perform('preview')", "Try the plan", show=False),
+        Binding("x", "app.plan", "Planned poses, and exclusions", show=False),
+        Binding("s", "app.perform('start', 'optimise')", "Start a calibration", show=False),
+        Binding("k", "app.perform('start', 'check')", "Start a check", show=False),
+        Binding("K", "app.perform('start', 'quick')", "Start a quick level", show=False),
+        Binding("l", "app.perform('start', 'length')", "Start a length check", show=False),
+        Binding("L", f"app.perform('start', '{WITH_LENGTH}')", "Calibrate, check the length", show=False),
+        Binding("r", "app.perform('start', 'resume')", "Resume the latest run", show=False),
+    ]
+
+    def compose_body(self) -> ComposeResult:
+        """The parts of this screen."""
+        yield TextPanel(id="instruction", classes="instruction")
+        yield TextPanel("What must hold before the robot moves", classes="title")
+        yield TextList(id="checklist")
+        yield TextPanel("The plan", classes="title")
+        yield TextList(id="plan")
+
+    def draw_body(self, model: ScreenModel) -> None:
+        """Show the checklist."""
+        view = model.checklist()
+        self.query_one("#instruction", TextPanel).show(view.instruction)
+        lines = [line for item in view.items for line in checklist_lines(item)]
+        self.query_one("#checklist", TextList).show(lines)
+        self.query_one("#plan", TextList).show(view.plan)
+
+
+class MeasureScreen(TabScreen):
+    """Guidance above, the devices, and below the records beside the predicted accuracy."""
+
+    TAB = "measure"
+    AUTO_FOCUS = "#records"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("space", "app.perform('play')", "Play or halt", show=False, priority=True),
+        Binding("plus", "app.perform('play', '+')", "Faster", show=False),
+        Binding("minus", "app.perform('play', '-')", "Slower", show=False),
+        Binding("right", "app.perform('step', '1')", "One event on", show=False, priority=True),
+        Binding("left", "app.perform('step', '-1')", "One event back", show=False, priority=True),
+        Binding("pagedown", "app.perform('step', '100')", "A hundred on", show=False, priority=True),
+        Binding("pageup", "app.perform('step', '-100')", "A hundred back", show=False, priority=True),
+        Binding("home", "app.perform('step', 'first')", "To the beginning", show=False, priority=True),
+        Binding("end", "app.perform('step', 'last')", "To the end", show=False, priority=True),
+    ]
+
+    def compose_body(self) -> ComposeResult:
+        """The parts of this screen."""
+        yield GuidancePanel()
+        yield TextPanel("Devices", id="devices-title", classes="title")
+        yield DevicePanel(id="devices")
+        with Horizontal(id="lower"):
+            with Vertical(id="record-side"):
+                yield TextPanel(id="records-title", classes="title")
+                yield TextPanel(id="records-header", classes="table-header")
+                yield TextList(id="records", follows=True)
+            yield PlotPanel(id="accuracy")
+
+    def draw_body(self, model: ScreenModel) -> None:
+        """Show the run."""
+        view = model.measure()
+        self.query_one(GuidancePanel).show(view.guidance)
+        self.query_one(DevicePanel).show(view.live)
+        self.query_one("#records-title", TextPanel).show(view.records_title)
+        self.query_one("#records-header", TextPanel).show(view.records_header)
+        self.query_one("#records", TextList).show(view.records)
+        self.query_one(PlotPanel).show(view.accuracy)
+
+
+PLOTS = 3
+
+
+class ReviewScreen(TabScreen):
+    """The verdict stays in sight; the rest scrolls below it."""
+
+    TAB = "review"
+    AUTO_FOCUS = "#details"
+
+    def compose_body(self) -> ComposeResult:
+        """The parts of this screen."""
+        yield TextPanel(id="verdict")
+        yield TextPanel(id="scope")
+        yield TextPanel(id="approval")
+        with VerticalScroll(id="details"):
+            yield TextPanel("Held-out poses, before and after", classes="title")
+            yield TextPanel(id="comparison")
+            with Horizontal(id="plots"):
+                for number in range(PLOTS):
+                    yield PlotPanel(id=f"plot-{number}", classes="plot")
+            with Vertical():
+                yield TextPanel("Parameters", classes="title")
+                yield TextPanel(id="parameters-header", classes="table-header")
+                yield TextPanel(id="parameters")
+                yield TextPanel("The change of the controller's config", classes="title")
+                yield TextPanel(id="change")
+
+    def draw_body(self, model: ScreenModel) -> None:
+        """Show the result."""
+        view = model.review()
+        self.query_one("#verdict", TextPanel).show(view.verdict, view.urgency)
+        self._show("#scope", view.scope)
+        self.query_one("#approval", TextPanel).show(view.approval)
+        self._show("#comparison", view.comparison)
+        self.query_one("#parameters-header", TextPanel).show(view.parameters_header)
+        self._show("#parameters", view.parameters)
+        self._show("#change", view.change)
+        for number, plot in enumerate(view.plots[:PLOTS]):
+            self.query_one(f"#plot-{number}", PlotPanel).show(plot)
+
+    def _show(self, place: str, lines: tuple[str, ...]) -> None:
+        self.query_one(place, TextPanel).show("\n".join(lines))
+
+
+class HistoryScreen(TabScreen):
+    """The runs above, what was asked about one of them below."""
+
+    TAB = "history"
+    AUTO_FOCUS = "#runs"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("v", "about('compare')", "Compare with the one before", show=False),
+        Binding("b", "about('roll back')", "Go back to its config, or undo it", show=False),
+        Binding("w", "write", "Write its proposal", show=False),
+        Binding("o", "app.perform('drift')", "Drift over all runs", show=False),
+    ]
+
+    is_asked = False
+
+    def compose_body(self) -> ComposeResult:
+        """The parts of this screen."""
+        yield TextPanel(id="history-header", classes="table-header")
+        yield RowList(id="runs")
+        yield TextPanel("Comparison", classes="title")
+        yield TextList(id="comparison")
+
+    def draw_body(self, model: ScreenModel) -> None:
+        """Show the runs."""
+        self.is_asked = model.question() is not None
+        view = model.history()
+        self.query_one("#history-header", TextPanel).show(view.note or view.header)
+        self.query_one("#comparison", TextList).show(view.comparison)
+        self.query_one(RowList).show([(entry.name, entry.line) for entry in view.entries])
+
+    async def action_about(self, what: str) -> None:
+        """Do something about the run that is chosen."""
+        if (run := self.query_one(RowList).chosen) is not None:
+            await self.run_action(f"app.perform({what!r}, {run!r})")
+
+    async def action_write(self) -> None:
+        """Write the proposal of the chosen run; a question that waits comes first, as on every screen."""
+        if self.is_asked:
+            await self.run_action("app.answer")
+        else:
+            await self.action_about("apply")
+
+    async def on_option_list_option_selected(self) -> None:
+        """Open the run."""
+        await self.action_about("open")

@@ -1,0 +1,253 @@
+"""What the screens are made of. Text is drawn again only where it changed.
+
+Textual's own footer makes a widget of each key, and all of them anew with each change of the screen, which
+takes longer than all else on it; so the keys are a line of text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from textual.app import ComposeResult
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.content import Content
+from textual.widgets import OptionList, Static
+from textual.widgets.option_list import Option
+
+from hexacell.screen.preferences import KEYS, ScreenAction
+from hexacell.text.screens.lines import device_lines
+from hexacell.text.screens.plot_lines import plot_lines
+from hexacell.text.screens.views import Guidance, HeaderView, LiveView, PlotView, Urgency
+
+
+class TextPanel(Static):
+    """Text without markup; its class says how urgent it is."""
+
+    def __init__(self, text: str = "", *, id: str | None = None, classes: str | None = None) -> None:  # noqa: A002 - as in every widget
+        super().__init__(text, id=id, classes=classes, markup=False)
+        self._text, self._urgency = text, Urgency.CALM
+
+    @property
+    def text(self) -> str:
+        """What it shows."""
+        return self._text
+
+    def show(self, text: str, urgency: Urgency = Urgency.CALM) -> None:
+        """Show a text."""
+        if text != self._text:
+            self._text = text
+            self.update(text)
+        if urgency is not self._urgency:
+            self._urgency = urgency
+            self.set_classes([*(c for c in self.classes if not c.startswith("urgency-"))])
+            self.add_class(f"urgency-{urgency}")
+
+
+class TextList(VerticalScroll):
+    """Lines that scroll; may follow the last one."""
+
+    def __init__(self, *, id: str | None = None, classes: str | None = None, follows: bool = False) -> None:  # noqa: A002 - as in every widget
+        self._panel, self._follows = TextPanel(), follows
+        self._count, self._is_at_end = 0, False
+        super().__init__(self._panel, id=id, classes=classes)
+
+    @property
+    def text(self) -> str:
+        """What it shows, scrolled out of sight or not."""
+        return self._panel.text
+
+    def show(self, lines: Sequence[str]) -> None:
+        """Show these lines."""
+        self._panel.show("\n".join(lines))
+        self._count = len(lines)
+        self.on_resize()
+
+    def on_resize(self) -> None:
+        """Stay at the end until somebody scrolls; lines that all have room begin at the top."""
+        is_long = self._follows and self._count > self.size.height > 0
+        if is_long != self._is_at_end:
+            self._is_at_end = is_long
+            self.anchor(is_long)
+
+
+MOST_LINES = 6
+"""Three gauges, encoders, controller and stop line."""
+
+
+class DevicePanel(Vertical):
+    """A line for each device."""
+
+    def __init__(
+        self,
+        *,
+        id: str | None = None,  # noqa: A002 - as in every widget
+        for_mounting: bool = False,
+    ) -> None:
+        self._lines = [TextPanel() for _ in range(MOST_LINES)]
+        self._for_mounting = for_mounting
+        super().__init__(*self._lines, id=id)
+
+    def show(self, live: LiveView) -> None:
+        """Show the devices."""
+        lines = device_lines(live, for_mounting=self._for_mounting)
+        for number, panel in enumerate(self._lines):
+            panel.display = number < len(lines)
+            if panel.display:
+                panel.show(*lines[number])
+
+
+WORDS = ("Now", "Next", "Time", "Stop")
+
+
+class GuidancePanel(Vertical):
+    """Four lines, the first one emphasised."""
+
+    def __init__(self) -> None:
+        self._lines = [TextPanel(classes=f"guidance-{word.lower()}") for word in WORDS]
+        super().__init__(*self._lines)
+
+    def show(self, guidance: Guidance) -> None:
+        """Show the guidance."""
+        texts = (guidance.now, guidance.following, guidance.remaining, guidance.stopping)
+        for word, panel, text in zip(WORDS, self._lines, texts, strict=True):
+            panel.show(f"{word:5}{text}")
+
+
+class PlotPanel(Vertical):
+    """Drawn in characters, as large as there is room."""
+
+    def __init__(self, *, id: str | None = None, classes: str | None = None) -> None:  # noqa: A002 - as in every widget
+        self._title, self._legend = TextPanel(classes="title"), TextPanel(classes="legend")
+        self._drawing = _Drawing(classes="drawing")
+        self._view: PlotView | None = None
+        super().__init__(self._title, self._drawing, self._legend, id=id, classes=classes)
+
+    def show(self, view: PlotView) -> None:
+        """Show a view."""
+        if view != self._view:
+            self._view = view
+            self._title.show(view.title)
+            self._legend.show(view.note if view.is_empty else view.legend)
+            self._drawing.display = not view.is_empty
+            self._drawing.draw(view)
+
+
+class _Drawing(TextPanel):
+    """The picture itself; drawn again when its size changes."""
+
+    _view: PlotView | None = None
+
+    def draw(self, view: PlotView) -> None:
+        """Draw a view."""
+        self._view = view
+        self.on_resize()
+
+    def on_resize(self) -> None:
+        """Draw it as large as there is room now."""
+        if self._view is not None:
+            room = self.content_region.size
+            self.show("\n".join(plot_lines(self._view, room.width, room.height)))
+
+
+class RowList(OptionList):
+    """Rows with a name each; what is chosen stays chosen where its name is still there."""
+
+    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - as in every widget
+        super().__init__(id=id, markup=False)
+        self._rows: list[tuple[str, str]] = []
+
+    @property
+    def chosen(self) -> str | None:
+        """The name of the chosen row; none without rows."""
+        row = self.highlighted
+        return None if row is None or row >= len(self._rows) else self._rows[row][0]
+
+    def show(self, rows: Sequence[tuple[str, str]]) -> None:
+        """Show these rows: name and line of each."""
+        if list(rows) == self._rows:
+            return
+        name, row = self.chosen, self.highlighted or 0
+        self._rows = list(rows)
+        self.clear_options()
+        self.add_options(Option(Content(line)) for _, line in rows)
+        names = [one for one, _ in rows]
+        last = len(names) - 1
+        self.highlighted = None if not names else names.index(name) if name in names else min(row, last)
+
+
+TABS = {
+    "cell": "Cell",
+    "preflight": "Preflight",
+    "measure": "Measure",
+    "review": "Review",
+    "history": "History",
+}
+
+
+class TopLine(Horizontal):
+    """The cell, what is done there, its state, and who is in control."""
+
+    def compose(self) -> ComposeResult:
+        """Left what is done, right how it stands."""
+        yield TextPanel("hexacell", id="where")
+        yield TextPanel("starting", id="state")
+
+    def show(self, view: HeaderView) -> None:
+        """Show a header."""
+        where = " | ".join(part for part in ("hexacell", view.cell, view.activity) if part)
+        state = " | ".join(part for part in (view.status, view.control) if part)
+        self.query_one("#where", TextPanel).show(where)
+        self.query_one("#state", TextPanel).show(state, view.urgency)
+
+
+class TabLine(Static):
+    """The five screens with their keys; the present one is marked."""
+
+    def __init__(self, present: str, keys: Mapping[str, str]) -> None:
+        parts = [
+            Content.from_markup(
+                f"[@click=app.show('{name}')]{'[reverse b]>' if name == present else ' '}$text "
+                f"{'[/]' if name == present else ''}[/]",
+                text=f"{keys[name]} {title}",
+            )
+            for name, title in TABS.items()
+        ]
+        super().__init__(Content("  ").join(parts))
+
+
+PALETTE = "^p palette"
+
+
+class KeyLine(Static):
+    """A key with its word each; a click does the same."""
+
+    def __init__(self, keys: Mapping[str, str]) -> None:
+        self._keys = keys
+        self._has_effect = dict.fromkeys(_ACTIONS.values(), False)
+        super().__init__(self._content())
+
+    def show(self, allows: Callable[[ScreenAction], bool]) -> None:
+        """Show which keys have an effect."""
+        has_effect = {action: allows(action) for action in self._has_effect}
+        if has_effect != self._has_effect:
+            self._has_effect = has_effect
+            self.update(self._content())
+
+    def _content(self) -> Content:
+        parts = [self._part(str(one.id), one.action, one.description) for one in KEYS if one.show]
+        palette = Content.from_markup(f"[@click=app.command_palette()]{PALETTE}[/]")
+        return Content("  ").join([*parts, palette])
+
+    def _part(self, name: str, action: str, word: str) -> Content:
+        call = action if action.endswith(")") else f"{action}()"
+        has_effect = action not in _ACTIONS or self._has_effect[_ACTIONS[action]]
+        text = "[b]$key[/b] $word" if has_effect else "[dim][b]$key[/b] $word[/dim]"
+        return Content.from_markup(f"[@click=app.{call}]{text}[/]", key=self._keys[name], word=word)
+
+
+_ACTIONS = {
+    f"perform('{action}')": action
+    for action in ScreenAction
+    if any(one.show and one.action == f"perform('{action}')" for one in KEYS)
+}
+"""Those that may have no effect, by how a key names them."""

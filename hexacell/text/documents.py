@@ -32,28 +32,22 @@ if TYPE_CHECKING:
 def next_document(proposed: NextPose) -> dict[str, Any]:
     """What ``next --json`` prints."""
     decision, forecast = proposed.decision, proposed.forecast
-    now = None if forecast is None else forecast.now_mm
-    expanded = None if forecast is None else forecast.expanded_mm(forecast.now_mm)
-    left_out = [list(record) for record in proposed.left_out]
+    now = {
+        "left_out": [list(record) for record in proposed.left_out],
+        "present_worst_sigma_mm": forecast and forecast.now_mm,
+        "present_expanded_mm": forecast and forecast.expanded_mm(forecast.now_mm),
+    }
     if isinstance(decision, Finished):
-        return {
-            "done": True,
-            "reason": decision.reason,
-            "present_worst_sigma_mm": now,
-            "present_expanded_mm": expanded,
-            "left_out": left_out,
-        }
+        return {"done": True, "reason": decision.reason, **now}
     return {
         "done": False,
-        "left_out": left_out,
+        **now,
         "point": decision.point,
         **_expected_record(decision),
         "pose": asdict(decision.pose),
         "joint_targets": list(decision.joints),
-        "present_worst_sigma_mm": now,
-        "present_expanded_mm": expanded,
-        "predicted_worst_sigma_mm": None if forecast is None else forecast.next_mm,
-        "going_on": None if forecast is None else _remainder(forecast),
+        "predicted_worst_sigma_mm": forecast and forecast.next_mm,
+        "going_on": forecast and _remainder(forecast),
     }
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from hexacell.design.decorrelation import DecorrelatingPose
 from hexacell.identification.diagnostics.frame_alignment import PoseErrors
 from hexacell.identification.diagnostics.model_tests import contradicted_points
-from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.noise.record_noise import NoiseLevels
 from hexacell.results.result import IdentificationResult
 from hexacell.uncertainty.budget import BudgetLine, UncertaintyBudget
@@ -26,26 +25,29 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
         **IdentificationResult.of(found, assessed.zeros).document(found.geometry.parameters),
         "findings": list(findings(assessed)),
         "verdict": Verdict.NOT_EVALUATED.value,  # no held-out records
-        "goodness": _goodness(found.goodness),
+        "goodness": {
+            "expected_chi2": found.goodness.expected,
+            "probability": found.goodness.probability,
+            "noise_ratio": found.goodness.ratio,
+            "agreement": found.goodness.agreement.value,
+        },
         "points_predicted": _points(assessed),
         "noise": _noise(assessed.noise),
         "measured_noise": assessed.measured_noise and assessed.measured_noise.model_dump(mode="json"),
         "repeatability": _repeatability(assessed),
-        "correlated": _correlated(assessed),
+        "correlated": [
+            {
+                "parameters": [pair.first, pair.second],
+                "correlation": pair.correlation,
+                "measure": pose and _decorrelating_pose(pose),
+            }
+            for pair, pose in assessed.correlated
+        ],
         "accuracy": _accuracy(assessed),
         "uncertainty": assessed.budget and _budget(assessed.budget),
         "refused": assessed.refused,
         "possible_causes": [asdict(cause) for cause in assessed.possible_causes],
         "beyond_tolerance": [asdict(violation) for violation in assessed.tolerance_violations],
-    }
-
-
-def _goodness(goodness: ChiSquareTest) -> dict[str, Any]:
-    return {
-        "expected_chi2": goodness.expected,
-        "probability": goodness.probability,
-        "noise_ratio": goodness.ratio,
-        "agreement": goodness.agreement.value,
     }
 
 
@@ -83,17 +85,6 @@ def _repeatability(assessed: Assessment) -> dict[str, Any] | None:
         "poses": scatter.poses,
         "recalibrating_helps": not assessed.does_not_repeat,
     }
-
-
-def _correlated(assessed: Assessment) -> list[dict[str, Any]]:
-    return [
-        {
-            "parameters": [pair.first, pair.second],
-            "correlation": pair.correlation,
-            "measure": pose and _decorrelating_pose(pose),
-        }
-        for pair, pose in assessed.correlated
-    ]
 
 
 def _decorrelating_pose(pose: DecorrelatingPose) -> dict[str, Any]:

@@ -5,7 +5,8 @@ In the order and words of ISO/IEC 17025:2017, 7.8, where they apply.
 
 from __future__ import annotations
 
-from hexacell.results.written_geometry import TaskDisplacement
+from collections.abc import Iterator
+
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.text.report.pages import Block, Chapter, Facts, Paragraph, Table, Tone
@@ -42,7 +43,7 @@ def verdict_of(run: ReportedRun) -> Verdict | None:
 
 
 def statement_chapter(run: ReportedRun) -> Chapter:
-    """What may be said of the robot, and what not."""
+    """The verdict, the errors that it is on, its reasons, scope and rule."""
     verdict, accuracy = verdict_of(run), judged_accuracy(run.state.judged)
     blocks: list[Block] = [
         Paragraph(_meaning(run, verdict), is_strong=True),
@@ -58,9 +59,11 @@ def found_and_left_chapter(run: ReportedRun) -> Chapter:
     """Errors as found and as left, and what must be taught anew."""
     state = run.state
     moved = None if state.proposed is None else state.proposed.displacement
-    rows = [row for row in (_mean_row(run), _error_row(run)) if row is not None]
-    table = (Table(("", "as found", "as left"), tuple(rows)),) if rows else ()
-    return Chapter("As found and as left", (*table, Paragraph(_left(run)), *_teaching(run, moved)))
+    rows = tuple(_found_and_left_rows(run))
+    table = (Table(("", "as found", "as left"), rows),) if rows else ()
+    is_written = state.committed is not None and not state.rolled_back
+    teaching = (Paragraph(teaching_sentence(moved)),) if moved and is_written else ()
+    return Chapter("As found and as left", (*table, Paragraph(_left(run)), *teaching))
 
 
 def method_chapter(run: ReportedRun) -> Chapter:
@@ -114,7 +117,7 @@ def _error_table(accuracy: VerifiedAccuracy | None) -> tuple[Block, ...]:
 
 
 def _reasons(run: ReportedRun) -> tuple[Block, ...]:
-    """The tests of the model, or what a check or a length check says instead."""
+    """The tests of the model, or the outcome of a check or a length check."""
     judged = run.state.judged
     if judged is None:
         reason = "it is not over" if run.state.ended is None else run.state.ended.line
@@ -129,7 +132,7 @@ def _reasons(run: ReportedRun) -> tuple[Block, ...]:
 
 
 def scope_sentences(accuracy: VerifiedAccuracy | None) -> str:
-    """What the statement holds for."""
+    """Scope of the statement."""
     if accuracy is None:
         return "Nothing is stated of errors at the task."
     where = "the task poses of the cell file" if accuracy.task_named else "poses across the workspace"
@@ -151,22 +154,18 @@ def decision_rule(accuracy: VerifiedAccuracy | None) -> str:
     )
 
 
-def _mean_row(run: ReportedRun) -> tuple[str, ...] | None:
-    judged = run.state.judged
-    verified = None if judged is None else judged.verification
-    if verified is None or verified.before_mm is None:
-        return None
-    after = "-" if verified.after_mm is None else f"{verified.after_mm:.3f}"
-    poses = len(run.state.held_out(Phase.AFTER))
-    return f"mean deviation of the ball at {poses} held-out poses, mm", f"{verified.before_mm:.3f}", after
-
-
-def _error_row(run: ReportedRun) -> tuple[str, ...] | None:
+def _found_and_left_rows(run: ReportedRun) -> Iterator[tuple[str, str, str]]:
+    verified = run.state.judged and run.state.judged.verification
+    if verified and verified.before_mm is not None:
+        after = "-" if verified.after_mm is None else f"{verified.after_mm:.3f}"
+        poses = len(run.state.held_out(Phase.AFTER))
+        name = f"mean deviation of the ball at {poses} held-out poses, mm"
+        yield name, f"{verified.before_mm:.3f}", after
     identified, accuracy = run.state.identified, judged_accuracy(run.state.judged)
-    if identified is None or identified.improvement is None:
-        return None
-    after = "-" if accuracy is None else f"{accuracy.position.value:.3f}"
-    return "largest position error at the task poses, mm", f"{identified.improvement.now_mm:.3f}", after
+    if identified is not None and identified.improvement is not None:
+        after = "-" if accuracy is None else f"{accuracy.position.value:.3f}"
+        name = "largest position error at the task poses, mm"
+        yield name, f"{identified.improvement.now_mm:.3f}", after
 
 
 def _left(run: ReportedRun) -> str:
@@ -181,9 +180,3 @@ def _left(run: ReportedRun) -> str:
     return (
         f"The new geometry is in the controller's config, approved by {state.committed.approved_by}{kept}."
     )
-
-
-def _teaching(run: ReportedRun, moved: TaskDisplacement | None) -> tuple[Block, ...]:
-    if moved is None or run.state.committed is None or run.state.rolled_back:
-        return ()
-    return (Paragraph(teaching_sentence(moved)),)

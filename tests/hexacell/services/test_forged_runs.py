@@ -147,7 +147,7 @@ FORGERIES: dict[str, tuple[Callable[[History], None], str]] = {
     ),
     "a covariance with negative variances": (
         lambda h: result_changed(h, covariance=((-1.0,) * 42,) * 42),
-        "a covariance is none",
+        "this is no covariance",
     ),
     "a geometry written without proposal": (
         lambda h: h.append(events.Committed(approved_by="me")),

@@ -21,7 +21,7 @@ from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import LengthMeasurements, length_standard
 from hexacell.verdict.outcome import outcome_line
 from hexacell.verdict.verification import HeldOut, Verification, verify
-from tests.hexacell.results.two_seat_records import two_seat_records
+from tests.hexacell.verdict.two_seat_records import two_seat_records
 
 FIXTURE = LengthCheckSettings(
     first_seat=(-150.0, 0.0, 500.0),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from hexacell.campaign.decisions import Forecast
 from hexacell.text.layout import wrapped
-from hexacell.text.measured_noise import noise_and_averaging_text
+from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.planning import quick_accuracy_text, quick_start_text, run_forecast_line
 from hexacell.text.verdict import check_start_text, check_text, length_text, verification_text
 from procedures.run.keys import Phase, SetKey
@@ -66,11 +66,11 @@ def _start_text(started: events.RunStarted) -> str | None:
 
 def _noise_text(measured: events.NoiseMeasured, state: RunState) -> str:
     """The noise, and what else was read meanwhile."""
-    noise, pilots = noise_and_averaging_text(measured.noise), len(state.set(measured.at).pilots)
+    text, pilots = measured_noise_text(measured.noise, with_averaging=True), state.set(measured.at).pilots
     if not pilots:
-        return noise
-    meanwhile = f"meanwhile {pilots} pilot poses were read, by which the next ones are chosen"
-    return f"{noise}\n{wrapped(meanwhile, indent=2)}"
+        return text
+    meanwhile = f"meanwhile {len(pilots)} pilot poses were read, by which the next ones are chosen"
+    return f"{text}\n{wrapped(meanwhile, indent=2)}"
 
 
 def _verdict_text(judged: events.ResultValidated) -> str | None:

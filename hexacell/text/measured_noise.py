@@ -22,23 +22,17 @@ NOTEWORTHY_DRIFT = 1.0
 """Smallest drift within seconds that is mentioned, in units of the noise of a record."""
 
 
-def measured_noise_text(measured: MeasuredNoise) -> str:
-    """What was measured, and what is wrong, a sentence a line."""
-    return _paragraphs([*_summary(measured), *_warnings(measured)])
-
-
-def measured_noise_lines(measured: MeasuredNoise) -> tuple[str, ...]:
-    """What was measured and what is wrong, each sentence as one line without indentation."""
-    return tuple(" ".join(line.split()) for line in [*_summary(measured), *_warnings(measured)])
-
-
-def noise_and_averaging_text(measured: MeasuredNoise) -> str:
-    """What was measured, what is wrong, and what means of more readings gain."""
-    return _paragraphs([*_summary(measured), *_warnings(measured), *_averaging(measured)])
-
-
-def _paragraphs(lines: Sequence[str]) -> str:
+def measured_noise_text(measured: MeasuredNoise, *, with_averaging: bool = False) -> str:
+    """What was measured, what is wrong and, if asked for, what means of more readings gain."""
+    lines = [*_summary(measured), *_warnings(measured)]
+    lines += _averaging(measured) if with_averaging else ()
     return "\n".join(wrapped(line, indent=2) for line in lines)
+
+
+def measured_noise_sentences(measured: MeasuredNoise) -> tuple[str, ...]:
+    """What was measured and what is wrong, as sentences of a page."""
+    lines = (" ".join(line.split()) for line in [*_summary(measured), *_warnings(measured)])
+    return tuple(f"{line[:1].upper()}{line[1:].removesuffix('.')}." for line in lines)
 
 
 def _summary(measured: MeasuredNoise) -> Iterator[str]:

@@ -7,7 +7,7 @@ from datetime import date
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.fields import CertificateSettings
 from hexacell.services.history.reported_run import ReportedRun
-from hexacell.text.measured_noise import measured_noise_lines
+from hexacell.text.measured_noise import measured_noise_sentences
 from hexacell.text.report.pages import Chapter, Facts, Paragraph, Report, Table, Tone
 from hexacell.text.report.results import (
     comparison_chapter,
@@ -77,9 +77,8 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
     if len(pairs) == 1:
         pairs.append(("Temperature", "not measured"))
     pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
-    lines = () if state.noise is None else measured_noise_lines(state.noise.noise)
-    noise = (Paragraph(f"{line[:1].upper()}{line[1:].removesuffix('.')}.") for line in lines)
-    return Chapter("Conditions", (Facts(tuple(pairs)), *noise, *_sets_table(run)))
+    noise = () if state.noise is None else measured_noise_sentences(state.noise.noise)
+    return Chapter("Conditions", (Facts(tuple(pairs)), *map(Paragraph, noise), *_sets_table(run)))
 
 
 def _sets_table(run: ReportedRun) -> tuple[Table, ...]:

@@ -232,8 +232,12 @@ def accuracy_plot(picture: RunPicture, target_mm: float | None) -> PlotView:
         records, last = picture.forecasts[-1]
         coming = [(float(records + last.records), last.end_mm)] if last.records else []
         series.append(Series("at the end", "x", *_columns(coming)))
+    title = "Accuracy, as predicted"
+    if picture.forecasts:
+        last = picture.forecasts[-1][1]
+        title = f"Accuracy {last.now_mm:.3f}->{last.end_mm:.3f} mm"
     return PlotView(
-        title=_accuracy_title(picture),
+        title=title,
         x_label="records",
         y_label="mm",
         series=tuple(series),
@@ -242,13 +246,6 @@ def accuracy_plot(picture: RunPicture, target_mm: float | None) -> PlotView:
         is_logarithmic=True,
         note="Predicted from the second point on, once the records determine something.",
     )
-
-
-def _accuracy_title(picture: RunPicture) -> str:
-    if not picture.forecasts:
-        return "Accuracy, as predicted"
-    last = picture.forecasts[-1][1]
-    return f"Accuracy {last.now_mm:.3f}->{last.end_mm:.3f} mm"
 
 
 def _columns(pairs: list[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -13,7 +13,7 @@ from hexacell.noise.measured_noise import (
     MeasuredNoise,
     RepeatedApproaches,
 )
-from hexacell.text.measured_noise import measured_noise_text, noise_and_averaging_text
+from hexacell.text.measured_noise import measured_noise_text
 
 
 def instrument(name: str, **more: Any) -> InstrumentNoise:
@@ -29,7 +29,7 @@ def measured(*changed: InstrumentNoise, **more: Any) -> MeasuredNoise:
 
 
 def said(noise: MeasuredNoise) -> str:
-    return " ".join(noise_and_averaging_text(noise).split())
+    return " ".join(measured_noise_text(noise, with_averaging=True).split())
 
 
 def visits(ratio: float, source: ScatterSource | None = None, excess: float = 0.0) -> RepeatedApproaches:
@@ -141,6 +141,6 @@ def test_means_that_gain_nothing_are_not_proposed() -> None:
 
 def test_where_the_run_is_over_the_averaging_is_not_told() -> None:
     told = measured(forecasts=forecasts(0.2, 0.15, 0.12), encoders_part_mm=0.17)
-    assert "expected at the task" in noise_and_averaging_text(told)
-    assert noise_and_averaging_text(told).startswith(measured_noise_text(told))
+    assert "expected at the task" in measured_noise_text(told, with_averaging=True)
+    assert measured_noise_text(told, with_averaging=True).startswith(measured_noise_text(told))
     assert "expected at the task" not in measured_noise_text(told)

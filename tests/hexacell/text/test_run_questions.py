@@ -59,7 +59,7 @@ def test_an_approval_shows_the_change_then_every_gate() -> None:
     improvement = ExpectedImprovement(now_mm=4.931, expanded_mm=0.0581)
     assert question_text(ask_approval(gates, "-1\n+2", None, improvement, cell="bench")) == (
         "\n-1\n+2\nok  The solver ended.\nNO  It is 9 mm.\n"
-        "Largest position error at the task poses: 4.93 mm with the config of now, 0 +-\n"
+        "Largest position error at the task poses: 4.93 mm with the current config, 0 +-\n"
         "    0.058 mm with this one.\n"
         "Write this into the controller's config? Type yes or no: "
     )

@@ -17,7 +17,7 @@ import numpy as np
 
 from hexacell.kinematics.parameters import LEGS, JointUnit, MachinePart
 from hexacell.kinematics.rotations import Array
-from hexacell.uncertainty.effects import UM, Effect, Occurrence, Placement, Readings
+from hexacell.uncertainty.effects import UM, Effect, Occurrence, Placement, RecordPlacement
 
 COMMON_SCALE = "scale common to all encoders"
 """The effect that a length check measures."""
@@ -159,24 +159,24 @@ def ball_beside_tool(mm: float, source: str = "") -> Effect:
     return Effect("ball beside the tool's centre", mm, "mm", Occurrence.WITH_TOOL, _beside, source=source)
 
 
-def _scales(readings: Readings) -> Array:
+def _scales(records: RecordPlacement) -> Array:
     # Along the base axes, as the estimator has them: the gauges' own are within a degree of these.
-    shares: Array = 1e-3 * readings.deviations[:, :, None] * np.eye(3)
+    shares: Array = 1e-3 * records.deviations[:, :, None] * np.eye(3)
     return shares
 
 
-def _oval(readings: Readings) -> Array:
+def _oval(records: RecordPlacement) -> Array:
     """Errors by each spherical harmonic of degree 2, the mean square of all five together being 1/2.
 
     The plate of a gauge touches the ball where its normal is the gauge's direction.
     """
-    touched = np.swapaxes(readings.rotations, -1, -2) @ readings.gauges
+    touched = np.swapaxes(records.poses.rotations, -1, -2) @ records.gauges
     x, y, z = np.moveaxis(touched, -2, 0)
     harmonics = np.stack(
         [x * y, y * z, z * x, 0.5 * (x * x - y * y), (3.0 * z * z - 1.0) / np.sqrt(12.0)], axis=-1
     )
     amplitude = UM * np.sqrt(1.5)
-    errors: Array = amplitude * np.einsum("ag,ngk->nak", readings.gauges, harmonics)
+    errors: Array = amplitude * np.einsum("ag,ngk->nak", records.gauges, harmonics)
     return errors
 
 

@@ -9,7 +9,7 @@ first order. An error ``df`` of the constraints, which is in mm of leg length, m
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
 from functools import cached_property
 
@@ -89,19 +89,22 @@ class Placement:
         return moved
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Readings:
-    """What the gauges see at n poses.
+@dataclass(frozen=True, eq=False)
+class RecordPlacement(Placement):
+    """A robot at n records, and what the gauges saw there.
 
     Attributes:
-        rotations: (n, 3, 3) of the platform.
         deviations: (n, 3), mm, along the base axes.
         gauges: (3, 3), columns: measuring directions of the gauges.
     """
 
-    rotations: Array
     deviations: Array
     gauges: Array
+
+    @classmethod
+    def of(cls, measured: MeasuredPoses) -> RecordPlacement:
+        """The robot at measured poses."""
+        return cls(**{one.name: getattr(measured, one.name) for one in fields(cls)})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,10 +128,20 @@ class Effect:
     unit: str
     occurrence: Occurrence
     on_poses: Callable[[Placement], Array] | None = None
-    on_readings: Callable[[Readings], Array] | None = None
+    on_readings: Callable[[RecordPlacement], Array] | None = None
     source: str = ""
     is_estimated: bool = False
     value: float = 0.0
+
+
+def errors_of_records(effect: Effect, records: RecordPlacement) -> Array:
+    """Errors (n, 3, k), mm, of the records by one unit of each cause of an effect."""
+    parts: list[Array] = [np.zeros((len(records), 3, 0))]
+    if effect.on_poses is not None:
+        parts.append(effect.on_poses(records)[:, :3])
+    if effect.on_readings is not None:
+        parts.append(effect.on_readings(records))
+    return np.concatenate(parts, axis=-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,26 +155,15 @@ class RecordEffects:
 
     def __call__(self, measured: MeasuredPoses, /) -> SystematicErrors:
         """The errors of n records at measured poses."""
-        placement = Placement(measured.mechanism, measured.geometry, measured.poses, measured.joints)
-        readings = Readings(measured.poses.rotations, measured.deviations, measured.gauges)
-        common: list[Array] = [np.zeros((len(placement), 3, 0))]
-        own = np.zeros((len(placement), 3, 3))
+        records = RecordPlacement.of(measured)
+        common: list[Array] = [np.zeros((len(records), 3, 0))]
+        own = np.zeros((len(records), 3, 3))
         for effect in self.effects:
             if not effect.size or effect.is_estimated or not effect.occurrence.is_in_records:
                 continue
-            errors = effect.size * errors_of_records(effect, placement, readings)
+            errors = effect.size * errors_of_records(effect, records)
             if effect.occurrence is Occurrence.EVERY_STOP:
                 own = own + errors @ np.swapaxes(errors, -1, -2)
             else:
                 common.append(errors)
         return SystematicErrors(np.concatenate(common, axis=-1), own)
-
-
-def errors_of_records(effect: Effect, placement: Placement, readings: Readings) -> Array:
-    """Errors (n, 3, k), mm, of the records by one unit of each cause of an effect."""
-    parts: list[Array] = [np.zeros((len(placement), 3, 0))]
-    if effect.on_poses is not None:
-        parts.append(effect.on_poses(placement)[:, :3])
-    if effect.on_readings is not None:
-        parts.append(effect.on_readings(readings))
-    return np.concatenate(parts, axis=-1)

@@ -165,8 +165,9 @@ class LengthCheck:
 
         A gauge is not a number where the ball hardly moved.
         """
-        along = self.records.gauges
-        moved, shown = self.records.placement.poses.positions @ along, self.records.deviations @ along
+        placement = self.records.placement
+        along = placement.gauges
+        moved, shown = placement.poses.positions @ along, placement.deviations @ along
         return {
             number: _slope(moved[rows], shown[rows])
             for number in np.unique(self.records.mountings).tolist()

@@ -21,10 +21,9 @@ from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import ParameterUnit
-from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE
-from hexacell.uncertainty.effects import Effect, Occurrence, Placement, Readings, errors_of_records
+from hexacell.uncertainty.effects import Effect, Occurrence, RecordPlacement, errors_of_records
 from hexacell.uncertainty.propagation import each_alone
 
 
@@ -56,39 +55,26 @@ class LengthRecords:
     Attributes:
         mountings: (n,) number of the mounting, from 1; the first seat has the odd ones.
         placement: the robot at the records, by the geometry that is judged and the joint variables shown.
-        deviations: (n, 3), mm, of the ball from the gauges' zero, along the base axes.
-        gauges: (3, 3), columns: measuring directions of the gauges.
     """
 
     mountings: NDArray[np.int_]
-    placement: Placement
-    deviations: Array
-    gauges: Array
+    placement: RecordPlacement
 
     @classmethod
-    def of(
-        cls,
-        mechanism: Mechanism,
-        geometry: Geometry,
-        commands: PoseBatch,
-        joints: Array,
-        deviations: Array,
-        mountings: NDArray[np.int_],
-        gauges: Array,
-    ) -> LengthRecords:
-        """Records commanded under (nearly) the geometry that is judged, joint variables (n, 6), mm.
+    def of(cls, commanded: RecordPlacement, mountings: NDArray[np.int_]) -> LengthRecords:
+        """Records whose poses are the commanded ones, under (nearly) the geometry that is judged.
 
         Raises:
             IdentifiabilityError: the geometry has no pose near a command at its joint variables.
         """
-        solved = forward_kinematics(mechanism, geometry, joints, commands)
+        mechanism, geometry = commanded.mechanism, commanded.geometry
+        solved = forward_kinematics(mechanism, geometry, commanded.joints, commanded.poses)
         if not solved.found.all():
             raise IdentifiabilityError(
                 "in the length check the joint variables do not belong to the commanded poses",
                 action="Check that the controller commands with the geometry in its config",
             )
-        placement = Placement(mechanism, geometry, solved.poses, joints)
-        return cls(mountings, placement, deviations, gauges)
+        return cls(mountings, replace(commanded, poses=solved.poses))
 
     def __len__(self) -> int:
         return len(self.mountings)
@@ -101,13 +87,8 @@ class LengthRecords:
     @property
     def places(self) -> Array:
         """(n, 3) where the ball would be with the gauges at zero, by the robot, mm."""
-        difference: Array = self.placement.poses.positions - self.deviations
+        difference: Array = self.placement.poses.positions - self.placement.deviations
         return difference
-
-    @property
-    def readings(self) -> Readings:
-        """What the gauges saw."""
-        return Readings(self.placement.poses.rotations, self.deviations, self.gauges)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,7 +140,7 @@ def shared_errors(records: LengthRecords, jacobian: Array, judged: JudgedGeometr
     through = None if columns is None else jacobian @ columns
     if effect.occurrence is not Occurrence.CONSTANT:
         return np.zeros((len(records), 3, 0)) if through is None else through
-    direct = -errors_of_records(effect, records.placement, records.readings)
+    direct = -errors_of_records(effect, records.placement)
     return direct if through is None else through + direct
 
 
@@ -167,15 +148,10 @@ def errors_by_effect(records: LengthRecords, effect: Effect, shared: Array) -> I
     """Errors by the causes that are shared, and by those that act on these records alone."""
     if not effect.is_estimated:  # else the covariance has them
         yield LengthError(effect.name, effect.size * shared, is_shared=True)
-    if effect.occurrence is Occurrence.EVERY_STOP:
-        yield LengthError(
-            effect.name,
-            effect.size * each_alone(errors_of_records(effect, records.placement, records.readings)),
-        )
-    elif effect.occurrence is not Occurrence.CONSTANT:
-        yield LengthError(
-            effect.name, effect.size * errors_of_records(effect, records.placement, records.readings)
-        )
+    if effect.occurrence is not Occurrence.CONSTANT:
+        errors = errors_of_records(effect, records.placement)
+        own = each_alone(errors) if effect.occurrence is Occurrence.EVERY_STOP else errors
+        yield LengthError(effect.name, effect.size * own)
 
 
 def errors_by_gauges(
@@ -186,7 +162,7 @@ def errors_by_gauges(
     sits = records.mountings[:, None] == mountings
     seated = np.einsum("nm,ab->namb", sits, np.eye(3)).reshape(len(records), 3, -1)
     yield LengthError("seating of the gauges", standard.seating_mm * seated)
-    turned = np.cross(np.eye(3), records.deviations[:, None]).swapaxes(1, 2)
+    turned = np.cross(np.eye(3), records.placement.deviations[:, None]).swapaxes(1, 2)
     yield LengthError("alignment of the gauges", noise.alignment * turned)
     second = records.seats[:, None, None] == 1
     yield LengthError("alignment of the gauges", standard.parallel * np.where(second, turned, 0.0))

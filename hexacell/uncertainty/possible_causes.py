@@ -43,10 +43,13 @@ from hexacell.uncertainty.effect_kinds import (
     rail_directions,
     rail_waves,
 )
-from hexacell.uncertainty.effects import Effect, Placement, Readings, errors_of_records
+from hexacell.uncertainty.effects import Effect, RecordPlacement, errors_of_records
 
 SMALLEST_SHARE = 0.1
 """Share of the excess that a cause must explain to be listed."""
+
+SMALLEST_REMAINDER = 1e-4
+"""Share of the square of a direction of Z that stations and parameters must leave: less is rounding."""
 
 WAVELENGTHS_MM = (600.0, 1500.0)
 """Waves of the rails that are longer than the travel of a slider at one point."""
@@ -88,9 +91,8 @@ def _of_the_machine(test: ExcessTest) -> Iterator[PossibleCause]:
 
 def _of_the_records(test: ExcessTest) -> Iterator[PossibleCause]:
     """The most likely data fault of each kind, if it is significant."""
-    model = test.found.linear_model
     kinds: set[type[FaultHypothesis]] = set()
-    for hypothesis in rank_hypotheses(model, test.found.noise_test):
+    for hypothesis in rank_hypotheses(test.found.linear_model, test.found.noise_test):
         if type(hypothesis) not in kinds:
             kinds.add(type(hypothesis))
             share = test.share_of_gain(hypothesis.gain, hypothesis.unknowns)
@@ -107,10 +109,6 @@ def _name(hypothesis: FaultHypothesis) -> str:
             where = "at every point" if point is None else f"at point {point}"
             return f"{fault.kind.value} ({', '.join(fault.gauges)}) {where}"
     raise TypeError(hypothesis)
-
-
-SMALLEST_REMAINDER = 1e-4
-"""Share of the square of a direction of Z that stations and parameters must leave: less is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,13 +131,13 @@ class ExcessTest:
 
     def by_effects(self, *effects: Effect) -> list[Array]:
         """What one unit of each cause of some effects does to the records."""
-        return [errors_of_records(effect, self._placement, self._readings) for effect in effects]
+        return [errors_of_records(effect, self._records) for effect in effects]
 
     def by_encoders(self) -> list[Array]:
         """Encoders whose scale changes along them."""
         joints = self.found.problem.joints
         bent = (joints - joints.mean(axis=0)) ** 2
-        return [self._placement.by_joints(bent[..., None] * np.eye(LEGS))[:, :3]]
+        return [self._records.by_joints(bent[..., None] * np.eye(LEGS))[:, :3]]
 
     def by_gauges(self) -> list[Array]:
         """Readings that are a linear function of the deviation, stations turned, and zeros that drift."""
@@ -155,7 +153,7 @@ class ExcessTest:
 
     def by_expansion(self) -> list[Array]:
         """Each part, and each leg, that expands evenly from the first record to the last."""
-        placement = self._placement
+        placement = self._records
         parameters, vector = placement.mechanism.parameters, placement.geometry.vector
         changes = [
             parameters.by_kind({kind.symbol: float(kind.part is part) for kind in parameters.kinds})
@@ -167,14 +165,8 @@ class ExcessTest:
         return [progress * by_parts[:, :3], progress * placement.by_constraints[:, :3]]
 
     @cached_property
-    def _placement(self) -> Placement:
-        found = self.found
-        return Placement(found.problem.mechanism, found.geometry, found.poses, found.problem.joints)
-
-    @cached_property
-    def _readings(self) -> Readings:
-        problem = self.found.problem
-        return Readings(self.found.poses.rotations, problem.deviations, problem.gauges)
+    def _records(self) -> RecordPlacement:
+        return RecordPlacement.of(self.found.measured)
 
     def _at_each_point(self, columns: Array) -> Array:
         """Columns (n, 3, k) as unknowns of each point (n, 3, k m)."""

@@ -40,7 +40,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
-from hexacell.uncertainty.effects import Effect, Occurrence, Placement, Readings, errors_of_records
+from hexacell.uncertainty.effects import Effect, Occurrence, Placement, RecordPlacement, errors_of_records
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,16 +107,8 @@ class Propagation:
         )
 
     @cached_property
-    def records(self) -> Placement:
-        """Where the robot was measured."""
-        problem = self.found.problem
-        return Placement(problem.mechanism, self.found.geometry, self.found.poses, problem.joints)
-
-    @cached_property
-    def readings(self) -> Readings:
-        """What the gauges saw at the records."""
-        problem = self.found.problem
-        return Readings(self.found.poses.rotations, problem.deviations, problem.gauges)
+    def _records(self) -> RecordPlacement:
+        return RecordPlacement.of(self.found.measured)
 
     @cached_property
     def _elimination(self) -> NuisanceElimination:
@@ -142,7 +134,7 @@ class Propagation:
         """Errors (p, k) of the free parameters by one unit of each cause of an effect."""
         if not effect.occurrence.is_in_records:
             return np.zeros((len(self._gain), 0))
-        on_records = errors_of_records(effect, self.records, self.readings)
+        on_records = errors_of_records(effect, self._records)
         each: Array = np.einsum("pna,nak->pnk", self._gain, on_records)
         before = None
         if effect.name in self.earlier:
@@ -165,7 +157,7 @@ class Propagation:
         """What one unit of every cause adds to the expected chi-square of the residuals."""
         if not effect.occurrence.is_in_records:
             return 0.0
-        errors = errors_of_records(effect, self.records, self.readings)
+        errors = errors_of_records(effect, self._records)
         if effect.occurrence is Occurrence.EVERY_STOP:
             errors = each_alone(errors)
         jacobian = self.found.prediction.jacobian

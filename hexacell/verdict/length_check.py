@@ -19,7 +19,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.results.result import AcceptedResult, LengthResult, LengthSource
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE
-from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.effects import Effect, RecordPlacement
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_records import JudgedGeometry, LengthRecords, LengthStandard
 from hexacell.uncertainty.propagation import errors_by_scale
@@ -106,15 +106,15 @@ def length_check(
     """
     fixture = settings.length_check
     assert fixture is not None  # noqa: S101 - a run without one has no such records
-    records = LengthRecords.of(
+    commanded = RecordPlacement(
         robot.mechanism,
         geometry,
         robot.frames.poses(measured.records.poses),
         measured.records.joints,
         robot.frames.deviations(measured.records.deviations),
-        measured.records.points,
         robot.frames.base,
     )
+    records = LengthRecords.of(commanded, measured.records.points)
     return LengthCheck.of(records, length_standard(fixture, measured.celsius), robot.noise, judged, effects)
 
 

@@ -88,9 +88,8 @@ def two_seats(
     seats = balls[0] + offsets * true / DISTANCE_MM + seated
     deviations: Array = balls - seats + noise.gauge_mm * random.standard_normal(balls.shape)
     read = shown + noise.encoder * random.standard_normal(shown.shape)
-    return LengthRecords.of(
-        robot.mechanism, found.geometry, commands, read, deviations, mountings, np.eye(3)
-    )
+    commanded = RecordPlacement(robot.mechanism, found.geometry, commands, read, deviations, np.eye(3))
+    return LengthRecords.of(commanded, mountings)
 
 
 def _pose(position: Array, a: float, b: float) -> Pose:

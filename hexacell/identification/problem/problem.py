@@ -18,7 +18,13 @@ from hexacell.identification.problem.commanded_poses import (
     CommandingGeometry,
     require_consistent_encoders,
 )
-from hexacell.identification.problem.prior import Noise, Prior, SystematicModel, no_systematic_errors
+from hexacell.identification.problem.prior import (
+    MeasuredPoses,
+    Noise,
+    Prior,
+    SystematicModel,
+    no_systematic_errors,
+)
 from hexacell.kinematics.forward import ForwardResult
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
@@ -95,6 +101,11 @@ class Problem:
     def geometry(self, free: Array) -> Geometry:
         """The geometry of free parameters (p,), mm."""
         return self.mechanism.convention.geometry(free)
+
+    def measured_at(self, free: Array, poses: PoseBatch) -> MeasuredPoses:
+        """What is known of the records under free parameters (p,), mm, that give them these poses."""
+        geometry = self.geometry(free)
+        return MeasuredPoses(self.mechanism, geometry, poses, self.joints, self.deviations, self.gauges)
 
     def solve_poses(self, free: Array) -> ForwardResult:
         """Poses that close the geometry of free parameters (p,), mm, at the records' joint variables."""

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.identification.problem.prior import MeasuredPoses, SystematicErrors
+from hexacell.identification.problem.prior import SystematicErrors
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction
@@ -182,16 +182,7 @@ class LinearCosts:
 
 def systematic_errors(problem: Problem, prediction: Prediction) -> SystematicErrors:
     """The errors of a problem's records at their predicted poses, beside the noise."""
-    return problem.systematic(
-        MeasuredPoses(
-            problem.mechanism,
-            problem.geometry(prediction.free),
-            prediction.poses,
-            problem.joints,
-            problem.deviations,
-            problem.gauges,
-        )
-    )
+    return problem.systematic(problem.measured_at(prediction.free, prediction.poses))
 
 
 def _least_squares(system: Array, values: Array) -> tuple[Array, float]:

@@ -208,30 +208,19 @@ def test_gauges_the_wrong_way_round_run_against_the_ball(
 
 def test_gauges_whose_ball_never_moved_say_nothing_of_their_direction(laboratory, exact, paper) -> None:
     records = seats().records(laboratory, exact, ideal(paper))
-    kept = np.flatnonzero(np.abs(records.deviations).max(axis=1) < 0.1)
     placement = records.placement
-    still = LengthRecords(
-        records.mountings[kept],
-        replace(placement, poses=placement.poses[kept], joints=placement.joints[kept]),
-        records.deviations[kept],
-        records.gauges,
-    )
+    kept = np.flatnonzero(np.abs(placement.deviations).max(axis=1) < 0.1)
+    rows = {name: getattr(placement, name)[kept] for name in ("poses", "joints", "deviations")}
+    still = LengthRecords(records.mountings[kept], replace(placement, **rows))
     followed = LengthCheck.of(still, seats().standard(), NOISE, judged(exact)).following()
     assert all(np.isnan(one).all() for one in followed.values())
 
 
 def test_joint_variables_of_other_poses_are_refused(laboratory, exact, paper) -> None:
     records = seats().records(laboratory, exact, ideal(paper))
+    wrong = replace(records.placement, joints=records.placement.joints * [1, -1, 1, -1, 1, -1])
     with pytest.raises(IdentifiabilityError, match="do not belong to the commanded poses"):
-        LengthRecords.of(
-            exact.problem.mechanism,
-            exact.geometry,
-            records.placement.poses,
-            records.placement.joints * [1, -1, 1, -1, 1, -1],
-            records.deviations,
-            records.mountings,
-            records.gauges,
-        )
+        LengthRecords.of(wrong, records.mountings)
 
 
 def budget_of(laboratory, paper, found, effects, scale=None) -> UncertaintyBudget:

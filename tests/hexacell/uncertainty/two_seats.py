@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.uncertainty.effects import RecordPlacement
 from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
 from tests.hexacell.uncertainty.conftest import Laboratory, Machine
 
@@ -60,9 +61,10 @@ class TwoSeats:
             np.concatenate([pose.positions for _, pose in rows]),
             np.concatenate([pose.rotations for _, pose in rows]),
         )
-        return LengthRecords.of(
-            found.problem.mechanism, found.geometry, commands, joints, deviations, mountings, np.eye(3)
+        commanded = RecordPlacement(
+            found.problem.mechanism, found.geometry, commands, joints, deviations, np.eye(3)
         )
+        return LengthRecords.of(commanded, mountings)
 
     def standard(self, **others: Any) -> LengthStandard:
         return LengthStandard(

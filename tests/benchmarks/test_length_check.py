@@ -28,6 +28,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
 from hexacell.robot.stated_effects import stated_effects
 from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.uncertainty.effects import RecordPlacement
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_records import JudgedGeometry, LengthRecords, LengthStandard
 from tests.benchmarks.imperfect_machine import ImperfectMachine

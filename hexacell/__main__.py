@@ -11,7 +11,7 @@ from hexacell.cli import app
 def main() -> int:
     """Run a command as a process of its own and return its exit code.
 
-    What numpy has to say of a number concerns developers: tests take it as an error, users do not see it.
+    Numpy's warnings concern developers: tests take them as errors, users do not see them.
     """
     if not sys.warnoptions:
         warnings.simplefilter("ignore", RuntimeWarning)

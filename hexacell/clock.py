@@ -35,5 +35,5 @@ class CellClock:
         await self.sleep(max(0.0, moment_s - self.now()))
 
     def wait(self, seconds: float, until: threading.Event) -> None:
-        """The same for a thread; returns early when ``until`` is set."""
+        """Sleep in a thread; returns early when ``until`` is set."""
         until.wait(self.real_seconds(seconds))

@@ -106,13 +106,13 @@ class ControllerSettings(Section):
         taught = [self.taught, *(one.taught for one in self.further_files)]
         if any(taught) and not all(taught):
             raise broken_rule(
-                "taught is stated for some of the files only", "State it for all of them, or for none"
+                "taught is stated for some of the files only", "State it for all of them, or leave it away"
             )
         return self
 
     @property
     def joint_unit_mm(self) -> float:
-        """One unit of the joint variables that it tells, in mm."""
+        """One unit of the joint variables that the controller reports, mm."""
         return self.unit_mm
 
 
@@ -121,5 +121,5 @@ class RotaryControllerSettings(ControllerSettings):
 
     @property
     def joint_unit_mm(self) -> float:
-        """One degree: an inch machine tells angles in degrees too."""
+        """One degree: an inch machine reports angles in degrees too."""
         return 1.0

@@ -84,7 +84,7 @@ class StreamSettings(DescribedFrame):
 
     @property
     def has_channel(self) -> bool:
-        """Whether its lines tell the gauge by its channel."""
+        """Whether its lines name the gauge by its channel."""
         return "channel" in re.compile(self.answer).groupindex
 
 
@@ -172,7 +172,7 @@ class ModbusEncoderSettings(Section):
     bits: Literal[16, 32] = Field(32, description="of a position, in one or two registers")
     word_order: Literal["big", "little"] = Field("big", description="which of two registers comes first")
     latch: LatchSettings | None = Field(
-        None, description="samples several devices at one instant, where they can be told to"
+        None, description="samples several devices at one instant, where they can do that"
     )
     invalid: tuple[int, ...] = Field((), max_length=8, description="counts that mean no valid position")
 

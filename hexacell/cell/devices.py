@@ -132,7 +132,7 @@ class GaugeSettings(Section):
 
     @property
     def place_on_line(self) -> int:
-        """What tells it from others on its port: its channel, or the register of its device."""
+        """What distinguishes it from others on its port: its channel, or the register of its device."""
         return self.channel if self.modbus is None else self.modbus.device << 16 | self.modbus.register_
 
     @property
@@ -204,7 +204,7 @@ class EncoderSettings(Section, ABC):
 
     @property
     def address(self) -> object:
-        """What says where they are; none if nothing does."""
+        """The section that says where the encoders are; None if no section does."""
         if self.are_of_controller:
             return self.protocol
         return self.bus if self.modbus is None else self.modbus.port
@@ -212,7 +212,7 @@ class EncoderSettings(Section, ABC):
     @property
     @abstractmethod
     def unit(self) -> JointUnit:
-        """That of the joint variables."""
+        """The unit of the joint variables."""
 
     @property
     @abstractmethod

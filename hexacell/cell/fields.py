@@ -21,10 +21,10 @@ from pydantic_core import PydanticCustomError
 from hexacell.storage.secrets import MASK
 
 LARGEST_NUMBER = 1e6
-"""Of any number in a cell file or a measurement file: a kilometre, eleven days."""
+"""Largest number in a cell file or a measurement file: a kilometre, eleven days."""
 
 SMALLEST_NUMBER = 1e-9
-"""Of one that must not be zero: a millionth of a nanometre."""
+"""Smallest number that must not be zero: a millionth of a nanometre."""
 
 LARGEST_SEED = 2**32 - 1
 LONGEST_TEXT = 1000
@@ -146,7 +146,7 @@ class Section(Frozen):
 
     @classmethod
     def field_of(cls, key: str) -> FieldInfo | None:
-        """The field of a key in the file; none if the section has no such key."""
+        """The field of a key in the file; None if the section has no such key."""
         return next((one for name, one in cls.model_fields.items() if cls.key(name) == key), None)
 
 

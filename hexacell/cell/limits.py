@@ -49,7 +49,7 @@ SixJointAxes = tuple[JointAxis, JointAxis, JointAxis, JointAxis, JointAxis, Join
 
 
 class AxisLimitSettings(Section):
-    """Smallest and largest command of each of the controller's axes; none: any."""
+    """Smallest and largest command of each of the controller's axes; None: any."""
 
     x: MinMax | None = Field(None, description="mm")
     y: MinMax | None = Field(None, description="mm")
@@ -60,7 +60,7 @@ class AxisLimitSettings(Section):
 
     @property
     def ranges(self) -> tuple[MinMax | None, ...]:
-        """Those of the six axes in their order."""
+        """The limits of the six axes in their order."""
         return (self.x, self.y, self.z, self.a, self.b, self.c)
 
 
@@ -85,12 +85,12 @@ class PassiveJointSettings(Section):
 
     @property
     def base_cones(self) -> tuple[float, ...]:
-        """Those of the six legs at the base, deg."""
+        """The cones of the six legs at the base, deg."""
         return self.base_cones_deg or (self.base_cone_deg,) * 6
 
     @property
     def platform_cones(self) -> tuple[float, ...]:
-        """Those of the six legs at the platform, deg."""
+        """The cones of the six legs at the platform, deg."""
         return self.platform_cones_deg or (self.platform_cone_deg,) * 6
 
 

@@ -29,10 +29,10 @@ from hexacell.storage.toml_document import KeyPath, TomlDocument, is_secret, tab
 _log = logging.getLogger(__name__)
 
 LARGEST_FILE_BYTES = 500_000
-"""Of a cell file, which usually has less than ten thousand."""
+"""Largest cell file that is read, bytes; most have less than ten thousand."""
 
-MOST_TOLD = 20
-"""More mistakes than these nobody reads at once."""
+MOST_REPORTED = 20
+"""Most mistakes that are reported at once."""
 
 SectionType = TypeVar("SectionType", bound=Section)
 
@@ -55,7 +55,7 @@ class Cell:
 
     @property
     def text_without_secrets(self) -> str:
-        """The same with every password masked, as it is kept with a run."""
+        """The whole file with every password masked, as it is kept with a run."""
         return without_secrets(self.text)
 
     @property
@@ -187,7 +187,7 @@ def validated(document: TomlDocument, model: type[SectionType], path: Path) -> S
         FileError: there is one mistake.
         SeveralErrors: there is more than one.
     """
-    diagnosis = Diagnosis(document, ModelLookup(model), MOST_TOLD)
+    diagnosis = Diagnosis(document, ModelLookup(model), MOST_REPORTED)
     errors = diagnosis.unsupported_values()
     try:
         # As JSON, because strict validation then accepts arrays as tuples.
@@ -199,8 +199,8 @@ def validated(document: TomlDocument, model: type[SectionType], path: Path) -> S
             raise
     if errors:
         in_order = sorted(errors.values(), key=lambda error: error.line or 0)
-        count = f"{len(errors)} mistakes" if len(errors) < MOST_TOLD else "many mistakes; among them"
-        raise joined(f"{path} has {count}", in_order[:MOST_TOLD])
+        count = f"{len(errors)} mistakes" if len(errors) < MOST_REPORTED else "many mistakes; among them"
+        raise joined(f"{path} has {count}", in_order[:MOST_REPORTED])
     return settings
 
 
@@ -234,7 +234,7 @@ def dump(settings: Section, remark: Remark = lambda _: None) -> str:
 
 
 def subsections(path: KeyPath, value: object) -> list[tuple[KeyPath, Section]]:
-    """The sections in the value at ``path``, each with its path; none if it is a plain value."""
+    """The sections in the value at ``path``, each with its path; empty for a plain value."""
     if isinstance(value, Section):
         return [(path, value)]
     items = value if isinstance(value, tuple) else ()

@@ -255,7 +255,7 @@ class NoiseSettings(Section):
     )
 
     def gauge_at(self, index: int) -> float:
-        """Of the readings of gauge x, y or z, index 0 to 2, mm."""
+        """Noise of the readings of gauge x, y or z, index 0 to 2, mm."""
         return self.gauge_mm if self.gauges_mm is None else self.gauges_mm[index]
 
     @model_validator(mode="after")

@@ -122,7 +122,7 @@ class CellSettings(Section):
 
     @property
     def certificates(self) -> dict[str, CertificateSettings]:
-        """Those of all instruments that have one, by the instrument's name."""
+        """The certificates of all instruments that have one, by the instrument's name."""
         fixture = self.length_check
         named = {
             **{f"gauge {gauge.name}": gauge.certificate for gauge in self.gauges},
@@ -256,7 +256,7 @@ class CellSettings(Section):
         ]
         refusals = [
             InitErrorDetails(
-                type=broken_rule(f"{problem}; only a cell with a [simulation] needs none", "Add it"),
+                type=broken_rule(f"{problem}; only a cell with a [simulation] may leave it away", "Add it"),
                 loc=place,
                 input=None,
             )

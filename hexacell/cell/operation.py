@@ -34,7 +34,7 @@ class ArchiveSettings(Section):
 
 
 def mistake_in_url(url: str) -> tuple[str, str] | None:
-    """What is wrong with the address of a shared archive, and what to do; none if nothing is."""
+    """What is wrong with the address of a shared archive, and what to do; None if nothing is."""
     found = _POSTGRESQL.fullmatch(url)
     if found is None:
         return "this is no address of a PostgreSQL database", "Write postgresql://user@host/database"
@@ -134,7 +134,7 @@ MOST_NOTIFICATIONS = 10
 
 
 class Occasion(StrEnum):
-    """What a run without a person may be worth telling for; one run may be of several."""
+    """Why a run without a person is reported; one run may have several reasons."""
 
     PASS = "pass"  # noqa: S105 - a verdict
     NO_PASS = "no-pass"  # noqa: S105 - likewise
@@ -160,7 +160,7 @@ _WILD = re.compile(r"[#+\0]")
 
 
 class NotificationSettings(Section):
-    """Somebody who is told of runs without a person; several may be."""
+    """Somebody who is notified of runs without a person."""
 
     name: Name = Field(description="name of the recipient")
     url: Text | None = Field(
@@ -203,9 +203,9 @@ class NotificationSettings(Section):
 
     @field_validator("on")
     @classmethod
-    def _tells_something(cls, on: tuple[OccasionWord, ...]) -> tuple[OccasionWord, ...]:
+    def _reports_something(cls, on: tuple[OccasionWord, ...]) -> tuple[OccasionWord, ...]:
         if not on:
-            raise broken_rule("nothing is told", "Name an occasion, or remove the section")
+            raise broken_rule("nothing is reported", "Name an occasion, or remove the section")
         return on
 
     @field_validator("topic")
@@ -228,7 +228,7 @@ def scheme_of(url: str) -> str:
 
 
 def mistake_in_address(url: str) -> tuple[str, str] | None:
-    """What is wrong with an address in a cell file, and what to do; none if nothing is."""
+    """What is wrong with an address in a cell file, and what to do; None if nothing is."""
     found = _ADDRESS.fullmatch(url)
     if found is None:
         return "this is no address", "Write https://host/path, mqtts://host or mailto://host?to=..."

@@ -44,7 +44,7 @@ def with_passwords(
     """The settings with the controller's passwords; ``folder`` has the cell file.
 
     Raises:
-        FileError: the password file cannot be read, is none, or others can read or change it.
+        FileError: the password file cannot be read, has another content, or others can read or change it.
         UsageError: a variable of the environment has control characters or is too long.
     """
     controller = settings.controller
@@ -70,7 +70,7 @@ def password_warnings(cell: Cell) -> Iterator[str]:
 
 
 def _mode(path: Path) -> int:
-    """The permissions of a file; none if it cannot be found, which is told where it is read."""
+    """The permissions of a file; 0 if it cannot be found, which is reported where it is read."""
     try:
         return path.stat().st_mode
     except (OSError, ValueError):

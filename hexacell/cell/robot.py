@@ -87,14 +87,14 @@ class RobotSettings(Section):
 
 @cache
 def mechanism_named(name: str) -> Mechanism:
-    """The mechanism that is announced under a name; raises ``UsageError`` if there is none."""
+    """The mechanism that is announced under a name; raises ``UsageError`` if it is not installed."""
     found: Mechanism = load(Group.MECHANISMS, name)()
     return found
 
 
 @cache
 def mechanism_of(name: str, *, encoder_scales: bool) -> Mechanism:
-    """The same, with errors of the encoders' scales if these are identified."""
+    """The mechanism with this name, with errors of the encoders' scales if these are identified."""
     return _with_scales(mechanism_named(name), encoder_scales=encoder_scales)
 
 

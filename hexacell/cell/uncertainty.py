@@ -53,7 +53,7 @@ class CommonUncertaintySettings(Section):
     grade: Grade = Field(
         "precision",
         description="what sizes that are not given are for; precision: glass scales and precision guides; "
-        "ordinary: magnetic scales and ordinary guides; ideal: none of the effects, as in a simulation",
+        "ordinary: magnetic scales and ordinary guides; ideal: no effects, as in a simulation",
     )
     stop_repeatability_acts: Literal["everywhere", "at work"] = Field(
         "everywhere",
@@ -109,7 +109,7 @@ class CommonUncertaintySettings(Section):
 
     @property
     def common_scale_um_m(self) -> float:
-        """Size of a scale error common to all encoders; encoders of angles have none."""
+        """Size of a scale error common to all encoders, um/m; 0 for encoders of angles."""
         return 0.0
 
     def source(self, key: str) -> str:
@@ -121,7 +121,7 @@ class CommonUncertaintySettings(Section):
 
 
 class LinearUncertaintySettings(CommonUncertaintySettings):
-    """The same of a machine whose joint variables are lengths."""
+    """Sizes of the effects of a machine whose joint variables are lengths."""
 
     common_encoder_scale_um_m: NotNegative = Field(
         15.0, description="scale error that all encoders have alike, um/m"
@@ -133,12 +133,12 @@ class LinearUncertaintySettings(CommonUncertaintySettings):
 
     @property
     def common_scale_um_m(self) -> float:
-        """As stated."""
+        """Size of a scale error common to all encoders, um/m."""
         return self.common_encoder_scale_um_m
 
 
 class RotaryUncertaintySettings(CommonUncertaintySettings):
-    """The same of a machine whose joints turn: a full circle has no error of scale."""
+    """Sizes of the effects of a machine whose joints turn: a full circle has no error of scale."""
 
     encoder_eccentricity_mdeg: NotNegative = Field(
         2.0, description="amplitude of each encoder's error over a turn, as its disc is off centre, mdeg"
@@ -149,7 +149,7 @@ class RotaryUncertaintySettings(CommonUncertaintySettings):
 
 
 class UncertaintySettings(LinearUncertaintySettings):
-    """The same of a machine whose joints move along rails."""
+    """Sizes of the effects of a machine whose joints move along rails."""
 
     rail_direction_mrad: NotNegative = Field(
         0.02, description="angle of each rail from parallel, horizontally and vertically, mrad"

@@ -78,7 +78,7 @@ def _carried_out(options: argparse.Namespace, typed: Sequence[str]) -> int:
 
 
 def _require_usable(typed: Sequence[str]) -> None:
-    """Refuse arguments that are not valid file names, which nothing else may be either.
+    """Refuse arguments that could not even be the name of a file.
 
     Raises:
         UsageError: one is too long, or has characters that no file name has.

@@ -12,7 +12,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 
 LARGEST_CONFIG_BYTES = 1_000_000
-"""Of a file, which usually has a few thousand."""
+"""Largest config that is read, bytes; most have a few thousand."""
 
 Range = tuple[float, float]
 JointRanges = tuple[Range, ...]
@@ -23,8 +23,8 @@ class ControllerLimits(Frozen):
     """What a controller may be commanded to, by its own configuration.
 
     Attributes:
-        joints: smallest and largest joint of each leg as the controller tells it; none: any.
-        axes: smallest and largest command of x, y, z, mm, and of a, b, c, deg; none: any.
+        joints: smallest and largest joint of each leg as the controller reports it; None: any.
+        axes: smallest and largest command of x, y, z, mm, and of a, b, c, deg; None: any.
     """
 
     joints: JointRanges | None = None
@@ -87,7 +87,7 @@ class ConfigPart:
 
     Attributes:
         values: by the parameters' names, each in its unit.
-        branch: that of the robot; none where the file has nothing to do with it.
+        branch: that of the robot; None where the file has nothing to do with it.
         limits: those that the file has, if any.
     """
 

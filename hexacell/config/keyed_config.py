@@ -117,7 +117,7 @@ def _filled(pattern: str, values: Mapping[str, str | int]) -> str:
 class NumberKeys:
     """The key of each parameter, of its correction if it has one, and of the signs or the signs.
 
-    ``branch`` is none of a file that is one of several and has no signs.
+    ``branch`` is None for a file that is one of several and has no signs.
     """
 
     values: Mapping[str, str]
@@ -259,7 +259,7 @@ class KeyedConfig:
         return value
 
     def _keys_of(self, parameter: GeometricParameter) -> tuple[str, ...]:
-        """Of the numbers whose sum it is."""
+        """The keys of the numbers whose sum it is."""
         keys = (self._keys.values[parameter.name], self._keys.corrections.get(parameter.name))
         return tuple(key for key in keys if key is not None)
 

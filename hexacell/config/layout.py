@@ -150,7 +150,7 @@ class CurrentConfig:
 
 
 Contents = tuple[bytes, ...]
-"""Of each file, in the order in which the cell file names them."""
+"""What each file holds, in the order in which the cell file names them."""
 
 
 def read_contents(paths: Iterable[Path]) -> Contents:
@@ -159,7 +159,7 @@ def read_contents(paths: Iterable[Path]) -> Contents:
 
 
 def read_contents_if_present(paths: Iterable[Path]) -> Contents | None:
-    """The same; none if one of the files is not there."""
+    """What the files hold now; None if one of them is not there."""
     found = [atomic_files.read_if_present(path) for path in paths]
     there = tuple(data for data in found if data is not None)
     return there if len(there) == len(found) else None
@@ -174,7 +174,7 @@ def fingerprint_of(contents: Contents) -> str:
 
 
 def fingerprint(*paths: Path) -> str:
-    """That of a config, for the start of a run; raises ``FileError``."""
+    """The fingerprint of a config, for the start of a run; raises ``FileError``."""
     return fingerprint_of(read_contents(paths))
 
 

@@ -177,7 +177,7 @@ ROTARY_JOINT = "ANGULAR"
 
 
 def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
-    """The limits in an INI file, in mm and deg; of axes and joints that are not all there: none.
+    """The limits in an INI file, in mm and deg; None for axes and joints that are not all there.
 
     ``unit_mm`` is one unit of length of the machine; angles are in degrees on every machine.
 
@@ -189,7 +189,7 @@ def limits_of_ini(path: Path, unit_mm: float = 1.0) -> ControllerLimits:
 
 
 def limits_in(ini: NumberLookup, source: Path | None, unit_mm: float) -> ControllerLimits:
-    """The same of a text that was read from ``source``."""
+    """The limits in a text that was read from ``source``."""
     joints = [
         _range(ini, section, 1.0 if _turns(ini, section) else unit_mm, source)
         for section in (f"JOINT_{leg}" for leg in range(LEGS))
@@ -211,7 +211,7 @@ def _turns(ini: NumberLookup, joint: str) -> bool:
 
 
 def _range(ini: NumberLookup, section: str, unit: float, source: Path | None) -> Range | None:
-    """Both limits of a joint or an axis; LinuxCNC takes one that is not there for none."""
+    """Both limits of a joint or an axis; LinuxCNC takes an absent one for unlimited."""
     low, high = (_limit(ini, f"{section}/{name}", source) for name in ("MIN_LIMIT", "MAX_LIMIT"))
     if low is None and high is None:
         return None

@@ -34,7 +34,7 @@ class NumberToken:
         """The number.
 
         Raises:
-            ValueError: it is none, or beyond what a geometry can hold.
+            ValueError: it is not a number, or beyond what a geometry can hold.
         """
         if not _NUMBER.fullmatch(self.text):
             raise ValueError(f"{self.text!r} is not a number")

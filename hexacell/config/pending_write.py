@@ -49,7 +49,7 @@ class _Note(JsonRecord):
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """Of the files."""
+        """The paths of the files."""
         return tuple(one.path for one in self.files)
 
 
@@ -88,7 +88,7 @@ def note_write(paths: Sequence[Path], before: Contents, after: Contents) -> None
         FileError: the note cannot be written, or somebody has put a link in its place.
     """
     place = note_path(paths)
-    if os.path.islink(place):  # noqa: PTH114 - Path.is_symlink raises where it cannot be told
+    if os.path.islink(place):  # noqa: PTH114 - Path.is_symlink raises where that is unknown
         raise FileError("is a link, which would lead a note elsewhere", subject=place, action="Remove it")
     files = tuple(
         _NotedFile(path=path.absolute(), before=old.decode(_AS_TEXT), sha256_after=atomic_files.sha256(new))
@@ -116,7 +116,7 @@ def is_interrupted(paths: Sequence[Path]) -> bool:
 
 
 def settle_interrupted_write(paths: Sequence[Path]) -> InterruptedWrite | None:
-    """Undo what a process that died left of a write; none if there is nothing.
+    """Undo what a process that died left of a write; None if there is nothing.
 
     The caller must hold the cell: a write that is going on looks the same.
 
@@ -189,7 +189,7 @@ def held_config(*paths: Path) -> Iterator[None]:
 
 
 def settle_config(*paths: Path) -> str | None:
-    """Settle what a process that was killed left of a write; what became of it, none if there is nothing.
+    """Settle what a killed process left of a write; gives what became of it, None if there is nothing.
 
     Where another process holds the cell, it is left to that one.
 
@@ -207,7 +207,7 @@ def settle_config(*paths: Path) -> str | None:
 
 
 def interrupted_sentence(settled: InterruptedWrite) -> str:
-    """What is said of it."""
+    """What became of an interrupted write, as a sentence."""
     files = " and ".join(settled.files)
     if settled.is_complete:
         return f"a write of {files} was interrupted when all of them were new: it is complete"

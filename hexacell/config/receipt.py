@@ -84,7 +84,7 @@ class Receipt(JsonRecord):
 class NumberVersions:
     """One number of the geometry in three versions of a config, in its unit.
 
-    ``now`` is none where the config of now has no geometry that can be read.
+    ``now`` is None where the current config has no geometry that can be read.
     """
 
     name: str
@@ -95,7 +95,7 @@ class NumberVersions:
 
     @property
     def is_edited(self) -> bool:
-        """Whether the number of now is from neither of the other two."""
+        """Whether the current number is from neither of the other two versions."""
         return self.now is not None and self.now not in {self.before, self.written}
 
 
@@ -104,7 +104,7 @@ class ConfigVersions:
     """The numbers that are not the same in all three versions, and the edit as a text change.
 
     Attributes:
-        edit: from the version that the config of now is most like to now, as a unified diff.
+        edit: the changes from the most similar version to the current config, as a unified diff.
         is_from_written: whether that is the version which the run wrote.
     """
 

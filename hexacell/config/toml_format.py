@@ -106,7 +106,7 @@ class NativeToml:
         return NativeToml(there).rewrite(text, Geometry(there, [values[name] for name in there.names]))
 
     def _kinds_in(self, document: TomlDocument) -> ParameterSet:
-        """Those of the mechanism that the document has, and whether it has the branch."""
+        """The parameters of the mechanism that the document has, and whether it has the branch."""
         section = document.data.get("geometry")
         names = {*section} if isinstance(section, dict) else set()
         has_branch = self._parameters.has_branch and "branch" in names | {*document.data}
@@ -139,7 +139,7 @@ class _Content:
         return Geometry.of(self.parameters, values)
 
     def branch(self) -> Branch:
-        """The signs, in ``[geometry]`` or at the top of the file; none of a mechanism without."""
+        """The signs, in ``[geometry]`` or at the top of the file; empty for a mechanism without."""
         if not self.parameters.has_branch:
             return ()
         path = ("branch",) if "branch" in self.document.data else self._path_to("branch")
@@ -150,7 +150,7 @@ class _Content:
         return cast("Branch", tuple(int(sign) for sign in signs))
 
     def joint_ranges(self) -> JointRanges | None:
-        """Smallest and largest joint variable of each leg; none where the six are not all stated."""
+        """Smallest and largest joint variable of each leg; None where the six are not all stated."""
         axes = self.document.data.get("axes")
         if not isinstance(axes, list) or len(axes) != LEGS:
             return None

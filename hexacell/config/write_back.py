@@ -51,7 +51,7 @@ def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
 
 
 def rollback(receipt: Receipt) -> None:
-    """Restore the config of before the commit, byte for byte; may be repeated.
+    """Restore the config as it was before the commit, byte for byte; may be repeated.
 
     Raises:
         FileError: the config is not the one that was written, the backup is missing, or the config cannot
@@ -75,7 +75,7 @@ def restore(paths: tuple[Path, ...], contents: Contents, *, expected: Contents) 
     """Replace the config by an earlier version, while it is as ``expected``, and read it back.
 
     Raises:
-        FileError: it has changed, or cannot be written; of several files none is replaced then. If even
+        FileError: it has changed, or cannot be written; of several files no one is replaced then. If even
             that fails, the next command that uses the cell does it.
     """
     replacement = Replacement(paths, expected, contents)
@@ -86,7 +86,7 @@ def restore(paths: tuple[Path, ...], contents: Contents, *, expected: Contents) 
     except BaseException:
         if len(replacement.changed) > 1:
             with suppress(FileError):
-                replacement.put_back(all_of_them=False)
+                replacement.restore(all_of_them=False)
         raise
 
 
@@ -101,7 +101,7 @@ def _require_unchanged(paths: Sequence[Path], found: Contents, before: Contents)
 
 
 def _edited(receipt: Receipt, found: Contents, before: Contents) -> tuple[Path, Path]:
-    """A file that is neither as before nor as written, and its copy of before."""
+    """A file that is neither as before nor as written, and the copy that was made before the write."""
     files = list(zip(receipt.paths, receipt.kept(BEFORE), strict=True))
     with suppress(FileError):
         for file, data, *known in zip(files, found, before, receipt.written(), strict=True):
@@ -154,7 +154,7 @@ def _undo(
     receipt: Receipt, replacement: Replacement, cause: BaseException, *, all_of_them: bool
 ) -> NoReturn:
     try:
-        replacement.put_back(all_of_them=all_of_them, keep=lambda found: _keep(receipt, found))
+        replacement.restore(all_of_them=all_of_them, keep=lambda found: _keep(receipt, found))
     except FileError as error:
         if any(one.present != one.old for one in replacement.changed):
             raise _not_undone(receipt, cause, error) from cause
@@ -197,7 +197,7 @@ class ReplacedFile(NamedTuple):
 
     @property
     def present(self) -> bytes | None:
-        """What it holds; none if it cannot be read."""
+        """What it holds; None if it cannot be read."""
         try:
             return atomic_files.read_bytes(self.path)
         except FileError:
@@ -208,7 +208,7 @@ class ReplacedFile(NamedTuple):
 class Replacement:
     """Files that hold ``before`` and are to hold ``after``; those that stay as they are, are not touched.
 
-    First :meth:`write`, then :meth:`finish`; where one of them fails, :meth:`put_back`.
+    First :meth:`write`, then :meth:`finish`; where one of them fails, :meth:`restore`.
     """
 
     paths: tuple[Path, ...]
@@ -250,14 +250,14 @@ class Replacement:
         """Whether a file has its new content, or may have it."""
         return any(one.present in {one.new, None} for one in self.changed)
 
-    def put_back(self, *, all_of_them: bool, keep: Callable[[bytes], None] = lambda _: None) -> None:
+    def restore(self, *, all_of_them: bool, keep: Callable[[bytes], None] = lambda _: None) -> None:
         """Give the files their old content again and remove the note.
 
         ``all_of_them``: also those that hold neither their old nor their new content. ``keep`` is given
         what they hold, so that it is not lost; the others are somebody's edit and stay.
 
         Raises:
-            FileError: of the last file that could not be put back; the others were.
+            FileError: of the last file that could not be restored; the others were.
         """
         failure: FileError | None = None
         for one in self.changed:

@@ -62,7 +62,7 @@ class WriteRecord(Frozen):
         run: the name of the run whose geometry was written or undone; empty where there is none.
         files: of the config, the first one first.
         numbers_changed, largest: how many numbers of the geometry changed, and the one that changed most (a
-            milliradian counts as a millimetre); none where that is not known.
+            milliradian counts as a millimetre); None where that is not known.
         why: what the program knows of the cause.
         reason: what the person gave as one.
     """
@@ -155,7 +155,7 @@ def read_records(folder: Path) -> tuple[tuple[WriteRecord, ...], tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class _Version:
-    """A config at one moment; no geometry where none can be read."""
+    """A config at one moment; without a geometry where it cannot be read."""
 
     sha256: str
     geometry: Geometry | None
@@ -192,7 +192,7 @@ def _record(paths: tuple[Path, ...], before: _Version, after: _Version, cause: W
 
 
 def _changes(before: Geometry | None, after: Geometry | None) -> list[NumberChange] | None:
-    """The numbers that differ, the largest change first; none where a geometry is not known."""
+    """The numbers that differ, the largest change first; None where a geometry is not known."""
     if before is None or after is None:
         return None
     units = [one.kind.unit for one in after.parameters.parameters]

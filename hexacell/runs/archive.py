@@ -41,13 +41,13 @@ from hexacell.runs.archived_documents import ArchiveUnavailable, DocumentKind, S
 from hexacell.storage.atomic_files import NOT_FOR_OTHERS
 
 VERSION = 1
-"""Of the documents and their table. A newer program makes a table of its own and fills it anew."""
+"""Version of the documents and their table; a newer program makes a table of its own and fills it anew."""
 
 INDEX = "index.sqlite"
 """The file of a cell's own archive, in the folder of its runs."""
 
 PATIENCE_S = 5
-"""Of a connection to a database server, and of a wait for another process."""
+"""Longest wait for a database server or for another process, s."""
 
 Found = TypeVar("Found")
 
@@ -199,7 +199,7 @@ class Archive:
 
 
 def open_engine(url: URL) -> Engine:
-    """Of SQLite, or of a PostgreSQL; connects to nothing yet. Raises ``ModuleNotFoundError``."""
+    """An engine for SQLite or PostgreSQL, not connected yet; raises ``ModuleNotFoundError``."""
     if url.drivername == "sqlite":
         return create_engine(url, poolclass=NullPool, connect_args={"timeout": PATIENCE_S})
     with_driver = url.set(drivername="postgresql+psycopg")
@@ -213,14 +213,14 @@ def _make_table(connection: Connection) -> None:
 
 
 def _make_file(path: Path | None) -> None:
-    """SQLite would make a file as the umask has it; where there can be none, it says why."""
+    """SQLite would make a file as the umask has it; where it cannot, it says why."""
     if path is not None and not path.exists():
         with suppress(OSError):
             os.close(os.open(path, os.O_CREAT | os.O_WRONLY, 0o666 & ~NOT_FOR_OTHERS))
 
 
 def _is_damaged(error: DBAPIError) -> bool:
-    """Whether a file of SQLite is none, or has other tables than it should."""
+    """Whether a file is no SQLite database, or has other tables than it should."""
     code = getattr(error.orig, "sqlite_errorcode", None)
     return code is not None and code & 0xFF not in _READ_ONLY_OR_BUSY
 
@@ -236,7 +236,7 @@ class SharedDocument:
 
 
 def shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]:
-    """All documents of one kind, by cell, place and run; none where no cell has put anything there.
+    """All documents of one kind, by cell, place and run; empty where no cell has put anything there.
 
     Raises:
         ArchiveUnavailable: it cannot be read.

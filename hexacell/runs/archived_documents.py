@@ -13,7 +13,7 @@ from hexacell.storage.atomic_files import os_error_to_file_error
 
 
 class DocumentKind(StrEnum):
-    """What the archive keeps of a run; of a cell, under no run's name, what others are told of it."""
+    """What the archive keeps of a run; of a cell, under no run's name, its status for others."""
 
     SUMMARY = "summary"
     RESULT = "result"
@@ -34,7 +34,7 @@ class ArchiveUnavailable(FileError):
 
 
 def folder_stamps(folder: Path) -> dict[str, str]:
-    """The stamp of each run folder in ``folder``, by name; none where ``folder`` does not exist.
+    """The stamp of each run folder in ``folder``, by name; empty where ``folder`` does not exist.
 
     Hidden folders are no runs.
 

@@ -78,7 +78,7 @@ class RunFolder:
         return self.path / "wire"
 
     def new_wire(self) -> Path:
-        """The same for a run that is resumed: what went over the wires before is kept."""
+        """A new trace for a run that is resumed: what went over the wires before is kept."""
         return _unused(self.wire)
 
     def create(self, cell: Cell) -> None:
@@ -106,7 +106,7 @@ def runs_folder(cell: Cell) -> Path:
 
 
 def runs_folder_of_unreadable(path: Path) -> Path | None:
-    """The same where the file at ``path`` has mistakes; none where neither it nor a run tells its name."""
+    """Where the runs of the cell file at ``path``, which has mistakes, are; None if its name is unknown."""
     every = path.parent / "runs"
     with suppress(OSError, ValidationError):
         return every / TypeAdapter(Name).validate_python(_stated_name(path.read_text(errors="replace")))
@@ -127,7 +127,7 @@ def new_run(cell: Cell) -> RunFolder:
 
 
 def new_run_in(folder: Path) -> RunFolder:
-    """The same below the folder of a cell's runs."""
+    """A folder for a run that begins now, below the folder of a cell's runs."""
     return RunFolder(_unused(folder / datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")))
 
 
@@ -135,7 +135,7 @@ def find_run(cell: Cell, named: str) -> RunFolder:
     """A run by its folder, or by its name within the cell's runs.
 
     Raises:
-        UsageError: there is none.
+        UsageError: there is no such run.
     """
     for path in (Path(named), runs_folder(cell) / named):
         if RunFolder(path).journal.is_file():
@@ -184,7 +184,7 @@ class StartAttempts(Frozen):
 
 
 def read_attempts(folder: RunFolder) -> StartAttempts | None:
-    """The tries that a run folder keeps; none where the run began at once.
+    """The tries that a run folder keeps; None where the run began at once.
 
     Raises:
         FileError: they cannot be read.

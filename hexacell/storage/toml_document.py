@@ -104,7 +104,7 @@ class TomlDocument:
 
 @lru_cache(maxsize=8)
 def _located(text: str) -> Mapping[KeyPath, slice]:
-    """The same few texts are parsed again and again, and the scanner takes most of the time."""
+    """The locations, kept for a few texts: these are parsed again and again, and the scanner is slow."""
     return locate(text)
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hexacell.services.write_back.config_rollback import ConfigRollback
     from hexacell.services.write_back.proposals import AppliedProposal
 
-RELOAD = "Restart or reload the controller before it moves: until then it has the geometry of before."
+RELOAD = "Restart or reload the controller before it moves: until then it has the previous geometry."
 
 
 def applied_text(applied: AppliedProposal) -> str:
@@ -58,13 +58,13 @@ def _unrecorded_lines(problem: str) -> list[str]:
 
 NO_WRITES = "No run of this cell wrote its config."
 
-_TOLD = {
+_WRITES = {
     WriteKind.RESULT: "the result of {run} written",
     WriteKind.APPLIED: "the proposal of {run} applied",
     WriteKind.ROLLED_BACK: "rolled back",
-    WriteKind.TAKEN_BACK: "the result of {run} taken back by itself",
+    WriteKind.TAKEN_BACK: "the result of {run} undone by the run itself",
     WriteKind.PROVISIONAL: "a provisional geometry of {run} written",
-    WriteKind.PROVISIONAL_TAKEN_BACK: "the provisional geometry of {run} taken back by itself",
+    WriteKind.PROVISIONAL_TAKEN_BACK: "the provisional geometry of {run} undone by the run itself",
 }
 
 
@@ -77,7 +77,7 @@ def config_history_text(found: ConfigHistory) -> str:
 
 def _write_text(write: ConfigWrite) -> str:
     one = write.record
-    head = f"{one.at:%Y-%m-%d %H:%M:%S}  {_TOLD[one.kind].format(run=one.run)}"
+    head = f"{one.at:%Y-%m-%d %H:%M:%S}  {_WRITES[one.kind].format(run=one.run)}"
     parts = [
         _who(one),
         _how_much(one),
@@ -98,11 +98,11 @@ def _how_much(one: WriteRecord) -> str:
     if one.numbers_changed is None:
         return f"{files}: how many numbers is not known"
     plural = "" if one.numbers_changed == 1 else "s"
-    told = f"{files}: {one.numbers_changed} number{plural}"
+    text = f"{files}: {one.numbers_changed} number{plural}"
     if one.largest is None:
-        return told
+        return text
     return (
-        f"{told}, most of all {one.largest.name} by {one.largest.change:+.4f} {one.largest.unit}".rstrip()
+        f"{text}, most of all {one.largest.name} by {one.largest.change:+.4f} {one.largest.unit}".rstrip()
     )
 
 

@@ -69,7 +69,7 @@ def resolved_address(
     folder: Path,
     environment: Mapping[str, str] = os.environ,
 ) -> NoticeAddress:
-    """The address of one who is told; ``folder`` has the cell file, ``cell`` is the cell's name.
+    """The address of a recipient; ``folder`` has the cell file, ``cell`` is the cell's name.
 
     Raises:
         FileError: its password file cannot be read, or others can read or change it.

@@ -89,7 +89,7 @@ def _sender(address: NoticeAddress) -> Sender:
 
 
 def post_to_webhook(address: NoticeAddress, notice: Notice, timeout_s: float) -> None:
-    """POST it; ``Idempotency-Key`` has its id, by which a second delivery is told from a second run.
+    """POST it; ``Idempotency-Key`` has its id, which distinguishes a second delivery from a second run.
 
     Raises:
         NoticeUndelivered: it was not taken.

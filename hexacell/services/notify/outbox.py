@@ -96,7 +96,7 @@ class NoticeOutbox:
 
     @contextmanager
     def held(self) -> Iterator[bool]:
-        """Whether no other process sends from here; none does while this is held."""
+        """Whether this process alone sends from here, as long as this is held."""
         try:
             descriptor = os.open(self._folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         except FileNotFoundError:

@@ -32,7 +32,7 @@ class ScheduledRun:
         retry_minutes: so long after a failure that may pass (a device, the lock) it is tried again.
         retries: how often.
         writable: the folders that it writes into: of the cell, of the controller's config, of metrics.
-        metrics: the file that they are written to after each run; none without.
+        metrics: the file that they are written to after each run, if any.
     """
 
     cell: Path
@@ -54,7 +54,7 @@ class ScheduledRun:
 
     @property
     def words_afterwards(self) -> tuple[str, ...]:
-        """The command that writes the metrics; none without."""
+        """The command that writes the metrics; empty without."""
         if self.metrics is None:
             return ()
         return (*self.program, "status", str(self.cell), "--metrics", str(self.metrics))
@@ -113,7 +113,7 @@ HARDENING = (
     "SystemCallArchitectures=native",
     "UMask=0077",
 )
-"""Of a system's service. ProtectClock would take the serial lines away; the families are those of
+"""Settings of a system's service. ProtectClock would take the serial lines away; the families are those of
 controllers and CAN."""
 
 
@@ -162,7 +162,7 @@ def timer_text(run: ScheduledRun) -> str:
 
 
 def cell_of(unit_text: str) -> Path | None:
-    """The cell file that a unit was written for; none if it is not ours."""
+    """The cell file that a unit was written for; None if `hexacell schedule` did not write it."""
     first = unit_text.split("\n", 1)[0]
     return Path(first.removeprefix(MARK)) if first.startswith(MARK) else None
 
@@ -172,7 +172,7 @@ def _file(run: ScheduledRun, lines: Sequence[str]) -> str:
 
 
 def _retries(run: ScheduledRun) -> list[str]:
-    """Only after failures that may pass by themselves; a verdict is none."""
+    """Only after failures that may pass by themselves, not after a verdict."""
     if not run.retries:
         return []
     others = [code for code in ExitCode if code not in {*WORTH_ANOTHER_TRY, ExitCode.DONE}]

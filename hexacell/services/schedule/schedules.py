@@ -121,7 +121,7 @@ def write_schedule(cell: Cell, request: ScheduleRequest, folder: Path | None) ->
 
 
 def present_schedule(cell: Cell, folder: Path | None) -> Schedule | None:
-    """The units of a cell; none if it has none."""
+    """The units of a cell; None if it has no schedule."""
     place, is_of_system = _place(folder)
     found = _units_of(cell.path.resolve(), place)
     return Schedule(found[0].stem, found, is_of_system) if found else None

@@ -28,7 +28,7 @@ from procedures.engine.commands import CommandQueue, EndAtReference
 from procedures.run.state import RunState
 
 MAY_PASS = frozenset({ExitCode.HARDWARE, ExitCode.BUSY, ExitCode.OUT_OF_TIME})
-"""Of refusals that another try may not meet: device, stop line, full disk; the lock; quiet hours."""
+"""Exit codes of refusals that may pass: device, stop line, full disk; the lock; quiet hours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +36,8 @@ class RefusedStart:
     """A run that could not begin.
 
     Attributes:
-        attempts: all tries so far; none where they could not be written.
-        wait_s: so long until the next try; none where there is none.
+        attempts: all tries so far; None where they could not be written.
+        wait_s: seconds until the next try; None where there is no further one.
     """
 
     attempts: StartAttempts | None
@@ -79,7 +79,7 @@ def refused_start(request: RunRequest, error: HexacellError, began: datetime, at
 def note_unreadable_cell(path: Path, mode: str, error: HexacellError) -> None:
     """Note that a run could not begin, as the cell file at ``path`` has mistakes.
 
-    That is left where nothing tells whose file it is, or the disk takes no note.
+    Nothing is noted where the cell's name is unknown, or the disk takes no note.
     """
     folder = runs_folder_of_unreadable(path)
     if folder is not None:
@@ -89,7 +89,7 @@ def note_unreadable_cell(path: Path, mode: str, error: HexacellError) -> None:
 
 
 def _wait_s(settings: CellSettings, error: HexacellError, began: datetime, at: datetime) -> float | None:
-    """How long until another try; none where it would not help, or the window is over by then."""
+    """Seconds until another try; None where it would not help, or the window is over by then."""
     wanted = settings.unattended
     again = at + timedelta(minutes=wanted.retry_minutes)
     is_open = again <= began + timedelta(minutes=wanted.window_minutes)
@@ -97,7 +97,7 @@ def _wait_s(settings: CellSettings, error: HexacellError, began: datetime, at: d
 
 
 def time_limit(settings: CellSettings, at: datetime) -> tuple[float, str] | None:
-    """How many seconds a run that begins now may last, and why no longer; none where nothing limits it."""
+    """How many seconds a run that begins now may last, and why no longer; None where nothing limits it."""
     wanted, limits = settings.unattended, []
     if wanted.longest_minutes is not None:
         seconds = 60.0 * wanted.longest_minutes / settings.timing.clock_factor
@@ -127,7 +127,7 @@ DAYS_AHEAD = 8
 
 
 def quiet_until(settings: UnattendedSettings, at: datetime) -> datetime | None:
-    """When the quiet hours end in which a moment lies; none if it lies in none.
+    """When the quiet hours end in which a moment lies; None if it lies outside all.
 
     Where one ends as another begins, the end of the latter.
     """
@@ -139,7 +139,7 @@ def quiet_until(settings: UnattendedSettings, at: datetime) -> datetime | None:
 
 
 def next_quiet(settings: UnattendedSettings, at: datetime) -> datetime | None:
-    """When quiet hours begin after a moment; the moment itself if it lies in some; none without any."""
+    """When quiet hours begin after a moment; the moment itself if it lies in some; None without any."""
     if quiet_until(settings, at) is not None:
         return at
     return min((begin for begin, _ in _spans(settings, at) if begin > at), default=None)
@@ -157,14 +157,14 @@ def _spans(settings: UnattendedSettings, at: datetime) -> Iterator[tuple[datetim
 
 
 def raised_alarm(state: RunState) -> ChangeAlarm | None:
-    """The alarm that a check raised; none if it raised none."""
+    """The alarm that a check raised, if any."""
     check = None if state.judged is None else state.judged.check
     alarm = None if check is None else check.alarm
     return alarm if alarm is not None and alarm.is_raised else None
 
 
 def repetition(request: RunRequest, state: RunState) -> RunRequest | None:
-    """The check to be made once more after one that nobody watched; none where there is no need.
+    """The check to be made once more after one that nobody watched; None where there is no need.
 
     One that failed is not repeated: it has found what an alarm only suspects.
     """

@@ -1,8 +1,7 @@
 """All writes into a cell's config, the newest first: who, when, what and why.
 
-They are those recorded beside the run folders. Of a write that has no record, as those of programs before
-there were records, or where none could be written, the run's own folder tells when it was, who approved it
-and why: its journal, and ``applied.json``.
+They are recorded beside the run folders. Where a record could not be written, as on a full disk, the run's
+own folder has when it was, who approved it and why: in its journal, and ``applied.json``.
 """
 
 from __future__ import annotations
@@ -43,8 +42,9 @@ class ConfigWrite:
 
     Attributes:
         record: what is known of it.
-        is_recorded: whether a record was kept; else the run's folder told it.
-        verdict: that of its run, and ``line`` is the outcome in words; none and empty where there is none.
+        is_recorded: whether a record was kept; else it is known from the run's folder.
+        verdict: the verdict of its run, if any.
+        line: the outcome in words; empty where there is no verdict.
     """
 
     record: WriteRecord
@@ -90,16 +90,16 @@ def config_history(cell: Cell) -> ConfigHistory:
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """What the folder of a run tells of its writes; nothing where there is none any more."""
+    """What the folder of a run says of its writes; nothing where it is deleted."""
 
     name: str
-    told: tuple[WriteRecord, ...] = ()
+    noted: tuple[WriteRecord, ...] = ()
     verdict: Verdict | None = None
     line: str = ""
 
 
 def _writes_of(run: _Run, records: Sequence[WriteRecord]) -> Iterator[ConfigWrite]:
-    every = [*((one, True) for one in records), *((one, False) for one in _unrecorded(run.told, records))]
+    every = [*((one, True) for one in records), *((one, False) for one in _unrecorded(run.noted, records))]
     for record, is_recorded in every:
         if record.kind in _OF_THE_RESULT:
             yield ConfigWrite(record, is_recorded, run.verdict, run.line)
@@ -107,9 +107,9 @@ def _writes_of(run: _Run, records: Sequence[WriteRecord]) -> Iterator[ConfigWrit
             yield ConfigWrite(record, is_recorded)
 
 
-def _unrecorded(told: Sequence[WriteRecord], records: Sequence[WriteRecord]) -> list[WriteRecord]:
-    """Those without a record of their kind, in their order; each record is of the first that it fits."""
-    left = list(told)
+def _unrecorded(noted: Sequence[WriteRecord], records: Sequence[WriteRecord]) -> list[WriteRecord]:
+    """The noted writes without a record, in their order; each record is of the first that it fits."""
+    left = list(noted)
     for record in records:
         fitting = (index for index, one in enumerate(left) if _is_of(record, one))
         if (match := next(fitting, None)) is not None:
@@ -117,14 +117,14 @@ def _unrecorded(told: Sequence[WriteRecord], records: Sequence[WriteRecord]) -> 
     return left
 
 
-def _is_of(record: WriteRecord, told: WriteRecord) -> bool:
+def _is_of(record: WriteRecord, noted: WriteRecord) -> bool:
     """A record is kept between the write and the line of the journal. ``applied.json`` is before both.
 
     Journals have milliseconds, so that what came after it may seem to have come before.
     """
-    recorded_at, told_at = _in_milliseconds(record.at), _in_milliseconds(told.at)
-    in_order = told_at <= recorded_at if record.kind is WriteKind.APPLIED else recorded_at <= told_at
-    return record.kind is told.kind and in_order
+    recorded_at, noted_at = _in_milliseconds(record.at), _in_milliseconds(noted.at)
+    in_order = noted_at <= recorded_at if record.kind is WriteKind.APPLIED else recorded_at <= noted_at
+    return record.kind is noted.kind and in_order
 
 
 def _in_milliseconds(at: datetime) -> datetime:
@@ -139,18 +139,18 @@ def _written_runs(cell: Cell) -> Iterator[_Run]:
 
 
 def _read(run: RunFolder, receipt: Receipt) -> _Run:
-    state, told = RunState(), list[WriteRecord]()
+    state, noted = RunState(), list[WriteRecord]()
     for entry in read_entries(run.journal):
-        told += _told_by(entry, state, run, receipt)
+        noted += _noted_in(entry, state, run, receipt)
         state = apply(state, entry.event)
     if (approval := later_approval(run)) is not None:
-        told.append(_record(WriteKind.APPLIED, approval.at, approval.by, run, receipt))
+        noted.append(_record(WriteKind.APPLIED, approval.at, approval.by, run, receipt))
     judged = state.judged
-    return _Run(run.name, tuple(told), judged.verdict if judged else None, judged.line if judged else "")
+    return _Run(run.name, tuple(noted), judged.verdict if judged else None, judged.line if judged else "")
 
 
-def _told_by(entry: Entry, state: RunState, run: RunFolder, receipt: Receipt) -> Iterator[WriteRecord]:
-    """The write that a line of the journal tells, if it does; ``state`` is that before it."""
+def _noted_in(entry: Entry, state: RunState, run: RunFolder, receipt: Receipt) -> Iterator[WriteRecord]:
+    """The write that a line of the journal notes, if any; ``state`` is that before it."""
     match entry.event:
         case events.Committed(approved_by=by):
             yield _record(WriteKind.RESULT, entry.at, by, run, receipt)

@@ -33,7 +33,7 @@ class ConfigRollback:
 
     Attributes:
         paths: the files of the config.
-        undone: the run whose geometry the config had; none where it had that of before all runs.
+        undone: the run whose geometry the config had; None where it had that from before all runs.
         restored: the files in a run folder that the config is a copy of now.
         change: the change of the text, as a unified diff; empty where nothing had to be written.
         unrecorded: why the history has no record of it, in a sentence; empty if it has.
@@ -87,7 +87,7 @@ def _cause(restored: Path, undone: Receipt | None, *, to: str | None, by: str, r
 
 
 def receipts_of(cell: Cell) -> Iterator[Receipt]:
-    """Those of the cell's config, the oldest first; folders that cannot be read are left out."""
+    """The receipts of the cell's config, the oldest first; unreadable folders are left out."""
     folder = runs_folder(cell)
     for path in sorted(folder.iterdir()) if folder.is_dir() else ():
         try:

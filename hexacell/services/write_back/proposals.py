@@ -57,7 +57,7 @@ class Proposal:
 
     @property
     def displacement(self) -> TaskDisplacement | None:
-        """How far it moves taught points and frames; none if that is not known."""
+        """How far it moves taught points and frames; None if that is not known."""
         return None if self.state.proposed is None else self.state.proposed.displacement
 
 
@@ -120,7 +120,7 @@ async def apply_proposal(
     Args:
         proposal: of a run of the cell.
         operator: who is asked where a gate needs a person.
-        typed_by: who approves where none does.
+        typed_by: who approves where no gate needs a person.
         reason: why, as the history of the config is to have it.
 
     Raises:
@@ -150,7 +150,7 @@ async def apply_proposal(
 
 
 def later_approval(folder: RunFolder) -> LaterApproval | None:
-    """Who had the proposal of a run written after it; none if nobody did. Raises ``FileError``."""
+    """Who had the proposal of a run written after it; None if nobody did. Raises ``FileError``."""
     path = _approval_path(folder)
     return LaterApproval.load(path) if path.exists() else None
 

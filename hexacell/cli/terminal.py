@@ -17,8 +17,7 @@ from typing import Any, TextIO, TypeVar
 from hexacell.cli.console import Console
 from hexacell.cli.process import STOP_SIGNALS, handled
 from hexacell.errors import AnswerNeeded, Interruption
-from hexacell.text.answers import request_text, typed_answer
-from hexacell.text.line_face import LETTERS
+from hexacell.text.line_face import LETTERS, request_text, typed_answer
 from hexacell.text.run import question_text
 from procedures.engine.commands import Abort, Command, CommandQueue, MeasureAgain, Pause, Resume, Stop, Undo
 from procedures.run.keys import SetKey

@@ -84,7 +84,16 @@ class RunHost:
             AudienceEvents(self._queue.put, self._on_control, self._on_leave, self._on_lost),
             stuck_s,
         )
-        self._lines: list[bytes] = [message_line(self._description())]
+        described = RunDescribed(
+            cell=settings.name,
+            cell_file=request.cell.path.absolute(),
+            folder=request.folder.path.absolute(),
+            mode=request.mode.value,
+            expected_records=expected_records(
+                settings, request.mode, pose_list_of(request.cell), length_check=request.length_check
+            ),
+        )
+        self._lines: list[bytes] = [message_line(described)]
         self._sequence = 0
         self._status = Status.IDLE
         self._question: Question | None = None
@@ -225,27 +234,12 @@ class RunHost:
             self._giving_up = None
         elif self._giving_up is None and is_away:
             loop = asyncio.get_running_loop()
-            self._giving_up = loop.call_later(self._away_s, self._give_up)
-
-    def _give_up(self) -> None:
-        self._queue.put(Stop(f"nobody was connected for {self._away_s / 60.0:g} minutes"))
+            stop = Stop(f"nobody was connected for {self._away_s / 60.0:g} minutes")
+            self._giving_up = loop.call_later(self._away_s, self._queue.put, stop)
 
     async def _watch_devices(self) -> None:
         async for snapshot in self._watching.snapshots():
             self._audience.send_latest(snapshot)
-
-    def _description(self) -> RunDescribed:
-        request = self._request
-        listed = pose_list_of(request.cell)
-        return RunDescribed(
-            cell=request.cell.settings.name,
-            cell_file=request.cell.path.absolute(),
-            folder=request.folder.path.absolute(),
-            mode=request.mode.value,
-            expected_records=expected_records(
-                request.cell.settings, request.mode, listed, length_check=request.length_check
-            ),
-        )
 
 
 def failure_message(error: HexacellError) -> HostFailed:

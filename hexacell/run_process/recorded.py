@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Sequence
-from dataclasses import dataclass
 
 from hexacell.clock import CellClock
 from hexacell.errors import FileError, UsageError
@@ -32,14 +31,6 @@ LONGEST_WAIT_S = 60.0
 """Longest wait between two events, s of recorded time: nobody waits for a run resumed the next day."""
 
 
-@dataclass
-class _Cursor:
-    """Where the run is wanted, and how fast it advances from there."""
-
-    sequence: int
-    speed: float
-
-
 class RecordedRun:
     """A :class:`~hexacell.run_process.client.RunConnection` that sends a journal up to its cursor.
 
@@ -61,7 +52,7 @@ class RecordedRun:
             raise FileError("the journal is empty", subject=folder.journal, action="Choose another run")
         self._started = self._entries[0].event
         self._clock = clock or CellClock()
-        self._cursor = _Cursor(0, 0.0)
+        self._sequence, self._speed = 0, 0.0
         self._moved = asyncio.Event()
         self._is_left = False
         self.jump(sequence or self.last)
@@ -74,15 +65,15 @@ class RecordedRun:
     @property
     def sequence(self) -> int:
         """The line of the journal that was sent last, from 1."""
-        return self._cursor.sequence
+        return self._sequence
 
     def step(self, count: int = 1) -> None:
         """Advance by a number of events, or go back if it is negative; stops at both ends."""
-        self.jump(self._cursor.sequence + count)
+        self.jump(self._sequence + count)
 
     def jump(self, sequence: int) -> None:
         """Go to a line of the journal; stops at both ends."""
-        self._cursor.sequence = min(max(sequence, 1), self.last)
+        self._sequence = min(max(sequence, 1), self.last)
         self._moved.set()
 
     def set_speed(self, speed: float) -> None:
@@ -93,7 +84,7 @@ class RecordedRun:
         """
         if not 0.0 <= speed < float("inf"):
             raise UsageError(f"{speed:g} is not a speed", action="Give a number from 0")
-        self._cursor.speed = speed
+        self._speed = speed
         self._moved.set()
 
     async def messages(self) -> AsyncIterator[HostMessage]:
@@ -101,12 +92,20 @@ class RecordedRun:
         sent = 0
         while not self._is_left:
             self._moved.clear()
-            if sent == 0 or sent > self._cursor.sequence:
+            if sent == 0 or sent > self._sequence:
                 sent = 0
-                yield self._description()
-            while sent < self._cursor.sequence and not self._is_left:
+                yield RunDescribed(
+                    cell=self._started.cell,
+                    cell_file=self._folder.cell_file,
+                    folder=self._folder.path,
+                    mode=self._started.mode,
+                    expected_records=fold(entry.event for entry in self._entries).completed,
+                    is_recorded=True,
+                )
+            while sent < self._sequence and not self._is_left:
                 sent += 1
-                yield self._event(sent)
+                entry = self._entries[sent - 1]
+                yield EventRecorded(sequence=sent, at=entry.at, event=entry.event)
             for message in self._present(sent):
                 yield message
             await self._until_moved(sent)
@@ -129,24 +128,10 @@ class RecordedRun:
         self._is_left = True
         self._moved.set()
 
-    def _description(self) -> RunDescribed:
-        return RunDescribed(
-            cell=self._started.cell,
-            cell_file=self._folder.cell_file,
-            folder=self._folder.path,
-            mode=self._started.mode,
-            expected_records=fold(entry.event for entry in self._entries).completed,
-            is_recorded=True,
-        )
-
-    def _event(self, sequence: int) -> EventRecorded:
-        entry = self._entries[sequence - 1]
-        return EventRecorded(sequence=sequence, at=entry.at, event=entry.event)
-
     def _present(self, sequence: int) -> list[HostMessage]:
         """What else a run sends: its status, its question, and where the cursor is."""
         entry = self._entries[sequence - 1]
-        at_cursor = CursorMoved(sequence=sequence, last=self.last, at=entry.at, speed=self._cursor.speed)
+        at_cursor = CursorMoved(sequence=sequence, last=self.last, at=entry.at, speed=self._speed)
         status = StatusChanged(status=_status_after(entry.event))
         return [status, _question_after(entry.event), at_cursor]
 
@@ -163,12 +148,12 @@ class RecordedRun:
             advancing.cancel()
 
     async def _advance(self, sent: int) -> None:
-        if self._cursor.speed == 0.0 or sent >= self.last:
+        if self._speed == 0.0 or sent >= self.last:
             await self._moved.wait()
             return
-        await self._clock.sleep(self._wait_s(sent) / self._cursor.speed)
-        if self._cursor.sequence == sent:
-            self._cursor.sequence = sent + 1
+        await self._clock.sleep(self._wait_s(sent) / self._speed)
+        if self._sequence == sent:
+            self._sequence = sent + 1
 
     def _wait_s(self, sent: int) -> float:
         """The recorded time from one event to the next, s."""

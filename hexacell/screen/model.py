@@ -16,12 +16,12 @@ from hexacell.screen.preferences import ONCE, ScreenAction
 from hexacell.screen.watching import DeviceWatcher, RunFollower
 from hexacell.screen.workplace import TriedPlan, Workplace
 from hexacell.text.config_changes import RELOAD, versions_text
-from hexacell.text.screens.headers import header_view
 from hexacell.text.screens.live import RUNNING, STARTING, TRYING, checklist_view, live_view
 from hexacell.text.screens.measuring import fault_view, measure_view
 from hexacell.text.screens.planned_poses import plan_view
 from hexacell.text.screens.questions import PERSON, question_view
 from hexacell.text.screens.reviewing import PROPOSAL_WAITS, history_view, review_view, rollback_question
+from hexacell.text.screens.run_picture import header_view
 from hexacell.text.screens.views import (
     CellView,
     ChecklistItem,

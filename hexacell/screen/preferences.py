@@ -14,49 +14,15 @@ from textual.theme import Theme
 
 from hexacell.errors import FileError, did_you_mean
 
+# Primary, secondary, warning, error, success, accent, foreground, background, surface, panel.
+_DARK = ("#7aa2f7", "#9ece6a", "#e0af68", "#f7768e", "#9ece6a", "#e0af68", "#d5daf0", "#16181f", "#1d2029")
+_LIGHT = ("#1f4fa3", "#2f6b1d", "#8a5300", "#b00020", "#2f6b1d", "#8a5300", "#14161a", "#ffffff", "#f4f5f7")
+_GREY = ("#ffffff", "#ffffff", "#ffffff", "#ffffff", "#ffffff", "#ffffff", "#e0e0e0", "#000000", "#000000")
+
 SCREEN_THEMES = (
-    Theme(
-        name="dark",
-        primary="#7aa2f7",
-        secondary="#9ece6a",
-        accent="#e0af68",
-        warning="#e0af68",
-        error="#f7768e",
-        success="#9ece6a",
-        foreground="#d5daf0",
-        background="#16181f",
-        surface="#1d2029",
-        panel="#272b37",
-        dark=True,
-    ),
-    Theme(
-        name="light",
-        primary="#1f4fa3",
-        secondary="#2f6b1d",
-        accent="#8a5300",
-        warning="#8a5300",
-        error="#b00020",
-        success="#2f6b1d",
-        foreground="#14161a",
-        background="#ffffff",
-        surface="#f4f5f7",
-        panel="#e3e6eb",
-        dark=False,
-    ),
-    Theme(
-        name="monochrome",
-        primary="#ffffff",
-        secondary="#ffffff",
-        accent="#ffffff",
-        warning="#ffffff",
-        error="#ffffff",
-        success="#ffffff",
-        foreground="#e0e0e0",
-        background="#000000",
-        surface="#000000",
-        panel="#303030",
-        dark=True,
-    ),
+    Theme("dark", *_DARK, "#272b37"),
+    Theme("light", *_LIGHT, "#e3e6eb", dark=False),
+    Theme("monochrome", *_GREY, "#303030"),
 )
 
 

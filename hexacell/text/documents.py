@@ -303,7 +303,7 @@ def retention_document(found: Retention, *, is_deleted: bool) -> dict[str, Any]:
 
 def story_document(entries: Sequence[Entry]) -> dict[str, Any]:
     """What ``history --show --json`` prints."""
-    from hexacell.text.run_story import run_story  # noqa: PLC0415 - needs the words of all events
+    from hexacell.text.line_face import run_story  # noqa: PLC0415 - needs the words of all events
 
     return {
         "events": [

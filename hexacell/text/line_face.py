@@ -1,12 +1,27 @@
-"""Text for a person at a plain terminal who asks during a run: where it is, and what the gauges show."""
+"""Text for a plain terminal: what to type and what it means, where a run is, and what happened in it.
+
+A question takes exactly what it offers; motion and changes begin only on an explicit answer.
+"""
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
 from hexacell.campaign.decisions import Forecast
 from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot
-from hexacell.text.layout import duration, wrapped
-from procedures.run.state import RunState
+from hexacell.text.events import EventFormatter
+from hexacell.text.layout import COLUMNS, duration, wrapped
+from procedures.journal.line_format import Entry
+from procedures.run.questions import PLACED, Question, QuestionKind
+from procedures.run.state import RunState, apply
 from procedures.steps import events
+
+YES, NO = ("yes", "y"), ("no", "n")
+
+INDENT = 10
+"""Width of the column with the time."""
 
 LETTERS = (
     "Letters, each with Enter: p pause after this record, P at once, r resume,\n"
@@ -68,3 +83,84 @@ def _forecast_text(forecast: Forecast) -> str:
     return (
         f"Predicted error at the task: {forecast.now_mm:.3f} mm now, {forecast.end_mm:.3f} at the end{left}"
     )
+
+
+@dataclass(frozen=True, slots=True)
+class TypedAnswer:
+    """An answer to a question; ``value`` is None where the person declines."""
+
+    value: str | None
+
+
+def typed_answer(typed: str, question: Question, person: str) -> TypedAnswer | None:
+    """The answer in a typed line, None if it is not one; ``person`` is who gives it."""
+    line = typed.strip()
+    match question.kind:
+        case QuestionKind.PLACE_GAUGES:
+            return None if line else TypedAnswer(PLACED)
+        case QuestionKind.APPROVE_CHANGE | QuestionKind.KEEP_RESULT:
+            return _consent_in(line.lower(), question.consent.lower(), person)
+        case QuestionKind.CHOOSE_RECOVERY | QuestionKind.START_UP:
+            chosen = matching_choice(line, question)
+            return None if chosen is None else TypedAnswer(chosen)
+
+
+def _consent_in(line: str, consent: str, person: str) -> TypedAnswer | None:
+    if line == consent or (consent == YES[0] and line in YES):
+        return TypedAnswer(person)
+    return TypedAnswer(None) if line in NO else None
+
+
+def matching_choice(typed: str, question: Question) -> str | None:
+    """The only choice that begins with the line typed; a space may stand for a hyphen."""
+    answer = typed.strip().lower().replace(" ", "-")
+    found = [choice for choice in question.choices if answer and choice.startswith(answer)]
+    return found[0] if len(found) == 1 else None
+
+
+def request_text(question: Question) -> str:
+    """What to type."""
+    match question.kind:
+        case QuestionKind.PLACE_GAUGES:
+            return "Press Enter when they are in place, or type a to abort: "
+        case QuestionKind.CHOOSE_RECOVERY:
+            return f"Type one of {', '.join(question.choices)}: "
+    if question.kind is QuestionKind.START_UP or question.consent == YES[0]:
+        return "Type yes or no: "
+    return f"Type the cell's name, {question.consent}, to take the responsibility, or no: "
+
+
+def run_story(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:
+    """The events that are worth telling a person, each with its text, which may have several lines."""
+    formatter, state = EventFormatter(), RunState()
+    for entry in entries:
+        state = apply(state, entry.event)
+        lines = [*_own_words(entry.event), *formatter.lines(entry.event, state)]
+        if lines:
+            yield entry, "\n".join(lines)
+
+
+def story_text(entries: Iterable[Entry]) -> str:
+    """What happened in a run, each line with its time, UTC."""
+    lines = (f"{entry.at:%H:%M:%S}  {_indented(text)}" for entry, text in run_story(entries))
+    return "\n".join(lines)
+
+
+def _own_words(event: events.Event) -> list[str]:
+    """Events that are not reported while they happen."""
+    match event:
+        case events.RunStarted():
+            return [f"{event.mode} of {event.cell}, {event.software}"]
+        case events.RecordTaken():
+            return [record_text(event)]
+        case events.Interrupted(reason=reason):
+            return [f"interrupted: {reason}"]
+        case events.Ended(line=line):
+            return [line]
+        case _:
+            return []
+
+
+def _indented(text: str) -> str:
+    lines = (textwrap.fill(line, COLUMNS - INDENT, subsequent_indent="  ") for line in text.splitlines())
+    return "\n".join(lines).replace("\n", "\n" + " " * INDENT)

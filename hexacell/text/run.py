@@ -10,8 +10,8 @@ from hexacell.kinematics.pose import Pose
 from hexacell.results.result import ExpectedImprovement
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.services.run.calibration_run import RunRequest
-from hexacell.text.answers import request_text
 from hexacell.text.layout import duration, wrapped
+from hexacell.text.line_face import request_text
 from hexacell.text.verdict import teaching_line, teaching_sentence
 from procedures.calibration.calibration import Mode
 from procedures.replay.comparison import Aspect, Difference, ReplayReport

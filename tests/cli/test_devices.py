@@ -235,7 +235,7 @@ def test_ports_of_nothing_and_of_nobody_are_told(typed_here, tmp_path) -> None:
     ("arguments", "words"),
     [
         (("--can", "slcan"), "--can slcan does not say what the bus is"),
-        (("--controller", "robot"), "--controller robot is no address"),
+        (("--controller", "robot"), "--controller robot is not an address"),
         (("--diagnose", "x"), "--diagnose wants the cell"),
     ],
 )
@@ -317,7 +317,7 @@ def test_questions_want_a_terminal_and_a_new_file(typed_here, cell_folder, monke
     monkeypatch.setattr("hexacell.cli.commands.devices.is_interactive", lambda: False)
     outcome = typed_here("devices", "--write", "new.toml")
     assert outcome.code == 4
-    assert "asks what no device tells" in outcome.err
+    assert "asks what no device reports" in outcome.err
 
 
 @pytest.mark.parametrize("place", ["nowhere/new.toml", "file/new.toml"])
@@ -332,8 +332,8 @@ def test_a_place_where_no_file_can_be_made_is_told_first(typed_here, tmp_path, p
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (("--controller", "127.0.0.1:99999"), "--controller 127.0.0.1:99999 is no address"),
-        (("--controller", "127.0.0.1:0"), "--controller 127.0.0.1:0 is no address"),
+        (("--controller", "127.0.0.1:99999"), "--controller 127.0.0.1:99999 is not an address"),
+        (("--controller", "127.0.0.1:0"), "--controller 127.0.0.1:0 is not an address"),
         (("--diagnose", "x", "--seconds", "-1"), "argument --seconds"),
         (("--diagnose", "x", "--seconds", "nan"), "argument --seconds"),
         (("--diagnose", "x", "--seconds", "inf"), "argument --seconds"),

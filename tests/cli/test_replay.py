@@ -83,4 +83,4 @@ def test_an_unreadable_journal_is_reported(typed_here, demo, tmp_path):
     assert "journal.jsonl:2: this line of the journal is damaged" in outcome.err
     outcome = typed_here("replay", tmp_path, "--tolerance", "nan")
     assert outcome.code == 2
-    assert "--tolerance nan is no tolerance" in outcome.err
+    assert "--tolerance nan is not a tolerance" in outcome.err

@@ -111,7 +111,7 @@ def test_a_run_of_the_quick_level_is_not_compared(typed_here, demo, run) -> None
 @pytest.mark.parametrize("name", ["report.doc", "report", "report.PDF.txt"])
 def test_what_no_report_can_be_written_as_is_told(typed_here, run, tmp_path, name) -> None:
     outcome = typed_here("report", run, "--output", tmp_path / name)
-    assert (outcome.code, "of this kind no report is made" in outcome.err) == (2, True)
+    assert (outcome.code, "reports of this kind are not made" in outcome.err) == (2, True)
     assert not (tmp_path / name).exists()
 
 

@@ -29,7 +29,7 @@ BY_NAME = {
 """What a shell offers for a value, by the value's name in the help."""
 
 BY_OPTION = {"--measurements": CSV_FILE}
-"""The same by the option, where its value's name says less."""
+"""What a shell offers by the option, where its value's name says less."""
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -54,16 +54,8 @@ def _state_what_it_takes(action: argparse.Action) -> None:
     """Mark an argument for shtab; one whose values are no files is left as it is."""
     if "--config" in action.option_strings:
         action.choices = bundled_names()
-    elif (taken := _by_option(action) or BY_NAME.get(_value_name(action))) is not None:
+        return
+    name = action.metavar[0] if isinstance(action.metavar, tuple) else action.metavar or action.dest.upper()
+    by_option = (BY_OPTION[option] for option in action.option_strings if option in BY_OPTION)
+    if (taken := next(by_option, BY_NAME.get(name))) is not None:
         action.complete = taken  # type: ignore[attr-defined] # where shtab looks for it
-
-
-def _by_option(action: argparse.Action) -> object | None:
-    return next((BY_OPTION[option] for option in action.option_strings if option in BY_OPTION), None)
-
-
-def _value_name(action: argparse.Action) -> str:
-    """The name of an argument's value, or of the first of several."""
-    if isinstance(action.metavar, tuple):
-        return action.metavar[0]
-    return action.metavar or action.dest.upper()

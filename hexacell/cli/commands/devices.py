@@ -49,7 +49,7 @@ def _set_node(options: argparse.Namespace, console: Console) -> ExitCode:
     console.print(wrapped(f"The only device on this bus gets node id {options.set_node}, and keeps it."))
     console.prompt("Is it the only one that is connected? Type yes: ")
     if sys.stdin.readline().strip().lower() != "yes":
-        raise AnswerNeeded("it was not agreed", action="Nothing was set")
+        raise AnswerNeeded("you have not agreed", action="Nothing was set")
     before = set_node_id(_bus(options.can[0]), options.set_node)
     had = "had none" if before is None else f"had {before}"
     console.print(f"Node {options.set_node} answers; it {had}.")
@@ -82,7 +82,7 @@ def _require_new(path: Path) -> None:
         raise FileError("is there already", subject=path, action="Name a new file, or remove it")
     require_creatable(path)
     if not is_interactive():
-        raise AnswerNeeded("--write asks what no device tells", action="Start it at a terminal")
+        raise AnswerNeeded("--write asks what no device reports", action="Start it at a terminal")
 
 
 def _write(found: SearchFindings, path: Path, console: Console) -> ExitCode:
@@ -128,5 +128,5 @@ def _address(words: str) -> tuple[str, int]:
     """Host and port from ``HOST:PORT``."""
     host, _, port = words.rpartition(":")
     if not host or not port.isdecimal() or not 0 < int(port) < TCP_PORTS:
-        raise UsageError(f"--controller {words} is no address", action="Write it like 127.0.0.1:5007")
+        raise UsageError(f"--controller {words} is not an address", action="Write it like 127.0.0.1:5007")
     return host, int(port)

@@ -26,7 +26,7 @@ from hexacell.text.documents import (
     story_document,
 )
 from hexacell.text.history import comparison_text, drift_text, history_text, retention_text, watch_text
-from hexacell.text.run_story import story_text
+from hexacell.text.line_face import story_text
 from procedures.journal.journal import read_entries
 
 MOST_DAYS = 36525.0

@@ -1,4 +1,4 @@
-"""``hexacell host``: the process of a run that terminals attach to and leave; started by the program."""
+"""``hexacell host``: the process of a run that screens connect to and leave; started by the program."""
 
 from __future__ import annotations
 
@@ -39,7 +39,14 @@ def main(options: argparse.Namespace) -> ExitCode:
 
 
 def _serve(options: argparse.Namespace) -> None:
-    request = _request(options)
+    request = RunRequest(
+        cell=load_cell(options.cell),
+        folder=RunFolder(options.folder),
+        mode=Mode(options.mode),
+        operator=RemoteOperator(),
+        resume=options.resume,
+        length_check=options.length_check,
+    )
     signals = SignalCommands(Console(wants_json=True))
     path = socket_path(request.cell)
     with listening_socket(path) as listener, _own_temporary_folder() as folder:
@@ -51,13 +58,10 @@ def _serve(options: argparse.Namespace) -> None:
 async def _serve_and_exit(host: RunHost, listener: socket, traces: tuple[Path, Path]) -> None:
     """Exit at once when the run is over: a computation that nobody waits for may go on in a thread."""
     code = await host.serve(listener)
-    await asyncio.to_thread(_remove, *traces)
+    path, folder = traces
+    await asyncio.to_thread(path.unlink, missing_ok=True)
+    await asyncio.to_thread(shutil.rmtree, folder, ignore_errors=True)
     os._exit(int(code))
-
-
-def _remove(path: Path, folder: Path) -> None:
-    path.unlink(missing_ok=True)
-    shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextmanager
@@ -69,17 +73,6 @@ def _own_temporary_folder() -> Iterator[Path]:
             yield Path(folder)
         finally:
             tempfile.tempdir = None
-
-
-def _request(options: argparse.Namespace) -> RunRequest:
-    return RunRequest(
-        cell=load_cell(options.cell),
-        folder=RunFolder(options.folder),
-        mode=Mode(options.mode),
-        operator=RemoteOperator(),
-        resume=options.resume,
-        length_check=options.length_check,
-    )
 
 
 def _say(line: bytes) -> None:

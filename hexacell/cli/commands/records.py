@@ -1,4 +1,4 @@
-"""``hexacell fit`` and ``hexacell next``: what the records in a measurement file tell."""
+"""``hexacell fit`` and ``hexacell next``: what the records in a measurement file say."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def fit(options: argparse.Namespace) -> ExitCode:
     cell = cell_at(options.cell, console)
     folder = RunFolder(options.measurements.parent)
     measurements = read_measurements(options.measurements)
-    _tell_size(console, measurements)
+    _print_size(console, measurements)
     choice = None if options.identify is None else ParameterChoice(options.identify)
     assessed = fit_measurements(cell, measurements, folder, choice)
     console.document(fit_document(assessed))
@@ -42,7 +42,7 @@ def propose_next(options: argparse.Namespace) -> ExitCode:
     cell = cell_at(options.cell, console)
     measurements = read_measurements(options.measurements, allow_partial=True)
     if len(measurements) <= MOST_RECORDS_BEFORE_NEXT:
-        _tell_size(console, measurements)
+        _print_size(console, measurements)
     proposed = next_pose(cell, measurements, rejections=options.refused)
     console.document(next_document(proposed))
     if not options.json:
@@ -56,7 +56,7 @@ def propose_next(options: argparse.Namespace) -> ExitCode:
     return ExitCode.DONE
 
 
-def _tell_size(console: Console, measurements: MeasurementSet) -> None:
-    """What takes more than a few seconds says so before it begins."""
+def _print_size(console: Console, measurements: MeasurementSet) -> None:
+    """Announce what takes more than a few seconds before it begins."""
     if len(measurements) > MANY_RECORDS:
         console.error(f"{len(measurements)} records: this takes some {len(measurements) // 50} seconds")

@@ -37,7 +37,7 @@ def main(options: argparse.Namespace) -> ExitCode:
 def _require_possible(target: Path, *, is_comparison: bool) -> None:
     if target.suffix not in KINDS:
         action = "Name one that ends in .html, .pdf or .xml"
-        raise UsageError("of this kind no report is made", subject=target, action=action)
+        raise UsageError("reports of this kind are not made", subject=target, action=action)
     if is_comparison and target.suffix == CERTIFICATE:
         raise UsageError(
             "a certificate compares nothing",

@@ -143,7 +143,7 @@ def _copied(request: RunRequest, stream: EventStream | None) -> list[Listener]:
 
 
 def execute_run(request: RunRequest, console: Console, further: Sequence[Listener] = ()) -> events.Ended:
-    """Carry out a run with a progress bar, which ``further`` listeners are told of too.
+    """Carry out a run with a progress bar; ``further`` listeners hear of every event too.
 
     Ctrl-C, SIGTERM or SIGHUP ends it after the step in progress, a second Ctrl-C at once.
 

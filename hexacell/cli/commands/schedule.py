@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 
 from hexacell.cell.loader import Cell
 from hexacell.cli.cell_argument import cell_at
@@ -11,7 +10,6 @@ from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.services.schedule.scheduled_run import crontab_line
 from hexacell.services.schedule.schedules import (
-    Schedule,
     ScheduleRequest,
     present_schedule,
     remove_schedule,
@@ -31,20 +29,15 @@ def main(options: argparse.Namespace) -> ExitCode:
     """Write, show or remove a schedule; nothing is started or stopped."""
     console = Console(options.json)
     cell = cell_at(options.cell, console)
-    if options.show:
-        _print(present_schedule(cell, options.folder), present_schedule_text, console)
-    elif options.remove:
-        _print(remove_schedule(cell, options.folder), removed_schedule_text, console)
+    if options.show or options.remove:
+        found = (present_schedule if options.show else remove_schedule)(cell, options.folder)
+        console.document(schedule_document(found))
+        console.print((present_schedule_text if options.show else removed_schedule_text)(found))
     elif options.daily is None:
         raise UsageError("the time of day is missing", action="Give --daily 02:30, --show or --remove")
     else:
         _write(cell, options, console)
     return ExitCode.DONE
-
-
-def _print(found: Schedule | None, text: Callable[[Schedule | None], str], console: Console) -> None:
-    console.document(schedule_document(found))
-    console.print(text(found))
 
 
 def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:

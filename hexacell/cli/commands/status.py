@@ -22,7 +22,7 @@ from hexacell.text.cells import fleet_document, fleet_text, metrics_text, status
 
 
 def main(options: argparse.Namespace) -> ExitCode:
-    """Tell; nothing is changed but the file of metrics, which is replaced whole."""
+    """Show the cells; nothing is changed but the file of metrics, which is replaced whole."""
     console = Console(options.json)
     if not options.cells:
         return _fleet(options, console)

@@ -15,8 +15,8 @@ from hexacell.text.studies import STUDIES
 def main(options: argparse.Namespace) -> ExitCode:
     """One of the studies; its picture goes into the folder of its results."""
     console, shown, new_executor = Console(options.json), STUDIES[options.study], _executors(options)
-    with task_bar(shown.study.unit) as told:
-        found = run_study(shown.study, options.folder, options.draws, new_executor, told)
+    with task_bar(shown.study.unit) as progress:
+        found = run_study(shown.study, options.folder, options.draws, new_executor, progress)
     for line in shown.lines(found):
         console.print(line)
     picture = options.folder / f"{shown.study.name}.svg"

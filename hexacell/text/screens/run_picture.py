@@ -1,4 +1,4 @@
-"""What a screen knows of a run: a fold over the messages of its host, and nothing else."""
+"""What a screen knows of a run: a fold over the messages of its host, and the first line that shows it."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from hexacell.run_process.messages import (
     RunDescribed,
     StatusChanged,
 )
+from hexacell.text.screens.views import HeaderView, Urgency
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import Question
@@ -31,16 +32,25 @@ Setback = events.Tripped | events.Failed | events.Interrupted | HostFailed
 """What a fault is shown from."""
 
 
+MODES = {"optimise": "calibration", "quick": "quick level", "check": "check", "length": "length check"}
+URGENT = {
+    Status.FAULTED: Urgency.ALARM,
+    Status.AWAITING_OPERATOR: Urgency.ATTENTION,
+    Status.PAUSED: Urgency.ATTENTION,
+    Status.PAUSING: Urgency.ATTENTION,
+}
+
+
 @dataclass(frozen=True, slots=True)
 class RunPicture:
     """A run as a screen sees it.
 
     Attributes:
         live: what the devices showed last, and ``live_at_s`` when that came, by the screen's clock.
-        step: the step that was begun last; none between steps.
-        expected: what the gauges were to show, by set and orientation.
+        step: the step that was begun last; None between steps.
+        expected: predicted readings of the gauges, by set and orientation.
         forecasts: predicted errors, each with the number of records for the identification before it.
-        setback: the latest fault, until a step is begun after it; ``setbacks`` how many there were.
+        setback: the latest fault, until a step is begun after it; ``setbacks`` is the number of faults.
         refusal: the command that was refused last, until the next event.
         record_times: when records were taken, for the time that is left.
     """
@@ -142,3 +152,34 @@ def _with_failure(picture: RunPicture, failed: HostFailed) -> RunPicture:
 
 def _with_setback(picture: RunPicture, setback: Setback) -> RunPicture:
     return replace(picture, setback=setback, setbacks=picture.setbacks + 1)
+
+
+def header_view(cell: str, picture: RunPicture) -> HeaderView:
+    """The cell, what is done there, its state, and who is in control."""
+    described = picture.described
+    if described is None:
+        return HeaderView(cell, status="no run")
+    if described.is_recorded:
+        return HeaderView(
+            cell, f"recorded {MODES[described.mode]} {described.folder.name}", _cursor(picture)
+        )
+    status = picture.status.value.upper()
+    urgency = URGENT.get(picture.status, Urgency.CALM)
+    return HeaderView(cell, MODES[described.mode], status, _control(picture), urgency)
+
+
+def _cursor(picture: RunPicture) -> str:
+    cursor = picture.cursor
+    if cursor is None:
+        return "RECORDED"
+    speed = f"x{cursor.speed:g}" if cursor.speed else "halted"
+    return f"{cursor.at:%Y-%m-%d %H:%M:%S} {cursor.sequence}/{cursor.last} {speed}"
+
+
+def _control(picture: RunPicture) -> str:
+    control = picture.control
+    if control is None:
+        return ""
+    if control.is_in_control:
+        return "you are in control"
+    return f"watching, {control.who or 'nobody'} is in control"

@@ -9,7 +9,7 @@ from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
 from hexacell.results.result import ExpectedImprovement
 from hexacell.results.written_geometry import TaskDisplacement
-from hexacell.text.answers import TypedAnswer, request_text, typed_answer
+from hexacell.text.line_face import TypedAnswer, request_text, typed_answer
 from hexacell.text.run import question_text
 from hexacell.text.verdict import teaching_sentence
 from hexacell.verdict.acceptance_gates import AcceptanceGate

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
 
-from hexacell.text.run_story import run_story, story_text
+from hexacell.text.line_face import run_story, story_text
 from procedures.journal.line_format import Entry
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events

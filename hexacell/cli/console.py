@@ -52,7 +52,7 @@ def _write(stream: TextIO | None, text: str) -> None:
 
 
 def lost_output() -> OSError | None:
-    """Why output of this process could not be written, as to a full disk; none if all could be."""
+    """Why output of this process could not be written, such as a full disk; None if all could be."""
     return _lost[0] if _lost else None
 
 

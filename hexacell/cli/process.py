@@ -107,7 +107,7 @@ def require_platform(target: str) -> None:
         )
     if target in OVER_A_SOCKET and not hasattr(socket, "SO_PEERCRED"):
         raise UsageError(
-            "this system does not tell as Linux does who is at the other end of a local socket, without "
+            "this system does not report as Linux does who is at the other end of a local socket, without "
             "which nobody may reach a run in another process",
             action="Use `hexacell run` at this terminal, or Linux",
         )

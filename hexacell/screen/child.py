@@ -23,7 +23,7 @@ async def run_child(what: Literal["preflight", "plan"], cell: Path, mode: str = 
     """The document of a computation about a cell, made by another process.
 
     Raises:
-        HexacellError: it gave none.
+        HexacellError: it gave no document.
     """
     command = (sys.executable, "-m", __name__, what, str(cell), mode)
     process = await asyncio.create_subprocess_exec(*command, stdin=DEVNULL, stdout=PIPE, stderr=DEVNULL)

@@ -77,7 +77,7 @@ KEYS = (
     Binding("question_mark", "help", "Help", key_display="?", id="help"),
     Binding("q", "leave", "Quit", id="quit"),
 )
-"""The same on every screen; ``id`` is the name in the file."""
+"""Keys of every screen; ``id`` is the name of the action in the file."""
 
 THEMES = ("dark", "light", "monochrome")
 
@@ -103,10 +103,10 @@ def shown_path(path: Path) -> str:
 
 
 def read_preferences(path: Path) -> ScreenPreferences:
-    """What the file says; the defaults where there is none.
+    """The preferences in the file; the defaults without a file.
 
     Raises:
-        FileError: it cannot be read, names no action or no theme, or one key for several actions.
+        FileError: it cannot be read, names an unknown action or theme, or one key for several actions.
     """
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))

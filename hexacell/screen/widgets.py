@@ -158,7 +158,7 @@ class RowList(OptionList):
 
     @property
     def chosen(self) -> str | None:
-        """The name of the chosen row; none without rows."""
+        """The name of the chosen row; None without rows."""
         row = self.highlighted
         return None if row is None or row >= len(self._rows) else self._rows[row][0]
 
@@ -250,4 +250,4 @@ _ACTIONS = {
     for action in ScreenAction
     if any(one.show and one.action == f"perform('{action}')" for one in KEYS)
 }
-"""Those that may have no effect, by how a key names them."""
+"""The actions that may have no effect, by what a key performs."""

@@ -56,7 +56,7 @@ def test_a_run_in_another_process_needs_a_socket_that_tells_its_peer(tmp_path):
     ended = typed(LIKE_MACOS, tmp_path, "tui", "cell.toml")
     assert ended.returncode == 2
     assert ended.stderr.startswith(
-        "hexacell: this system does not tell as Linux does who is at the other end"
+        "hexacell: this system does not report as Linux does who is at the other end"
     )
     assert ended.stderr.endswith("Use `hexacell run` at this terminal, or Linux\n")
 

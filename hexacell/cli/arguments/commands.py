@@ -102,7 +102,7 @@ def not_negative(text: str) -> int:
 
 
 def positive(text: str) -> int:
-    """A number above zero; raises ``ValueError`` likewise."""
+    """A number above zero; raises ``ValueError``, of which argparse makes a message."""
     number = int(text)
     if number < 1:
         raise ValueError
@@ -113,7 +113,7 @@ LONGEST_S = 86_400.0
 
 
 def bounded_seconds(text: str) -> float:
-    """Seconds, more than none and no more than a day; raises ``ValueError``."""
+    """Seconds, from above 0 to a day; raises ``ValueError``."""
     seconds = float(text)
     if not 0.0 < seconds <= LONGEST_S:
         raise ValueError(text)
@@ -121,7 +121,7 @@ def bounded_seconds(text: str) -> float:
 
 
 def node_id(text: str) -> int:
-    """A CANopen node id, from 1 to 127; raises ``ValueError`` likewise."""
+    """A CANopen node id, from 1 to 127; raises ``ValueError``."""
     number = int(text)
     if not 1 <= number <= LARGEST_NODE_ID:
         raise ValueError

@@ -123,10 +123,12 @@ def _status(commands: Any) -> None:  # noqa: ANN401
 
 
 def _notify(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(commands, "notify", "who is told of unattended runs: list, try, send what waits")
+    parser = add_command(
+        commands, "notify", "who is notified of unattended runs: list, try, send what waits"
+    )
     add_cell(parser)
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--test", action="store_true", help="tell everybody something now")
+    what.add_argument("--test", action="store_true", help="notify everybody of a test now")
     what.add_argument("--send", action="store_true", help="send what earlier runs could not")
     add_json(parser)
 

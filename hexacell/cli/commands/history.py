@@ -63,7 +63,7 @@ def main(options: argparse.Namespace) -> ExitCode:
 
 
 def _index(cell: Cell, options: argparse.Namespace, console: Console) -> RunIndex:
-    """Of the archive that the command or the cell file names."""
+    """The index of the archive that the command or the cell file names."""
     url = None if options.archive is None else archive_url(options.archive)
     return RunIndex(cell, url, console.warn)
 

@@ -46,7 +46,6 @@ def _require_possible(target: Path, *, is_comparison: bool) -> None:
 
 
 def _written(suffix: str, run: ReportedRun, report: Report) -> bytes:
-    """As what the name of the file asks for."""
     match suffix:
         case ".pdf":
             return pdf_of(report)

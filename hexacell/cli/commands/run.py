@@ -86,7 +86,7 @@ def _request(options: argparse.Namespace, console: Console, mode: Mode) -> RunRe
 
 
 def _cell(options: argparse.Namespace, console: Console, mode: Mode) -> Cell:
-    """The cell; if its file has mistakes, the history of its runs says why there was none tonight."""
+    """The cell; if its file has mistakes, the history of its runs says why nothing ran tonight."""
     try:
         return cell_with_devices_at(options.cell, console)
     except HexacellError as error:

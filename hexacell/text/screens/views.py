@@ -73,7 +73,7 @@ class GaugeReadout:
 
     @property
     def urgency(self) -> Urgency:
-        """Of a gauge that does not answer."""
+        """Alarm where the gauge does not answer."""
         return Urgency.ALARM if self.problem else Urgency.CALM
 
 
@@ -110,7 +110,7 @@ class PlotView:
     """A picture with axes.
 
     Attributes:
-        level: the value of a horizontal line, and ``level_name`` what it is; none without one.
+        level: the value of a horizontal line, and ``level_name`` what it is; None without a line.
         is_logarithmic: whether its vertical axis is; then all its values are above zero.
         note: what is said instead while there is nothing to draw.
     """

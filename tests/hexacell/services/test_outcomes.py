@@ -48,7 +48,7 @@ def proposed(finished, make_site) -> Callable[..., Any]:
         site = make_site(**changes)
         history = list(finished.until(events.Proposed))
         if gates is not None:
-            history[-1] = events.Proposed(gates=tuple(gates), written={})
+            history[-1] = history[-1].model_copy(update={"gates": tuple(gates)})
         site.write(history, finished)
         return site
 

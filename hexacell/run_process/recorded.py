@@ -158,10 +158,9 @@ class RecordedRun:
     def _wait_s(self, sent: int) -> float:
         """The recorded time from one event to the next, s."""
         here, following = self._entries[sent - 1], self._entries[sent]
-        elapsed = (following.at - here.at).total_seconds()
-        if here.monotonic_s is not None and following.monotonic_s is not None:
-            by_clock = following.monotonic_s - here.monotonic_s
-            elapsed = by_clock if by_clock >= 0.0 else elapsed
+        elapsed = following.monotonic_s - here.monotonic_s
+        if elapsed < 0.0:  # the machine was restarted
+            elapsed = (following.at - here.at).total_seconds()
         return min(max(elapsed, 0.0), LONGEST_WAIT_S)
 
 

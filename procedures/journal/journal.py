@@ -22,7 +22,7 @@ from typing import BinaryIO, Self
 
 from hexacell.errors import CellBusy, FileError
 from hexacell.storage import atomic_files
-from procedures.journal.line_format import RESTORE, Entry, begins_whole, decode, encode, now, stated_version
+from procedures.journal.line_format import RESTORE, Entry, begins_whole, decode, encode, now
 from procedures.steps.events import Event
 
 _log = logging.getLogger(__name__)
@@ -50,15 +50,6 @@ def read_entries(path: Path) -> tuple[Entry, ...]:
     try:
         with open(path, "rb", opener=_open_without_waiting) as stream:
             return _parse(path, stream)[0]
-    except OSError as error:
-        raise atomic_files.os_error_to_file_error("cannot be read", path, error) from error
-
-
-def read_version(path: Path) -> int:
-    """The version of a journal's format; raises ``FileError``."""
-    try:
-        with open(path, "rb", opener=_open_without_waiting) as stream:
-            return stated_version(stream.readline(LONGEST_LINE))
     except OSError as error:
         raise atomic_files.os_error_to_file_error("cannot be read", path, error) from error
 

@@ -2,7 +2,7 @@
 
 A line is ``{"n":7,"at":"2026-11-20T10:30:00.000Z","s":5.125,"event":{...},"crc":"89abcdef"}`` and a
 line feed. The checksum is CRC-32 over the line's own bytes as they would be without it. The first
-line has ``"version"`` behind ``"n"`` and begins so in every version; without it, it is version 1.
+line has ``"version"`` behind ``"n"`` and begins so in every version.
 """
 
 from __future__ import annotations
@@ -20,31 +20,15 @@ from hexacell.cell.fields import first_mistake
 from hexacell.errors import FileError
 from procedures.steps.events import Event
 
-VERSION = 18
-"""What this program writes; it reads this and all before. Version 1 had neither version nor ``s``, and
-versions 1 and 2 no verification; checks of version 3 measured held-out points; up to version 5 no noise was
-measured. Versions up to 6 had no length check. Up to 8 only the controller's pose was read where the robot
-was located, its guard tripped on an emergency stop, gauges were not tried, the place of their plungers
-did not count, the minutes of a forecast knew no durations of moves, and commands kept fewer limits. Up to
-9 there was no quick level, a narrow failure of a test of the model ended the run, and a calibrated
-controller got a provisional geometry too. In version 10 a pass kept U from its limit where the cell file
-said nothing else, and now keeps 1.5 U. So a run of them was decided by other rules.
-Up to 12 a record was the plain mean of its readings; neither limits of the controller's files nor settings
-and ports of devices were kept. Up to 13 the encoders were read after the gauges, and no skew was kept. Up
-to 14 lines were checked in the convention's frames, and candidates were examined in other batches. Up to
-15 a set was closed, and it was not told why, where no line led from its reference to the last record. Up
-to 16 candidates were not refined, and gained beside what was known. Up to 17 no pilot poses were visited,
-and candidates were refined less."""
-
-RULES_SINCE = 18
-"""The version since which runs are decided by the present rules; older ones are not resumed."""
+VERSION = 1
+"""What this program writes and reads. A new version is one in which something no longer means the same."""
 
 RESTORE = "Restore the run folder from a copy; it cannot be continued"
 
 _EVENTS: TypeAdapter[Event] = TypeAdapter(Event)
 _FIRST = re.compile(rb'\{"n":1,"version":(\d{1,9}),')
 _LINE = re.compile(
-    rb'\{"n":([1-9]\d*),(?:"version":\d+,)?"at":"([^"]+)",(?:"s":(\d+\.\d+),)?"event":(\{.*\})}', re.DOTALL
+    rb'\{"n":([1-9]\d*),(?:"version":\d+,)?"at":"([^"]+)","s":(\d+\.\d+),"event":(\{.*\})}', re.DOTALL
 )
 _TAIL = re.compile(rb',"crc":"([0-9a-f]{8})"\}')
 _TAIL_LENGTH = 18
@@ -57,13 +41,12 @@ class Entry:
     Attributes:
         number: its place in the journal, from 1; also its line in the file.
         at: when it was written, UTC, by a clock that may have been set in between.
-        monotonic_s: time of a monotonic clock, for durations, s; it restarts when the machine
-            does. None in journals of version 1.
+        monotonic_s: time of a monotonic clock, for durations, s; it restarts when the machine does.
     """
 
     number: int
     at: datetime
-    monotonic_s: float | None
+    monotonic_s: float
     event: Event
 
 
@@ -76,8 +59,7 @@ def encode(entry: Entry) -> bytes:
     """The line of an entry; raises ``ValueError`` if its text has no bytes in UTF-8, as some file names."""
     at = entry.at.isoformat(timespec="milliseconds").replace("+00:00", "Z")
     version = f'"version":{VERSION},' if entry.number == 1 else ""
-    monotonic = "" if entry.monotonic_s is None else f'"s":{entry.monotonic_s},'
-    head = f'{{"n":{entry.number},{version}"at":"{at}",{monotonic}"event":'
+    head = f'{{"n":{entry.number},{version}"at":"{at}","s":{entry.monotonic_s},"event":'
     body = (head + entry.event.model_dump_json()).encode()
     return b'%b,"crc":"%08x"}\n' % (body, _checksum(body))
 
@@ -106,13 +88,7 @@ def decode(line: bytes, path: Path, due: int) -> Entry | None:
     except ValueError as error:
         reason = first_mistake(error, "the event") if isinstance(error, ValidationError) else str(error)
         raise _foreign(reason, path, due) from error
-    return Entry(due, when, float(monotonic) if monotonic else None, found)
-
-
-def stated_version(line: bytes) -> int:
-    """The version that the first line of a journal states."""
-    stated = _FIRST.match(line)
-    return 1 if stated is None else int(stated[1])
+    return Entry(due, when, float(monotonic), found)
 
 
 def is_whole(line: bytes) -> bool:
@@ -135,10 +111,12 @@ def _checksum(body: bytes) -> int:
 
 
 def _require_known_version(line: bytes, path: Path) -> None:
-    if (version := stated_version(line)) > VERSION:
+    stated = _FIRST.match(line)
+    if stated is None:
+        raise _foreign("it states no version", path, 1)
+    if (version := int(stated[1])) > VERSION:
         raise FileError(
-            f"a newer hexacell wrote this journal: its format has version {version}, "
-            f"known are 1 to {VERSION}",
+            f"a newer hexacell wrote this journal: its format has version {version}, known is {VERSION}",
             subject=path,
             line=1,
             action="Use that hexacell, or update this one",

@@ -116,14 +116,9 @@ def is_wording(change: Change) -> bool:
 
 
 def counts_mismatch(reading: Reading, encoders: EncoderSettings) -> Change | None:
-    """A difference of joint variables from their encoder counts by more than half a count.
-
-    Journals before version 13 have the plain mean.
-    """
-    readings = np.array([joint_variables(counts, encoders) for counts in reading.counts])
-    mean = trimmed_mean(readings)
-    half = 0.5 * encoders.step
-    if any(np.abs(one - reading.joints).max() <= half + TOLERANCE for one in (mean, readings.mean(axis=0))):
+    """A difference of joint variables from their encoder counts by more than half a count."""
+    mean = trimmed_mean(np.array([joint_variables(counts, encoders) for counts in reading.counts]))
+    if np.abs(mean - reading.joints).max() <= 0.5 * encoders.step + TOLERANCE:
         return None
     return Change("reading.joints", reading.joints, tuple(mean.tolist()))
 

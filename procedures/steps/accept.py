@@ -25,7 +25,6 @@ class ResultAccepted(BaseEvent):
     asked: bool = True
 
     def applied_to(self, state: RunState) -> RunState:
-        """The written geometry stays if somebody keeps it."""
         return replace(state, accepted=self)
 
 
@@ -35,14 +34,10 @@ class Accept(StepWithoutMotion):
     kind: Literal["accept"] = "accept"
 
     outcomes: ClassVar = (ResultAccepted,)
+    doing: ClassVar[str] = "waiting for a decision on the result"
     is_reproducible: ClassVar[bool] = False
 
-    def activity(self) -> str:
-        """What the run waits for."""
-        return "waiting for a decision on the result"
-
     async def perform(self, run: RunResources, state: RunState) -> ResultAccepted:
-        """Ask; nobody to ask keeps nothing."""
         judged = state.judged
         assert judged is not None  # noqa: S101 - decided only after the verdict
         assert judged.verification is not None  # noqa: S101 - only then it is offered

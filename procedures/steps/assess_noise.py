@@ -43,13 +43,9 @@ class AssessNoise(Computation):
     kind: Literal["assess noise"] = "assess noise"
 
     outcomes: ClassVar = (NoiseMeasured,)
-
-    def activity(self) -> str:
-        """What is computed."""
-        return "evaluating the noise"
+    doing: ClassVar[str] = "evaluating the noise"
 
     def compute(self, run: RunResources, state: RunState) -> NoiseMeasured:
-        """Assess the noise by the plan of the run."""
         assert state.at_pose is not None  # noqa: S101 - decided only at the reference
         key, _ = state.at_pose
         readings = noise_readings(state.set(key), run.settings.encoders)

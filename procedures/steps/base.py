@@ -29,7 +29,6 @@ class BaseEvent(Frozen):
 
     def text(self, state: RunState) -> str | None:
         """What it reports, None if nothing; ``state`` includes the event."""
-        del state
         return None
 
 
@@ -38,7 +37,7 @@ class BaseStep(Frozen, ABC):
 
     Attributes:
         outcomes: the events that carrying it out may give.
-        doing: what the robot or a person does meanwhile, where :meth:`activity` gives nothing.
+        doing: what the run, the robot or a person does meanwhile, in a few words.
         moves_nothing: it neither moves the robot nor reads a device.
         is_reproducible: a replay can compute its failure again, unless a device or the disk caused it.
     """
@@ -74,9 +73,11 @@ class BaseStep(Frozen, ABC):
 
 
 class StepOfSet(BaseStep):
-    """A step within a set."""
+    """A step within a set; ``purpose`` is what for, in a few words, where a person is to know."""
 
     at: SetKey
+
+    purpose: ClassVar[str] = ""
 
     @property
     def key(self) -> str:
@@ -87,6 +88,10 @@ class StepOfSet(BaseStep):
     def place(self) -> str:
         """Where its failures are counted: in its set."""
         return str(self.at)
+
+    def activity(self) -> str | None:
+        """The set, and what for."""
+        return f"{self.at.name}, {self.purpose}" if self.purpose else None
 
 
 class StepAtPose(StepOfSet):
@@ -115,6 +120,10 @@ class StepWithoutMotion(BaseStep):
 
     moves_nothing: ClassVar[bool] = True
     is_reproducible: ClassVar[bool] = True
+
+    def activity(self) -> str:
+        """What is done."""
+        return self.doing
 
 
 class Computation(StepWithoutMotion):

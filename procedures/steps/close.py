@@ -31,11 +31,9 @@ class SetClosed(BaseEvent):
     reason: str = ""
 
     def applied_to(self, state: RunState) -> RunState:
-        """The set is complete."""
         return state.with_set(self.at, replace(state.set(self.at), drift_mm=self.drift_mm))
 
     def text(self, state: RunState) -> str:
-        """One line about the set, and why it has fewer records than planned."""
         samples = state.set(self.at).samples
         largest = max(float(np.abs(sample.deviation_mm).max()) for sample in samples)
         drift = float(np.abs(self.drift_mm).max())

@@ -27,8 +27,6 @@ class Committed(BaseEvent):
         return replace(state, committed=self).without_position()
 
     def text(self, state: RunState) -> str:
-        """By whose word."""
-        del state
         return f"written to the controller, approved by {self.approved_by}"
 
 
@@ -38,10 +36,7 @@ class Commit(StepWithoutMotion):
     kind: Literal["commit"] = "commit"
 
     outcomes: ClassVar = (Committed,)
-
-    def activity(self) -> str:
-        """What the config gets."""
-        return "writing the config and reloading it"
+    doing: ClassVar[str] = "writing the config and reloading it"
 
     async def perform(self, run: RunResources, state: RunState) -> Committed:
         """Write the config and have it read; raises ``WriteBackUndone`` if the controller does not."""

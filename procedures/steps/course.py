@@ -57,7 +57,6 @@ class RunStarted(BaseEvent):
     further_configs: tuple[str, ...] = ()
 
     def applied_to(self, state: RunState) -> RunState:
-        """Nobody knows yet where the robot is."""
         return replace(state, started=self, position_unknown=True)
 
 
@@ -68,7 +67,6 @@ class StepBegun(BaseEvent):
     step: Step
 
     def applied_to(self, state: RunState) -> RunState:
-        """What the step changes when it is begun."""
         return self.step.begun_in(state)
 
 
@@ -107,8 +105,6 @@ class Paused(BaseEvent):
         return state.without_position().unverified() if self.at_once else state
 
     def text(self, state: RunState) -> str:
-        """That it is paused."""
-        del state
         return self.kind
 
 
@@ -118,8 +114,6 @@ class Resumed(BaseEvent):
     kind: Literal["resumed"] = "resumed"
 
     def text(self, state: RunState) -> str:
-        """That it continues."""
-        del state
         return self.kind
 
 
@@ -130,12 +124,9 @@ class RunRecalled(BaseEvent):
     reason: str
 
     def applied_to(self, state: RunState) -> RunState:
-        """The next steps lead to the reference."""
         return replace(state, recalled=self.reason)
 
     def text(self, state: RunState) -> str:
-        """Why it is to end."""
-        del state
         return f"the run is to end: {self.reason}; back to the reference"
 
 
@@ -147,12 +138,9 @@ class RecordDiscarded(BaseEvent):
     orientation: int
 
     def applied_to(self, state: RunState) -> RunState:
-        """The set has one record less."""
         return state.with_set(self.at, state.set(self.at).without(self.orientation))
 
     def text(self, state: RunState) -> str:
-        """Which record."""
-        del state
         return f"{self.at.name}, orientation {self.orientation} is measured again"
 
 
@@ -183,8 +171,6 @@ class Failed(BaseEvent):
         return counted.unverified() if self.action is Action.MEASURE_AGAIN else counted
 
     def text(self, state: RunState) -> str:
-        """What failed, and the reaction."""
-        del state
         return f"{self.reason}\n  attempt {self.attempt}: {self.action.value}"
 
 
@@ -196,8 +182,6 @@ class CommandRejected(BaseEvent):
     reason: str
 
     def text(self, state: RunState) -> str:
-        """Which command, and why."""
-        del state
         return f"{self.command}: {self.reason}"
 
 
@@ -209,7 +193,6 @@ class Interrupted(BaseEvent):
     exit_code: int
 
     def applied_to(self, state: RunState) -> RunState:
-        """Failures are counted anew when it is resumed."""
         return replace(state, failures={}, recalled=None).without_position().unverified()
 
 
@@ -222,7 +205,6 @@ class Ended(BaseEvent):
     displacement: TaskDisplacement | None = None
 
     def applied_to(self, state: RunState) -> RunState:
-        """Nothing is left to do."""
         return replace(state, ended=self)
 
 

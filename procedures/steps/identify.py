@@ -39,7 +39,6 @@ class Identified(BaseEvent):
     quick: QuickAccuracy | None = None
 
     def applied_to(self, state: RunState) -> RunState:
-        """The run has a geometry to verify."""
         return replace(state, identified=self)
 
 
@@ -49,10 +48,7 @@ class Identify(Computation):
     kind: Literal["identify"] = "identify"
 
     outcomes: ClassVar = (Identified,)
-
-    def activity(self) -> str:
-        """What is computed."""
-        return "identifying the geometry"
+    doing: ClassVar[str] = "identifying the geometry"
 
     def compute(self, run: RunResources, state: RunState) -> Identified:
         """Identify, assess, keep the fit in the run folder, and choose the held-out poses."""

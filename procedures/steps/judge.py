@@ -37,12 +37,9 @@ class ConfirmationPlanned(BaseEvent):
     poses: tuple[tuple[SixNumbers, ...], ...]
 
     def applied_to(self, state: RunState) -> RunState:
-        """These poses are measured before the verdict."""
         return replace(state, confirmation=self)
 
     def text(self, state: RunState) -> str:
-        """Why more is measured, and how much."""
-        del state
         return f"{self.reason}: {sum(map(len, self.poses))} new records tell whether by chance"
 
 
@@ -61,7 +58,6 @@ class ResultValidated(BaseEvent):
     length: LengthStatement | None = None
 
     def applied_to(self, state: RunState) -> RunState:
-        """The run has its verdict."""
         return replace(state, judged=self)
 
 
@@ -74,13 +70,9 @@ class Judge(Computation):
     kind: Literal["judge"] = "judge"
 
     outcomes: ClassVar = (ResultValidated, ConfirmationPlanned)
-
-    def activity(self) -> str:
-        """What is computed."""
-        return "verifying the result"
+    doing: ClassVar[str] = "verifying the result"
 
     def compute(self, run: RunResources, state: RunState) -> ResultValidated | ConfirmationPlanned:
-        """Judge by the mode of the run; raises ``HexacellError``."""
         match run.calibration.mode:
             case "check":
                 return _checked(run, state)

@@ -31,8 +31,6 @@ class ProvisionalApplied(BaseEvent):
         return applied.without_position()
 
     def text(self, state: RunState) -> str:
-        """What changed."""
-        del state
         return "the controller uses a provisional geometry while the points are measured"
 
 
@@ -42,13 +40,9 @@ class Lend(StepWithoutMotion):
     kind: Literal["lend"] = "lend"
 
     outcomes: ClassVar = (ProvisionalApplied,)
-
-    def activity(self) -> str:
-        """What the config gets."""
-        return "loading a provisional geometry"
+    doing: ClassVar[str] = "loading a provisional geometry"
 
     def begun_in(self, state: RunState) -> RunState:
-        """How far the change got is unknown until its event."""
         return replace(state, config_write_pending=True)
 
     async def perform(self, run: RunResources, state: RunState) -> ProvisionalApplied:

@@ -40,7 +40,6 @@ class Locate(BaseStep):
 
     async def perform(self, run: RunResources, state: RunState) -> Located:
         """Compare what controller and encoders report; raises ``GuardTripped`` if they do not agree."""
-        del state
         found = await run.locate()
         return Located(
             pose=found.pose.as_tuple(),

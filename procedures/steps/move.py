@@ -104,8 +104,6 @@ class PoseExcluded(BaseEvent):
         return found.model_copy(update=lists)
 
     def text(self, state: RunState) -> str:
-        """What follows from the refusal."""
-        del state
         if self.orientation == 1:
             what = "its reference is refused, the point is left out"
         else:
@@ -140,7 +138,6 @@ class Move(StepAtPose):
         return Pose(*self.pose)
 
     def activity(self) -> str:
-        """The pose, with the predicted error now and at the end of the plan."""
         forecast = self.expected and self.expected.forecast
         predicted = f": {forecast.now_mm:.3f} -> {forecast.end_mm:.3f} mm" if forecast else ""
         return f"{self.at.pose_name(self.orientation)}{predicted}"

@@ -33,7 +33,6 @@ class PilotTaken(BaseEvent):
         return Record(self.at.point, self.orientation, Pose(*self.pose), self.reading.joints, deviation)
 
     def applied_to(self, state: RunState) -> RunState:
-        """The set has one more pilot reading."""
         return state.with_set(self.at, state.set(self.at).with_pilot(self))
 
 
@@ -45,7 +44,6 @@ class Pilot(StepAtPose):
     outcomes: ClassVar = (PilotTaken, RecordRejected)
 
     async def perform(self, run: RunResources, state: RunState) -> PilotTaken | RecordRejected:
-        """Read one window."""
         reading = await read_inside(self, run, state)
         if isinstance(reading, RecordRejected):
             return reading

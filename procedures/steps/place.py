@@ -27,7 +27,6 @@ class GaugesPlaced(BaseEvent):
     at: SetKey
 
     def applied_to(self, state: RunState) -> RunState:
-        """The set has its gauges."""
         return state.with_set(self.at, replace(state.set(self.at), placed=True))
 
 
@@ -42,7 +41,6 @@ class Place(StepOfSet):
 
     async def perform(self, run: RunResources, state: RunState) -> GaugesPlaced:
         """Ask a person where one is needed; the robot stands still meanwhile."""
-        del state
         settings, pose = run.settings, Pose(*self.pose)
         if self.at.phase is Phase.LENGTH and settings.length_check is not None:
             if settings.length_check.mounting == "by-hand":

@@ -23,7 +23,6 @@ class GaugesProbed(BaseEvent):
     reading: Reading
 
     def applied_to(self, state: RunState) -> RunState:
-        """The set has one more probe."""
         measured = state.set(self.at)
         return state.with_set(self.at, replace(measured, probes=(*measured.probes, self)))
 
@@ -35,12 +34,7 @@ class Probe(StepOfSet):
     moved_mm: ThreeNumbers
 
     outcomes: ClassVar = (GaugesProbed,)
-
-    def activity(self) -> str:
-        """The set, and what for."""
-        return f"{self.at.name}, trying the gauges"
+    purpose: ClassVar[str] = "trying the gauges"
 
     async def perform(self, run: RunResources, state: RunState) -> GaugesProbed:
-        """Read one window."""
-        del state
         return GaugesProbed(at=self.at, moved_mm=self.moved_mm, reading=await run.read())

@@ -27,7 +27,6 @@ class Proposed(BaseEvent):
     displacement: TaskDisplacement | None = None
 
     def applied_to(self, state: RunState) -> RunState:
-        """The config may be written once it is approved."""
         return replace(state, proposed=self)
 
 
@@ -37,10 +36,7 @@ class Propose(Computation):
     kind: Literal["propose"] = "propose"
 
     outcomes: ClassVar = (Proposed,)
-
-    def activity(self) -> str:
-        """What is computed."""
-        return "preparing the new config"
+    doing: ClassVar[str] = "preparing the new config"
 
     def compute(self, run: RunResources, state: RunState) -> Proposed:
         """Save the change of the config and evaluate the gates; raises ``FileError``."""

@@ -21,7 +21,6 @@ class ReferenceRepeated(BaseEvent):
     reading: Reading
 
     def applied_to(self, state: RunState) -> RunState:
-        """The set has one more visit of its reference."""
         return state.with_set(self.at, state.set(self.at).with_visit(self))
 
 
@@ -31,12 +30,7 @@ class Repeat(StepOfSet):
     kind: Literal["repeat"] = "repeat"
 
     outcomes: ClassVar = (ReferenceRepeated,)
-
-    def activity(self) -> str:
-        """The set, and what for."""
-        return f"{self.at.name}, measuring the noise"
+    purpose: ClassVar[str] = "measuring the noise"
 
     async def perform(self, run: RunResources, state: RunState) -> ReferenceRepeated:
-        """Read one window."""
-        del state
         return ReferenceRepeated(at=self.at, reading=await run.read())

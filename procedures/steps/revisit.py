@@ -28,12 +28,9 @@ class ReferenceConfirmed(BaseEvent):
     reading: Reading
 
     def applied_to(self, state: RunState) -> RunState:
-        """The gauges have kept their zero."""
         return state.with_set(self.at, replace(state.set(self.at), reference_unverified=False))
 
     def text(self, state: RunState) -> str:
-        """Which set continues."""
-        del state
         return f"{self.at.name} continues: its reference is unchanged"
 
 
@@ -56,8 +53,6 @@ class SetInvalidated(BaseEvent):
         return replace(state, sets=kept, at_pose=None, invalidated=state.invalidated + 1)
 
     def text(self, state: RunState) -> str:
-        """Which set, and why."""
-        del state
         return f"{self.at.name} is measured again: {self.reason}"
 
 

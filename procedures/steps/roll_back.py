@@ -27,8 +27,6 @@ class RolledBack(BaseEvent):
         return replace(state, committed=None, confirmation=None, sets=kept)
 
     def text(self, state: RunState) -> str:
-        """What changed."""
-        del state
         return "the old geometry is back in the controller"
 
 
@@ -38,18 +36,13 @@ class RollBack(StepWithoutMotion):
     kind: Literal["roll back"] = "roll back"
 
     outcomes: ClassVar = (RolledBack,)
+    doing: ClassVar[str] = "restoring the old config"
     is_reproducible: ClassVar[bool] = False
 
-    def activity(self) -> str:
-        """What the config gets."""
-        return "restoring the old config"
-
     def begun_in(self, state: RunState) -> RunState:
-        """The old geometry is being restored."""
         return replace(state, rolling_back=True)
 
     async def perform(self, run: RunResources, state: RunState) -> RolledBack:
-        """Restore the config and have it read; raises ``HexacellError``."""
         cause = run.config.cause(WriteKind.TAKEN_BACK, reason_to_take_back(state))
         await run.config.restore(run.folder.path, cause)
         await run.startup.reload()

@@ -43,7 +43,6 @@ class RecordTaken(BaseEvent):
         )
 
     def applied_to(self, state: RunState) -> RunState:
-        """The set has one more record."""
         return state.with_set(self.at, state.set(self.at).with_sample(self))
 
 
@@ -69,8 +68,6 @@ class RecordRejected(BaseEvent):
         return left.with_set(self.at, rejected if is_verified else rejected.unverified())
 
     def text(self, state: RunState) -> str:
-        """Which record, and why."""
-        del state
         return f"{self.at.pose_name(self.orientation)} left out: {self.reason}"
 
 

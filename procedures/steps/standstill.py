@@ -21,7 +21,6 @@ class StandstillRead(ReadingSeries, BaseEvent):
     at: SetKey
 
     def applied_to(self, state: RunState) -> RunState:
-        """The set has its series."""
         return state.with_set(self.at, replace(state.set(self.at), standstill=self))
 
 
@@ -31,13 +30,8 @@ class Standstill(StepOfSet):
     kind: Literal["standstill"] = "standstill"
 
     outcomes: ClassVar = (StandstillRead,)
-
-    def activity(self) -> str:
-        """The set, and what for."""
-        return f"{self.at.name}, measuring the noise"
+    purpose: ClassVar[str] = "measuring the noise"
 
     async def perform(self, run: RunResources, state: RunState) -> StandstillRead:
-        """Read a series once the devices are settled."""
-        del state
         series = await run.read_series(run.settings.noise.standstill_readings)
         return StandstillRead(at=self.at, **dict(series))

@@ -24,8 +24,6 @@ class ProvisionalReverted(BaseEvent):
         return replace(state, provisional_active=False, config_write_pending=False).without_position()
 
     def text(self, state: RunState) -> str:
-        """What changed."""
-        del state
         return "the controller uses its own geometry again"
 
 
@@ -35,17 +33,12 @@ class TakeBack(StepWithoutMotion):
     kind: Literal["take back"] = "take back"
 
     outcomes: ClassVar = (ProvisionalReverted,)
-
-    def activity(self) -> str:
-        """What the config gets."""
-        return "restoring the controller's geometry"
+    doing: ClassVar[str] = "restoring the controller's geometry"
 
     def begun_in(self, state: RunState) -> RunState:
-        """How far the change got is unknown until its event."""
         return replace(state, config_write_pending=True)
 
     async def perform(self, run: RunResources, state: RunState) -> ProvisionalReverted:
-        """Restore the config and have it read; raises ``HexacellError``."""
         config = run.config
         is_written = config.holds_provisional()
         if is_written:

@@ -69,10 +69,7 @@ class Try(StepOfSet):
     kind: Literal["try"] = "try"
 
     outcomes: ClassVar = (GaugesTried,)
-
-    def activity(self) -> str:
-        """The set, and what for."""
-        return f"{self.at.name}, trying the gauges"
+    purpose: ClassVar[str] = "trying the gauges"
 
     async def perform(self, run: RunResources, state: RunState) -> GaugesTried:
         """Compare the probes with the reference; raises ``MountingError`` where a gauge did not follow."""

@@ -113,7 +113,7 @@ def pace(cell: Cell) -> float:
     """The median time from the event of a move to the next decided step, s: two lines of the journal."""
     entries = read_entries(RunFolder(runs_folder(cell) / "run").journal)
     waits = [
-        (after.monotonic_s or 0.0) - (before.monotonic_s or 0.0)
+        after.monotonic_s - before.monotonic_s
         for before, after in pairwise(entries)
         if isinstance(before.event, events.Arrived) and isinstance(after.event, events.StepBegun)
     ]

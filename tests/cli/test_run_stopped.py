@@ -50,7 +50,7 @@ def stopped_at_once(process, cell, number: signal.Signals):
     signalled_s = time.monotonic()
     outcome = process.ended()
     entries = [entry for run in cell.runs() for entry in read_entries(run / "journal.jsonl")]
-    begun_s = [entry.monotonic_s or 0.0 for entry in entries if isinstance(entry.event, events.StepBegun)]
+    begun_s = [entry.monotonic_s for entry in entries if isinstance(entry.event, events.StepBegun)]
     assert sum(moment_s > signalled_s for moment_s in begun_s) <= STEPS_TO_STOP
     return outcome
 

@@ -34,8 +34,7 @@ from procedures.engine.engine import Engine, Listener
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.engine.step_executor import StepExecutor
 from procedures.guards.position_check import PositionCheck
-from procedures.journal.journal import Journal, read_journal, read_version
-from procedures.journal.line_format import RULES_SINCE
+from procedures.journal.journal import Journal, read_journal
 from procedures.resources.config_changes import holds_provisional
 from procedures.run.questions import Operator
 from procedures.run.state import fold
@@ -247,7 +246,7 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
     """The first event of the run to resume.
 
     Raises:
-        UsageError: it is over, was begun by other rules, or the cell file has changed since it began.
+        UsageError: it is over, or the cell file has changed since it began.
         FileError: its journal cannot be read, or its folder is not that of a run of this cell.
     """
     history = read_journal(request.folder.journal)
@@ -256,12 +255,6 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
         raise FileError("the journal is empty", subject=request.folder.journal, action="Begin a new run")
     if state.ended is not None:
         raise UsageError(f"the run {request.folder.path} is over: {state.ended.line}")
-    if (version := read_version(request.folder.journal)) < RULES_SINCE:
-        raise UsageError(
-            f"{state.started.software} began this run by other rules (version {version} of the journal)",
-            subject=request.folder.path,
-            action="Finish it with that version, or begin a new run",
-        )
     if state.started.cell_text != request.cell.text_without_secrets:
         raise UsageError(
             f"{request.cell.path} has changed since the run began",

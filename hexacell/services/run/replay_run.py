@@ -15,12 +15,12 @@ from hexacell.cell.model import CellSettings
 from hexacell.config.change import ConfigChange
 from hexacell.config.layout import Contents, fingerprint_of, read_contents_if_present
 from hexacell.config.receipt import BEFORE, kept_paths
-from hexacell.errors import FileError, HexacellError, UsageError
+from hexacell.errors import FileError, HexacellError
 from hexacell.runs.run_folder import CELL_FILE, RunFolder
 from hexacell.services.recorded.journal_soundness import require_sound
 from hexacell.services.run.calibration_run import calibration_of_run
-from procedures.journal.journal import read_entries, read_version
-from procedures.journal.line_format import RESTORE, RULES_SINCE, Entry
+from procedures.journal.journal import read_entries
+from procedures.journal.line_format import RESTORE, Entry
 from procedures.replay.comparison import TOLERANCE, ReplayReport
 from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Replayer, Scope
@@ -44,7 +44,6 @@ async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERAN
     folder, journal = _found(run)
     entries = read_entries(journal)
     started = _started(journal, entries)
-    _require_rules(journal, scope)
     report = ReplayReport(journal, started.software, len(entries))
     with TemporaryDirectory(prefix="hexacell-replay-") as name:
         executor, started = _set_up(Path(name), folder, started, entries)
@@ -57,20 +56,6 @@ def _found(run: Path) -> tuple[RunFolder, Path]:
     if run.is_dir():
         return RunFolder(run), RunFolder(run).journal
     return RunFolder(run.parent), run
-
-
-def _require_rules(journal: Path, scope: Scope) -> None:
-    """Earlier versions decided by other rules; only their identification can be repeated.
-
-    Raises:
-        UsageError: more than that is to be repeated.
-    """
-    if (version := read_version(journal)) < RULES_SINCE and scope is not Scope.IDENTIFICATION:
-        raise UsageError(
-            f"the journal has version {version}, whose runs were decided by other rules",
-            subject=journal,
-            action="Replay it with --only identification",
-        )
 
 
 def _started(journal: Path, entries: Sequence[Entry]) -> RunStarted:

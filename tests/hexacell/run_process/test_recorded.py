@@ -49,11 +49,11 @@ HISTORY: tuple[Any, ...] = (
 LAST = len(HISTORY)
 
 
-def recorded(folder: Path, *at_s: float, clocks: bool = True) -> RunFolder:
+def recorded(folder: Path, *at_s: float, restarted: bool = False) -> RunFolder:
     """The run on the disk; each event so many seconds after noon, or one second after the one before."""
     times = [at_s[n] if n < len(at_s) else float(n) for n in range(LAST)]
     lines = [
-        encode(Entry(n, NOON + timedelta(seconds=at), 1000.0 + at if clocks else None, event))
+        encode(Entry(n, NOON + timedelta(seconds=at), 1000.0 + (-at if restarted else at), event))
         for n, (at, event) in enumerate(zip(times, HISTORY, strict=True), start=1)
     ]
     (folder / "journal.jsonl").write_bytes(b"".join(lines))
@@ -137,10 +137,10 @@ async def test_questions_to_place_gauges_are_told(tmp_path) -> None:
     assert StatusChanged(status=Status.RUNNING) in answered
 
 
-@pytest.mark.parametrize("clocks", [True, False])
-async def test_it_advances_by_itself_as_fast_as_wanted(tmp_path, clocks: bool) -> None:
+@pytest.mark.parametrize("restarted", [False, True])
+async def test_it_advances_by_itself_as_fast_as_wanted(tmp_path, restarted: bool) -> None:
     clock = ManualClock()
-    run = RecordedRun(recorded(tmp_path, 0.0, 10.0, 30.0, clocks=clocks), 1, clock)
+    run = RecordedRun(recorded(tmp_path, 0.0, 10.0, 30.0, restarted=restarted), 1, clock)
     messages = run.messages()
     await told(messages)
     run.set_speed(4.0)

@@ -17,7 +17,9 @@ HISTORY = [
     events.Resumed(),
     events.Ended(exit_code=0, line="35 parameters, 55 records at 5 points; " + "position error " * 8),
 ]
-ENTRIES = [Entry(n, NOON + timedelta(seconds=n), None, event) for n, event in enumerate(HISTORY, start=1)]
+ENTRIES = [
+    Entry(n, NOON + timedelta(seconds=n), float(n), event) for n, event in enumerate(HISTORY, start=1)
+]
 
 
 def test_each_record_and_each_turn_has_its_time() -> None:

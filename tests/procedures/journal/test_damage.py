@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import zlib
-from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -12,8 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hexacell.errors import FileError
-from procedures.journal.journal import Journal, read_entries, read_journal
-from procedures.journal.line_format import VERSION, Entry
+from procedures.journal.journal import Journal, read_journal
+from procedures.journal.line_format import VERSION
 from tests.procedures.journal.told import TOLD, checked, write_told
 
 
@@ -82,15 +81,10 @@ def test_a_journal_of_a_newer_version_is_refused_plainly(path: Path) -> None:
     assert path.read_bytes() == before
 
 
-def test_a_journal_of_the_first_version_is_read_and_continued(path: Path) -> None:
-    event = b'{"kind":"committed","approved_by":"a tester"}'
-    body = b'{"n":1,"at":"2026-11-20T10:30:00.000Z","event":%b}' % event
-    path.write_bytes(checked(body))
-    (entry,) = read_entries(path)
-    assert entry == Entry(1, datetime(2026, 11, 20, 10, 30, tzinfo=UTC), None, TOLD[1])
-    with Journal(path) as journal:
-        journal.append(TOLD[2])
-    assert read_journal(path) == TOLD[1:3]
+def test_a_journal_that_states_no_version_is_refused(path: Path) -> None:
+    path.write_bytes(checked(b'{"n":1,"at":"2026-11-20T10:30:00.000Z","s":1.0,"event":{"kind":"resumed"}}'))
+    with pytest.raises(FileError, match="states no version"):
+        read_journal(path)
 
 
 @settings(max_examples=500, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -73,14 +73,14 @@ def test_a_different_field_is_named(recorded: Any, replayed: Any, field: str) ->
 
 
 def test_a_field_missing_in_the_recorded_event_is_no_difference() -> None:
-    body = b'{"kind":"closed","at":{"phase":"before-V","point":2},"drift_mm":[0.0,0.0,0.0]}'
-    line = b'{"n":2,"at":"2026-11-20T10:30:00.000Z","event":%b}' % body
+    body = b'{"kind":"refused","at":{"phase":"before-V","point":2},"orientation":2,"reason":"so"}'
+    line = b'{"n":2,"at":"2026-11-20T10:30:00.000Z","s":1.5,"event":%b}' % body
     entry = decode(checked(line), Path("journal.jsonl"), 2)
     assert entry is not None
     reading = Reading(
         gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints=(0.0,) * 6, answers=(), counts=(), skews_s=()
     )
-    again = events.SetClosed(at=KEY, drift_mm=(0.0, 0.0, 0.0), reading=reading)
+    again = events.RecordRejected(at=KEY, orientation=2, reason="so", reading=reading)
     assert changes(entry.event, again, 1e-9) == []
     assert changes(again, again.model_copy(update={"reading": None}), 1e-9) != []
 

@@ -28,11 +28,11 @@ from hexacell.kinematics.position_agreement import PositionReports, PositionSour
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.stated_limits import gauge_travel_of
 from procedures.devices.device_set import Devices, MountedGauge
-from procedures.guards import rules
-from procedures.guards.heartbeat import WatchedController
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
 from procedures.guards.position_check import PositionCheck
-from procedures.guards.rules import GuardLimits
+from procedures.guards.rules.after_a_move import following_error, stuck_gauge
+from procedures.guards.rules.base import GuardLimits
+from procedures.guards.rules.controller_frozen import WatchedController
 from procedures.guards.supervision import MotionSupervisor, Supervised
 from procedures.run.keys import ThreeNumbers
 from procedures.run.trips import Trip, WatchedSet
@@ -122,7 +122,7 @@ class Guards:
         """A joint is not where it was commanded (6,), or the controller is wrong about where it is."""
         limit = self._settings.guards.following
         words = self._settings.mechanism.words
-        following = rules.following_error(commanded, np.array(reached.positions), limit, words)
+        following = following_error(commanded, np.array(reached.positions), limit, words)
         found = await self.position.read(reached)
         return following if following and found.odd is PositionSource.ENCODERS else found.trip or following
 
@@ -198,7 +198,6 @@ def _stuck_gauge(watched: WatchedSet, gauges: tuple[WatchedGauge, ...]) -> Trip 
     if watched.moved_mm is None:
         return None
     trips = (
-        rules.stuck_gauge(gauge.device, tuple(gauge.displayed), watched.moved_mm[gauge.axis])
-        for gauge in gauges
+        stuck_gauge(gauge.device, tuple(gauge.displayed), watched.moved_mm[gauge.axis]) for gauge in gauges
     )
     return next((trip for trip in trips if trip is not None), None)

@@ -14,6 +14,7 @@
 from __future__ import annotations
 
 import asyncio
+import shutil
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,9 +24,10 @@ from typing import Any, Self, TypeVar
 from drivers.interfaces import Controller
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
+from hexacell.storage import atomic_files
 from procedures.guards import rules
 from procedures.guards.polling import PolledDevices
-from procedures.guards.rules import GuardLimits
+from procedures.guards.rules.base import GuardLimits
 from procedures.run.cancellation import cancel_and_wait, shielded
 from procedures.run.trips import Guard, GuardTripped, Trip
 
@@ -65,7 +67,7 @@ class MotionSupervisor:
         """
         if self.latched is not None:
             raise self.latched.as_error()
-        if trip := rules.low_disk_space(self._folder, self._free_disk_mb):
+        if trip := low_disk_space(self._folder, self._free_disk_mb):
             raise self.latch(trip)
 
     def latch(self, trip: Trip) -> GuardTripped:
@@ -207,3 +209,30 @@ class GuardMonitor:
             self._failure = self._failure or error
             self._ended.set()
             self._updated.set()
+
+
+def low_disk_space(folder: Path, limit_mb: float) -> Trip | None:
+    """The free disk space of a folder, which need not exist yet, is below its limit.
+
+    Raises:
+        FileError: it cannot be determined.
+    """
+    free_mb = _free_bytes(folder) / 1e6
+    if free_mb >= limit_mb:
+        return None
+    return Trip(
+        Guard.DISK,
+        str(folder),
+        f"only {free_mb:.0f} MB are free where the run is kept, less than {limit_mb:g} MB",
+        "Free some space, then resume",
+    )
+
+
+def _free_bytes(folder: Path) -> int:
+    there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+    try:
+        return shutil.disk_usage(there).free
+    except OSError as error:
+        raise atomic_files.os_error_to_file_error(
+            "its free space cannot be determined", there, error
+        ) from error

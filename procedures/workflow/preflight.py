@@ -12,8 +12,9 @@ from hexacell.errors import AnswerNeeded, HexacellError, flatten_errors, joined
 from hexacell.kinematics.pose import Pose
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.devices.device_set import Devices, gather_errors
-from procedures.guards import rules
 from procedures.guards.position_check import PositionCheck
+from procedures.guards.rules.stop_requested import motion_forbidden
+from procedures.guards.supervision import low_disk_space
 from procedures.run.cancellation import in_thread
 from procedures.workflow.next_step import length_poses
 
@@ -92,8 +93,8 @@ async def start_failures(devices: Devices, folder: Path, free_disk_mb: float) ->
     """What prevents the start of a run, apart from the devices: the stop line, and a full disk."""
     pressed = await devices.stop_input.active_reason()
     trips = [
-        None if pressed is None else rules.motion_forbidden(pressed),
-        rules.low_disk_space(folder, free_disk_mb),
+        None if pressed is None else motion_forbidden(pressed),
+        low_disk_space(folder, free_disk_mb),
     ]
     return [trip.as_error() for trip in trips if trip is not None]
 

@@ -17,7 +17,9 @@ from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.limits.gauge_travel import GaugeRoom
 from procedures.guards import rules
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
-from procedures.guards.rules import GuardLimits
+from procedures.guards.rules.after_a_move import following_error, stuck_gauge
+from procedures.guards.rules.base import GuardLimits
+from procedures.guards.supervision import low_disk_space
 from procedures.run.trips import DriftTripped, Guard, GuardTripped, Trip
 from procedures.steps import events
 from procedures.steps.close import reference_drift
@@ -212,9 +214,9 @@ def test_the_trip_of_a_cause_precedes_those_of_its_effects() -> None:
 
 def test_a_slider_beyond_the_following_limit_is_named() -> None:
     sent = np.arange(6.0)
-    assert rules.following_error(sent, sent + 1.0, 1.0) is None
+    assert following_error(sent, sent + 1.0, 1.0) is None
     measured = sent + np.array([0.0, 0.5, 0.0, 0.0, -1.25, 1.0])
-    trip = rules.following_error(sent, measured, 1.0, Hexaglide.words)
+    trip = following_error(sent, measured, 1.0, Hexaglide.words)
     assert trip is not None
     assert (trip.guard, trip.device) == (Guard.FOLLOWING, "slider 5")
     assert "is -1.250 mm from its commanded position (limit 1 mm)" in trip.problem
@@ -234,7 +236,7 @@ def test_a_slider_beyond_the_following_limit_is_named() -> None:
 def test_an_unchanged_gauge_trips_if_the_ball_should_have_moved(
     shown: tuple[str, ...], expected_mm: float, trips: bool
 ) -> None:
-    trip = rules.stuck_gauge("gauge y", shown, expected_mm)
+    trip = stuck_gauge("gauge y", shown, expected_mm)
     assert (trip is not None) is trips
     if trip:
         assert (
@@ -255,7 +257,7 @@ def test_drift_has_its_own_exit_code() -> None:
 @pytest.mark.parametrize(("free", "trips"), [(50_000_000, False), (49_999_999, True), (0, True)])
 def test_the_disk_must_have_room(monkeypatch, free: int, trips: bool) -> None:
     monkeypatch.setattr(rules, "_free_bytes", lambda folder: free)
-    assert (rules.low_disk_space(Path("/runs"), 50.0) is not None) is trips
+    assert (low_disk_space(Path("/runs"), 50.0) is not None) is trips
 
 
 def test_a_trip_without_a_stop_asks_for_the_emergency_stop_first() -> None:

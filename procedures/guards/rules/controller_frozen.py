@@ -12,6 +12,9 @@ from drivers.errors import ControllerFrozen
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.clock import CellClock
 from procedures.devices.device_set import Devices
+from procedures.guards.polling import PolledDevices
+from procedures.guards.rules.base import GuardLimits, fault_trip
+from procedures.run.trips import Guard, Trip
 
 _FRESH_SAMPLES = 2
 """The second new sample after a heartbeat was certainly taken after it."""
@@ -74,3 +77,10 @@ class WatchedController:
                 subject="controller",
                 action="Restart it, and find out why; then resume",
             )
+
+
+def controller_frozen(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
+    """The controller answers, but always the same, although the joints move."""
+    report = devices.controller
+    is_frozen = report is not None and isinstance(report.error, ControllerFrozen)
+    return fault_trip(Guard.STALE, report) if report is not None and is_frozen else None

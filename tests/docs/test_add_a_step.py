@@ -75,7 +75,7 @@ def program(tmp_path: Path) -> Path:
     shutil.copytree(ROOT / "procedures", tmp_path / "procedures")
     codes = re.findall(r"^```python\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
     for name, code in zip(FILES, codes, strict=True):
-        assert f"`{name}`" in PAGE
+        assert f"`{Path(name).name}`" in PAGE
         (tmp_path / name).write_text(code)
     for name, patch in re.findall(r"^```diff\n(\S+)\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL):
         path = tmp_path / name

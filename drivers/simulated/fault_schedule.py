@@ -14,7 +14,7 @@ from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.robot import SimulatedMachine
-from drivers.simulated.served_device import Closeable, Switch
+from drivers.simulated.served_device import Closeable, Switch, setting
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
 from hexacell.errors import UsageError
@@ -39,8 +39,8 @@ class CellFaults:
         of_controller: dict[FaultKind, Switch] = {
             "unplugged": controller.set_unplugged,
             "silent": controller.set_silent,
-            "forward kinematics": machine.set_failing_forward,
-            "old config": machine.set_keeping_geometry,
+            "forward kinematics": setting(machine, "fails_forward"),
+            "old config": setting(machine, "keeps_geometry"),
             "frozen": controller.set_frozen,
         }
         self._switches: dict[str, Mapping[FaultKind, Switch]] = {

@@ -111,14 +111,6 @@ class SimulatedMachine:
                 joints = joints + joint_zeros(self._mechanism, self._geometry.geometry)
             return tuple(float(value) for value in joints)
 
-    def set_failing_forward(self, *, on: bool) -> None:
-        """Let the forward kinematics fail, or no more."""
-        self.fails_forward = on
-
-    def set_keeping_geometry(self, *, on: bool) -> None:
-        """Let it ignore its config when it is switched on, or no more."""
-        self.keeps_geometry = on
-
     def switch_on(self) -> None:
         """Read the geometry again; the joints stay, so the controller's pose changes.
 

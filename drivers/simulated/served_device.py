@@ -37,3 +37,12 @@ class Switch(Protocol):
     def __call__(self, *, on: bool) -> object:
         """Inject it, or clear it; from any thread."""
         ...
+
+
+def setting(owner: object, attribute: str, faulty: object = True, sound: object = False) -> Switch:
+    """A fault that is the value of an attribute."""
+
+    def switch(*, on: bool) -> None:
+        setattr(owner, attribute, faulty if on else sound)
+
+    return switch

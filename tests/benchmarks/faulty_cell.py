@@ -121,16 +121,16 @@ class FaultyCell:
         switches: dict[str, Callable[[bool], object]] = {
             "silent": partial(setattr, line, "silent"),
             "unplugged": partial(setattr, line, "unplugged"),
-            "at its end": lambda on: indicator.set_at_end(on=on),
-            "in inches": lambda on: indicator.set_inch(on=on),
-            "low battery": lambda on: indicator.set_battery_low(on=on),
+            "at its end": lambda on: setattr(indicator, "is_at_end", on),
+            "in inches": lambda on: setattr(indicator, "inch", on),
+            "low battery": lambda on: setattr(indicator, "battery_low", on),
             **{kind.value: partial(_switch, line, kind) for kind in LineFault},
         }
         if "reversed" in SEEN[axis]:
             switches |= {
                 "on hold": lambda on: indicator.set_hold(on=on),
                 "in peak mode": lambda on: indicator.set_peak(on=on),
-                "reversed": lambda on: indicator.set_reversed(on=on),
+                "reversed": lambda on: setattr(indicator, "reversed", on),
             }
         if "switched on again" in SEEN[axis]:
             switches["switched on again"] = partial(self._switch_on, axis)

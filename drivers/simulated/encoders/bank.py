@@ -10,7 +10,7 @@ from typing import Any
 from drivers.simulated.encoders.can_bus import SimulatedCanBus
 from drivers.simulated.encoders.node import SimulatedEncoder
 from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC, ROTARY, DeviceData, Vendor
-from drivers.simulated.served_device import Closeable, Switch
+from drivers.simulated.served_device import Closeable, Switch, setting
 from hexacell.cell.devices import NM, EncoderSettings, RotaryEncoderSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.clock import CellClock
@@ -64,24 +64,21 @@ class SimulatedEncoderBank(Closeable):
 
     def faults(self, leg: int) -> dict[FaultKind, Switch]:
         encoder = self._encoders[leg - 1]
-        return {
-            "unplugged": partial(self._set_fault, encoder.set_unplugged),
-            "silent": partial(self._set_fault, encoder.set_silent),
-            "alarm": partial(self._set_fault, encoder.set_alarm),
-            "warning": partial(self._set_fault, encoder.set_warning),
-            "two steps": partial(self._set_fault, encoder.set_two_steps),
-            "SYNC counter": partial(self._set_fault, encoder.set_sync_counter),
-            "switched on again": partial(self._set_fault, encoder.switch_on_again),
-            "repeated": partial(self._set_fault, encoder.set_doubled),
-            "reversed": partial(self._set_fault, encoder.set_reversed),
-            "zeroed": partial(self._set_fault, encoder.set_zeroed),
-            "frozen": partial(self._set_fault, encoder.set_frozen),
-            "jumped": partial(self._set_fault, partial(encoder.set_shifted, self._jump_counts)),
+        switches: dict[FaultKind, Switch] = {
+            "unplugged": encoder.set_unplugged,
+            "silent": setting(encoder, "is_silent"),
+            "alarm": encoder.set_alarm,
+            "warning": encoder.set_warning,
+            "two steps": encoder.set_two_steps,
+            "SYNC counter": encoder.set_sync_counter,
+            "switched on again": encoder.switch_on_again,
+            "repeated": setting(encoder, "is_doubled"),
+            "reversed": encoder.set_reversed,
+            "zeroed": encoder.set_zeroed,
+            "frozen": setting(encoder, "is_frozen"),
+            "jumped": partial(encoder.set_shifted, round(JUMP / self._settings.step)),
         }
-
-    @property
-    def _jump_counts(self) -> int:
-        return round(JUMP / self._settings.step)
+        return {kind: partial(self._set_fault, switch) for kind, switch in switches.items()}
 
     def _set_fault(self, switch: Switch, *, on: bool) -> None:
         with self.bus.lock:
@@ -108,13 +105,11 @@ class SimulatedEncoderBank(Closeable):
         for place, encoder in enumerate(self._encoders, 1):
             delay_s = self._latency_s * place / len(self._encoders)
             for cob_id, data in encoder.on_sync():
-                self._send_later(encoder, cob_id, data, delay_s)
-
-    def _send_later(self, encoder: SimulatedEncoder, cob_id: int, data: bytes, delay_s: float) -> None:
-        if delay_s:
-            self.bus.call_later(self._clock.real_seconds(delay_s), lambda: encoder.send(cob_id, data))
-        else:
-            encoder.send(cob_id, data)
+                send = partial(encoder.send, cob_id, data)
+                if delay_s:
+                    self.bus.call_later(self._clock.real_seconds(delay_s), send)
+                else:
+                    send()
 
     def _sample(self) -> None:
         positions = self._positions()

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 from drivers.encoders.dbc import PositionSignal, read_database
+from drivers.simulated.encoders.bank import JUMP, Positions
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
-from drivers.simulated.served_device import Closeable, Switch
+from drivers.simulated.served_device import Closeable, Switch, setting
 from hexacell.cell.described_devices import DbcSettings
 from hexacell.cell.devices import EncoderSettings
 from hexacell.cell.simulation import FaultKind
@@ -18,44 +17,34 @@ from hexacell.errors import FileError
 PERIOD_S = 0.005
 """Period of what they send by themselves, s of real time."""
 
-JUMP = 400.0
-
-Positions = Callable[[], Sequence[float]]
-
 
 class SimulatedDbcEncoder:
-    """One encoder: its position in the unit of the joint, and what is wrong with it."""
+    """One encoder, and what is wrong with it.
+
+    Attributes:
+        shift: by how much it shows more, in the unit of the joint.
+        is_silent: it sends nothing.
+        has_alarm: the signals that say whether it is healthy have other values.
+    """
 
     def __init__(self, signal: PositionSignal, healthy: dict[str, int]) -> None:
         self._signal, self._healthy = signal, healthy
         self._frozen: float | None = None
-        self._position = self._shift = 0.0
-        self.is_silent = False
-        self._has_alarm = False
+        self._position = self.shift = 0.0
+        self.is_silent = self.has_alarm = False
 
     def frame(self, position: float) -> bytes:
         """The data of its message at a position."""
         self._position = position if self._frozen is None else self._frozen
         values: dict[str, Any] = {signal.name: 0 for signal in self._signal.message.signals}
-        values |= {name: value + self._has_alarm for name, value in self._healthy.items()}
-        values[self._signal.signal.name] = (self._position + self._shift) / self._signal.scale
+        values |= {name: value + self.has_alarm for name, value in self._healthy.items()}
+        values[self._signal.signal.name] = (self._position + self.shift) / self._signal.scale
         data: bytes = self._signal.message.encode(values, strict=False)
         return data
 
-    def set_silent(self, *, on: bool) -> None:
-        self.is_silent = on
-
     def set_frozen(self, *, on: bool) -> None:
-        """Send the position of now for ever, or the true one again."""
+        """Send the current position for ever, or the true one again."""
         self._frozen = self._position if on else None
-
-    def set_alarm(self, *, on: bool) -> None:
-        """Send other values of the signals that say whether it is healthy."""
-        self._has_alarm = on
-
-    def set_jumped(self, *, on: bool) -> None:
-        """Send a position far away."""
-        self._shift = JUMP if on else 0.0
 
 
 class SimulatedDbcBank(Closeable):
@@ -88,19 +77,15 @@ class SimulatedDbcBank(Closeable):
     def faults(self, leg: int) -> dict[FaultKind, Switch]:
         encoder = self._encoders[leg - 1]
         return {
-            "unplugged": partial(self._switch, encoder.set_silent),
-            "silent": partial(self._switch, encoder.set_silent),
-            "frozen": partial(self._switch, encoder.set_frozen),
-            "jumped": partial(self._switch, encoder.set_jumped),
-            "alarm": partial(self._switch, encoder.set_alarm),
+            "unplugged": setting(encoder, "is_silent"),
+            "silent": setting(encoder, "is_silent"),
+            "frozen": encoder.set_frozen,
+            "jumped": setting(encoder, "shift", JUMP, 0.0),
+            "alarm": setting(encoder, "has_alarm"),
         }
 
     def close(self) -> None:
         self.bus.close()
-
-    def _switch(self, switch: Switch, *, on: bool) -> None:
-        with self.bus.lock:
-            switch(on=on)
 
     def _send(self) -> None:
         settings = self._settings

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import struct
-import threading
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
 
+from drivers.simulated.encoders.bank import JUMP, Positions
 from drivers.simulated.gauges.instruments import Instrument
 from drivers.simulated.gauges.modbus import BROADCAST, WRITE_REGISTER, answer, refusal, split_requests
 from drivers.simulated.gauges.server import LATE_TIMEOUTS, GaugeLineServer, LineFault, LineFaults
 from drivers.simulated.serial_line import PtyLine, SerialLine
-from drivers.simulated.served_device import Closeable, Switch
+from drivers.simulated.served_device import Closeable, Switch, setting
 from hexacell.cell.described_devices import ModbusEncoderSettings
 from hexacell.cell.devices import EncoderSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.clock import CellClock
 
-JUMP = 400.0
-Positions = Callable[[], Sequence[float]]
 Counts = Callable[[], Sequence[int]]
 
 
@@ -36,7 +35,7 @@ class ModbusScales(Instrument):
         super().__init__({})
         self._described, self._counts, self._has_gaps = described, counts, has_gaps
         self._latched: Sequence[int] | None = None
-        self.silent_legs: frozenset[int] = frozenset()
+        self.silent_legs: set[int] = set()
 
     def split(self, received: bytes) -> tuple[list[bytes], bytes]:
         return split_requests(received)
@@ -44,25 +43,18 @@ class ModbusScales(Instrument):
     def answer(self, command: bytes) -> bytes:
         """The registers, or an exception; nothing to all at once, or if no device has that address."""
         device, function, register, number = struct.unpack(">BBHH", command[:-2])
-        latch = self._described.latch
+        latch, devices = self._described.latch, self._described.devices
         if device == BROADCAST:
-            if latch is not None and (function, register, number) == (
-                WRITE_REGISTER,
-                latch.register_,
-                latch.value,
-            ):
+            if latch and (function, register, number) == (WRITE_REGISTER, latch.register_, latch.value):
                 self._latched = tuple(self._counts())
             return b""
-        if device not in self._described.devices or self._is_silent(device):
+        if device not in devices or device in {devices[leg - 1] for leg in self.silent_legs}:
             return b""
         held = self._registers(device)
         wanted = [held.get(register + place) for place in range(number)]
         if None in wanted:
             return refusal(device, function)
         return answer(device, function, struct.pack(f">{number}H", *wanted))
-
-    def _is_silent(self, device: int) -> bool:
-        return any(self._described.devices[leg - 1] == device for leg in self.silent_legs)
 
     def _registers(self, device: int) -> dict[int, int]:
         """What a device holds, by register."""
@@ -81,11 +73,21 @@ class ModbusScales(Instrument):
         return held
 
 
+@dataclass
+class _Scale:
+    """What is wrong with one encoder; ``frozen`` is the count at which it stands."""
+
+    is_reversed: bool = False
+    is_invalid: bool = False
+    shift: float = 0.0
+    frozen: int | None = None
+
+
 class SimulatedModbusBank(Closeable):
     """Six encoders on a serial line; serves until it is closed.
 
     ``positions`` gives the six joint variables, when they are asked for. Answers come ``latency_s`` of the
-    cell's time after requests, beside what the line takes.
+    cell's time after requests, beside what the line takes. ``described`` is where a driver finds them.
     """
 
     def __init__(
@@ -100,11 +102,7 @@ class SimulatedModbusBank(Closeable):
         has_gaps: bool = True,
     ) -> None:
         self._settings, self._positions = settings, positions
-        self._lock = threading.Lock()
-        self._shifts = [0.0] * 6
-        self._reversed: set[int] = set()
-        self._frozen: dict[int, int] = {}
-        self._invalid: set[int] = set()
+        self._faulty = tuple(_Scale() for _ in range(6))
         self._scales = ModbusScales(described, self._counts, has_gaps=has_gaps)
         self._served = GaugeLineServer(
             self._scales,
@@ -113,67 +111,47 @@ class SimulatedModbusBank(Closeable):
             latency_s=latency_s,
             faults=LineFaults(LATE_TIMEOUTS * settings.timeout_s),
         )
-        self._described = described
         self.described = described.model_copy(update={"port": self._served.url})
-        """Where a driver finds them."""
 
     def faults(self, leg: int) -> dict[FaultKind, Switch]:
+        scale = self._faulty[leg - 1]
         found: dict[FaultKind, Switch] = {
             "unplugged": self._served.set_unplugged,
             "silent": partial(self._set_silent, leg),
-            "reversed": partial(self._set_reversed, leg),
+            "reversed": setting(scale, "is_reversed"),
             "zeroed": partial(self._set_zeroed, leg),
             "frozen": partial(self._set_frozen, leg),
-            "jumped": partial(self._set_jumped, leg),
+            "jumped": setting(scale, "shift", JUMP, 0.0),
             **{fault.value: partial(self._served.faults.switch, fault) for fault in LineFault},
         }
-        return found | ({"alarm": partial(self._set_invalid, leg)} if self._described.invalid else {})
+        return found | ({"alarm": setting(scale, "is_invalid")} if self.described.invalid else {})
 
     def close(self) -> None:
         self._served.close()
 
     def _counts(self) -> list[int]:
-        with self._lock:
-            return [self._count(leg, position) for leg, position in enumerate(self._positions(), 1)]
+        positions = self._positions()
+        return [self._count(leg, position) for leg, position in enumerate(positions, 1)]
 
     def _count(self, leg: int, position: float) -> int:
-        if leg in self._invalid:
-            return self._described.invalid[0]
-        return self._frozen.get(leg, self._true_count(leg, position))
+        scale, step = self._faulty[leg - 1], self._settings.step
+        if scale.is_invalid:
+            return self.described.invalid[0]
+        if scale.frozen is not None:
+            return scale.frozen
+        sign = -1 if scale.is_reversed else 1
+        return round(sign * (self._shown(leg, position) + scale.shift) / step)
 
-    def _true_count(self, leg: int, position: float) -> int:
-        settings = self._settings
-        sign = -1 if leg in self._reversed else 1
-        shown = (position - settings.offset[leg - 1]) * settings.direction[leg - 1]
-        return round(sign * (shown + self._shifts[leg - 1]) / settings.step)
+    def _shown(self, leg: int, position: float) -> float:
+        return (position - self._settings.offset[leg - 1]) * self._settings.direction[leg - 1]
 
     def _set_silent(self, leg: int, *, on: bool) -> None:
-        """The device of the leg answers nothing, or again."""
-        self._scales.silent_legs = (
-            self._scales.silent_legs | {leg} if on else self._scales.silent_legs - {leg}
-        )
-
-    def _set_reversed(self, leg: int, *, on: bool) -> None:
-        with self._lock:
-            (self._reversed.add if on else self._reversed.discard)(leg)
+        (self._scales.silent_legs.add if on else self._scales.silent_legs.discard)(leg)
 
     def _set_zeroed(self, leg: int, *, on: bool) -> None:
-        with self._lock:
-            settings = self._settings
-            now = (self._positions()[leg - 1] - settings.offset[leg - 1]) * settings.direction[leg - 1]
-            self._shifts[leg - 1] = -now if on else 0.0
-
-    def _set_jumped(self, leg: int, *, on: bool) -> None:
-        with self._lock:
-            self._shifts[leg - 1] = JUMP if on else 0.0
+        now = self._shown(leg, self._positions()[leg - 1])
+        self._faulty[leg - 1].shift = -now if on else 0.0
 
     def _set_frozen(self, leg: int, *, on: bool) -> None:
-        with self._lock:
-            if on:
-                self._frozen[leg] = self._true_count(leg, self._positions()[leg - 1])
-            else:
-                self._frozen.pop(leg, None)
-
-    def _set_invalid(self, leg: int, *, on: bool) -> None:
-        with self._lock:
-            (self._invalid.add if on else self._invalid.discard)(leg)
+        scale = self._faulty[leg - 1]
+        scale.frozen = self._count(leg, self._positions()[leg - 1]) if on else None

@@ -37,14 +37,21 @@ _WRONG_VALUE = 0x0609_0030
 
 
 class SimulatedEncoder:
-    """A device on the bus. ``counts`` is the position of its last sample."""
+    """A device on the bus.
+
+    Attributes:
+        counts: the position of its last sample.
+        is_silent: it responds to no SYNC, but to everything else.
+        is_frozen: it sends the position of its last sample for ever.
+        is_doubled: it answers a SYNC twice, as where another device has the same node id.
+    """
 
     def __init__(
         self, bus: SimulatedCanBus, vendor: Vendor, data: DeviceData, real_seconds: Callable[[float], float]
     ) -> None:
         self.data = data
         self.counts = 0
-        self._is_silent = self._is_frozen = self._is_doubled = False
+        self.is_silent = self.is_frozen = self.is_doubled = False
         self._shift = 0
         self._has_reported_sync = False
         self._bus = bus
@@ -73,14 +80,6 @@ class SimulatedEncoder:
             self._bus.subscribe(_NMT, self._on_nmt)
             self.boot()
 
-    def set_silent(self, *, on: bool) -> None:
-        """Respond to SYNC no longer, or again; the node responds to everything else."""
-        self._is_silent = on
-
-    def set_frozen(self, *, on: bool) -> None:
-        """Send the position of the last sample from now on, or the present one again."""
-        self._is_frozen = on
-
     def set_shifted(self, counts: int, *, on: bool) -> None:
         """Count so much more, as after a lost revolution, or as before."""
         self._shift = counts if on else 0
@@ -94,10 +93,6 @@ class SimulatedEncoder:
         if on:
             self._shift -= self.counts
             self._set(object_dictionary.OFFSET, struct.pack("<i", self._shift))
-
-    def set_doubled(self, *, on: bool) -> None:
-        """Answer a SYNC twice, as where another device has the same node id."""
-        self._is_doubled = on
 
     def set_two_steps(self, *, on: bool) -> None:
         """Report two measuring steps, one a tenth of the other, or one."""
@@ -119,7 +114,7 @@ class SimulatedEncoder:
         self._set(object_dictionary.WARNINGS, bytes((DIRTY_SCALE * on, 0)))
 
     def sample(self, counts: int) -> None:
-        if not self._is_frozen:
+        if not self.is_frozen:
             is_reversed = self._value(object_dictionary.OPERATING_PARAMETERS, 0) & REVERSED
             self.counts = (-counts if is_reversed else counts) + self._shift
 
@@ -141,12 +136,12 @@ class SimulatedEncoder:
     def on_sync(self) -> Iterator[tuple[int, bytes]]:
         """The frames (COB-ID, data) sent at this SYNC, with the present sample."""
         self._syncs += 1
-        if not self.is_operational or self._is_silent or self._misses_counter():
+        if not self.is_operational or self.is_silent or self._misses_counter():
             return
         for number in range(1, len(self._vendor.tpdos) + 1):
             transmission_type = self._value(0x1800 + number - 1, 2)
             if transmission_type in _SYNCHRONOUS and self._syncs % transmission_type == 0:
-                for _ in range(1 + self._is_doubled):
+                for _ in range(1 + self.is_doubled):
                     yield from self._frames(number)
 
     def send(self, cob_id: int, data: bytes) -> None:

@@ -7,10 +7,10 @@ from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
-from drivers.simulated.gauges.instruments import Indicator, Instrument, PlungerPosition
+from drivers.simulated.gauges.instruments import OFF_MIDDLE_MM, Indicator, Instrument, PlungerPosition
 from drivers.simulated.gauges.server import LATE_TIMEOUTS, GaugeLineServer, LineFault, LineFaults
 from drivers.simulated.serial_line import PtyLine, SocketLine
-from drivers.simulated.served_device import ServedGroup, Switch
+from drivers.simulated.served_device import ServedGroup, Switch, setting
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import FaultKind, SimulatedGauges
 from hexacell.clock import CellClock
@@ -85,17 +85,17 @@ class SimulatedGaugeBank(ServedGroup):
         return {
             "unplugged": line.set_unplugged,
             "silent": line.set_silent,
-            "at its end": indicator.set_at_end,
+            "at its end": setting(indicator, "is_at_end"),
             "off its plate": indicator.set_pushed,
-            "off its middle": indicator.set_off_middle,
-            "reversed": indicator.set_reversed,
-            "in inches": indicator.set_inch,
+            "off its middle": setting(indicator, "off_middle_mm", OFF_MIDDLE_MM, 0.0),
+            "reversed": setting(indicator, "reversed"),
+            "in inches": setting(indicator, "inch"),
             "exchanged": partial(self._exchange, gauge),
             "frozen": indicator.set_frozen,
             "on hold": indicator.set_hold,
             "in peak mode": indicator.set_peak,
             "zeroed": indicator.set_zeroed,
-            "low battery": indicator.set_battery_low,
+            "low battery": setting(indicator, "battery_low"),
             "switched on again": partial(_switch_on, line, self._channels[gauge]),
             **{fault.value: partial(line.faults.switch, fault) for fault in LineFault},
         }

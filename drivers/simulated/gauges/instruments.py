@@ -24,9 +24,13 @@ Called from the thread of the line.
 
 
 class Indicator:
-    """One instrument. Its settings and its power are attributes.
+    """One instrument. Its settings, its power and some faults are attributes.
 
-    ``held_mm`` is the value on hold, ``peak_mm`` the largest one while it shows that.
+    Attributes:
+        held_mm: the value on hold.
+        peak_mm: the largest value, while it shows that.
+        is_at_end: the plunger is at an end of its travel.
+        off_middle_mm: by how much the stem is clamped away from where it belongs.
     """
 
     def __init__(self, plunger: PlungerPosition, travel_mm: float = 12.5) -> None:
@@ -39,11 +43,11 @@ class Indicator:
         self._plunger = plunger
         self._travel_mm = travel_mm
         self._offset_mm = 0.0
-        self._at_end = False
+        self.is_at_end = False
         self._jammed_mm: float | None = None
         self.peak_mm: float | None = None
         self._pushed_mm = 0.0
-        self._off_middle_mm = 0.0
+        self.off_middle_mm = 0.0
 
     def shown(self) -> float | None:
         """The number on the display, mm or inch; None with the plunger at an end of its travel."""
@@ -62,9 +66,6 @@ class Indicator:
         """Show the largest value since then, or the present one again."""
         self.peak_mm = self._live_mm() if on else None
 
-    def set_battery_low(self, *, on: bool) -> None:
-        self.battery_low = on
-
     def set_zeroed(self, *, on: bool) -> None:
         """Press the zero key; what it did stays."""
         if on:
@@ -81,10 +82,6 @@ class Indicator:
         self._offset_mm = 0.0
         self._offset_mm = -(self._live_mm() or 0.0)
 
-    def set_at_end(self, *, on: bool) -> None:
-        """Move the plunger to an end of its travel, or back."""
-        self._at_end = on
-
     def set_frozen(self, *, on: bool) -> None:
         """Jam the plunger at its position, or free it; the instrument still answers."""
         self._jammed_mm = self._plunger() if on else None
@@ -93,24 +90,14 @@ class Indicator:
         """Push the plunger farther than a ball on its plate could, or release it."""
         self._pushed_mm = -copysign(PUSH_MM, self._plunger()) if on else 0.0
 
-    def set_reversed(self, *, on: bool) -> None:
-        self.reversed = on
-
-    def set_inch(self, *, on: bool) -> None:
-        self.inch = on
-
     def exchange_with(self, other: Indicator) -> None:
         """Put each of two instruments where the other one is."""
         self._plunger, other._plunger = other._plunger, self._plunger
 
-    def set_off_middle(self, *, on: bool) -> None:
-        """Clamp the instrument by its stem so far from where it belongs, or as it belongs."""
-        self._off_middle_mm = OFF_MIDDLE_MM if on else 0.0
-
     def _live_mm(self) -> float | None:
-        free = self._plunger() + self._off_middle_mm + self._pushed_mm
+        free = self._plunger() + self.off_middle_mm + self._pushed_mm
         position = free if self._jammed_mm is None else self._jammed_mm
-        if self._at_end or abs(position) > self._travel_mm / 2:
+        if self.is_at_end or abs(position) > self._travel_mm / 2:
             return None
         return (-position if self.reversed else position) + self._offset_mm
 

@@ -110,13 +110,7 @@ class PoseRefused(MoveRefused):
     """
 
     def __init__(
-        self,
-        command: str,
-        reason: str,
-        *,
-        subject: str,
-        axis: str | None = None,
-        is_highest: bool = True,
+        self, command: str, reason: str, *, subject: str, axis: str | None = None, is_highest: bool = True
     ) -> None:
         self.axis = axis
         self.is_highest = is_highest

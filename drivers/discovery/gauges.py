@@ -132,10 +132,7 @@ async def _identify(resource: str, timeout_s: float) -> PortFindings:
 
 
 async def _listen(
-    port: str,
-    factories: Mapping[str, GaugeFactory],
-    probes: Mapping[str, Probe],
-    timeouts: SearchTimeouts,
+    port: str, factories: Mapping[str, GaugeFactory], probes: Mapping[str, Probe], timeouts: SearchTimeouts
 ) -> PortFindings:
     """What sends by itself: gauges of a protocol, else any number."""
     for protocol, probe in probes.items():

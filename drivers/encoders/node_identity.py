@@ -29,11 +29,7 @@ from drivers.encoders.object_dictionary import (
 )
 from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity
-from hexacell.cell.devices import (
-    EncoderSettings,
-    LinearEncoderSettings,
-    RotaryEncoderSettings,
-)
+from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.parameters import JointUnit
 

@@ -211,10 +211,7 @@ class FollowedController(ServedGroup):
 
 def _require_real(settings: CellSettings, simulation: SimulationSettings) -> None:
     if simulation.faults:
-        problem, action = (
-            "only a simulated controller has faults",
-            "Remove [[simulation.faults]]",
-        )
+        problem, action = ("only a simulated controller has faults", "Remove [[simulation.faults]]")
     elif settings.timing.clock_factor != 1.0:
         problem, action = "a real controller has no fast clock", "Remove timing.clock_factor"
     elif which(simulation.joints_command[0]) is None:

@@ -6,13 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from canopen.objectdictionary import ObjectDictionary, ODRecord, ODVariable
-from canopen.objectdictionary.datatypes import (
-    INTEGER16,
-    INTEGER32,
-    UNSIGNED8,
-    UNSIGNED16,
-    UNSIGNED32,
-)
+from canopen.objectdictionary.datatypes import INTEGER16, INTEGER32, UNSIGNED8, UNSIGNED16, UNSIGNED32
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,8 +58,13 @@ def main() -> int:
     return 0
 
 
-def restart(ini: Path) -> subprocess.Popen[bytes]:
+def restart(ini: Path, ended_s: float = ENDED_S, poll_s: float = POLL_S) -> subprocess.Popen[bytes]:
     """End LinuxCNC, if it runs, and start it with an INI file; the process that it is then.
+
+    Args:
+        ini: the INI file.
+        ended_s: longest wait for its end.
+        poll_s: pause between two looks.
 
     Raises:
         UsageError: it does not start linuxcncrsh, or a screen that cannot come back; it does not end, or it
@@ -68,7 +73,7 @@ def restart(ini: Path) -> subprocess.Popen[bytes]:
     """
     configured = _configured_in(ini)
     server = configured.server
-    _wait(lambda: _is_shut_down(configured), ENDED_S, "LinuxCNC does not end")
+    _wait(lambda: _is_shut_down(configured), ended_s, poll_s, "LinuxCNC does not end")
     log = ini.with_name(LOG)
     with log.open("wb") as output:
         started = subprocess.Popen(  # noqa: S603 - LinuxCNC's own program
@@ -79,7 +84,12 @@ def restart(ini: Path) -> subprocess.Popen[bytes]:
             stderr=output,
             start_new_session=True,
         )
-    _wait(lambda: _greeting(server) or started.poll() is not None, STARTED_S, "LinuxCNC does not answer")
+    _wait(
+        lambda: _greeting(server) or started.poll() is not None,
+        STARTED_S,
+        poll_s,
+        "LinuxCNC does not answer",
+    )
     if started.poll() is not None:
         said = log.read_text(errors="replace").strip()[-SHOWN_CHARACTERS:]
         raise UsageError(f"LinuxCNC ended at once: {said}", action=f"Look at {log}")
@@ -94,20 +104,16 @@ def _configured_in(ini: Path) -> _Configured:
     applications = (shlex.split(_variable(ini, "APPLICATIONS", "APP", number)) for number in count(1))
     for program, *options in takewhile(bool, applications):
         if Path(program).name == SERVER:
-            _require_screen(display)
+            if not os.environ.get("DISPLAY"):
+                raise UsageError(
+                    f"{display} needs a screen, and there is no DISPLAY here",
+                    action="Start hexacell on that screen, or restart LinuxCNC by a command of your own",
+                )
             return _Configured(ini, _server_with(options), screen=display)
     raise UsageError(
         f"neither [DISPLAY] DISPLAY nor an [APPLICATIONS] APP of {ini} is {SERVER}",
         action="Name the INI file that LinuxCNC runs, or restart it by a command of your own",
     )
-
-
-def _require_screen(display: str) -> None:
-    if not os.environ.get("DISPLAY"):
-        raise UsageError(
-            f"{display} needs a screen, and there is no DISPLAY here",
-            action="Start hexacell on that screen, or restart LinuxCNC by a command of your own",
-        )
 
 
 def _variable(ini: Path, section: str, name: str, number: int = 1) -> str:
@@ -189,12 +195,12 @@ def _commands() -> Iterator[tuple[int, list[str]]]:
             yield int(path.parent.name), path.read_bytes().decode(errors="replace").split("\0")
 
 
-def _wait(condition: Callable[[], bool], limit_s: float, problem: str) -> None:
+def _wait(condition: Callable[[], bool], limit_s: float, poll_s: float, problem: str) -> None:
     deadline = time.monotonic() + limit_s
     while not condition():
         if time.monotonic() > deadline:
             raise UsageError(f"{problem} within {limit_s:g} s", action="Look at it; the machine is off")
-        time.sleep(POLL_S)
+        time.sleep(poll_s)
 
 
 if __name__ == "__main__":

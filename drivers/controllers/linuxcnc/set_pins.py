@@ -47,8 +47,10 @@ def main() -> int:
     return 0
 
 
-def set_pins(files: Sequence[Path]) -> int:
+def set_pins(files: Sequence[Path], settle_s: float = KINEMATICS_CYCLES_S) -> int:
     """Set the pins of HAL files (``*.hal``) to the numbers in them and in the INI files; their number.
+
+    After ``settle_s`` the forward kinematics has been computed with them.
 
     Raises:
         FileError: a file cannot be read, or has a section that a pin names, and not its variable.
@@ -67,7 +69,7 @@ def set_pins(files: Sequence[Path]) -> int:
         )
     before = _values(wanted)
     _set(wanted)
-    time.sleep(KINEMATICS_CYCLES_S)
+    time.sleep(settle_s)
     if failing := [pin for pin, value in _shown(FAILURE_PINS).items() if value == "TRUE"]:
         _set(before)
         raise UsageError(
@@ -80,7 +82,7 @@ def set_pins(files: Sequence[Path]) -> int:
 def _wanted(hal: Iterable[Path], inis: Sequence[IniText]) -> Iterator[tuple[str, str]]:
     """Every pin with its value as text; of INI variables, those of sections that the INI files have.
 
-    Where there are INI files, they have the geometry, and a number in the HAL file is none.
+    Where there are INI files, they have the geometry, and a number in the HAL file is not part of it.
     """
     for path in hal:
         for line in read_text(path).split("\n"):
@@ -89,14 +91,12 @@ def _wanted(hal: Iterable[Path], inis: Sequence[IniText]) -> Iterator[tuple[str,
                 if reference is None:
                     if not inis:
                         yield setp["pin"], setp["value"]
-                elif (value := _looked_up(reference, inis)) is not None:
-                    yield setp["pin"], value
+                elif (ini := _with_section(reference["section"], inis)) is not None:
+                    yield setp["pin"], ini.number(f"{reference['section']}/{reference['name']}").text
 
 
-def _looked_up(reference: re.Match[str], inis: Sequence[IniText]) -> str | None:
-    key = f"{reference['section']}/{reference['name']}"
-    found = next((ini for ini in inis if ini.has_section(reference["section"])), None)
-    return None if found is None else found.number(key).text
+def _with_section(section: str, inis: Sequence[IniText]) -> IniText | None:
+    return next((ini for ini in inis if ini.has_section(section)), None)
 
 
 def _values(wanted: Iterable[str]) -> dict[str, str]:

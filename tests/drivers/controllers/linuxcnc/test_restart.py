@@ -79,7 +79,7 @@ class Machine:
         self.ini.write_text("\n".join([f"DISPLAY = {program} {options}", *more]))
 
     def restart(self) -> None:
-        self.started.append(restart(self.ini))
+        self.started.append(restart(self.ini, poll_s=0.01))
 
     @property
     def notes(self) -> list[str]:
@@ -95,7 +95,6 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Machine
         (tmp_path / name).chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setattr(command, "LOCK", tmp_path / "lock")
-    monkeypatch.setattr(command, "POLL_S", 0.01)
     made = Machine(tmp_path, port)
     yield made
     for process in made.started[:-1]:
@@ -124,11 +123,10 @@ def test_one_that_does_not_start_is_shown_with_what_it_said(machine: Machine) ->
         restart(machine.ini)
 
 
-def test_one_that_does_not_end_is_not_started_a_second_time(machine: Machine, monkeypatch) -> None:
+def test_one_that_does_not_end_is_not_started_a_second_time(machine: Machine) -> None:
     (machine.folder / "lock").touch()
-    monkeypatch.setattr(command, "ENDED_S", 0.0)
     with pytest.raises(UsageError, match="LinuxCNC does not end within 0 s"):
-        restart(machine.ini)
+        restart(machine.ini, ended_s=0.0)
     assert machine.notes == []
 
 

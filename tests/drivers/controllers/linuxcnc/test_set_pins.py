@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from drivers.controllers.linuxcnc import set_pins as command
-from drivers.controllers.linuxcnc.set_pins import set_pins
 from hexacell.errors import FileError, UsageError
 
 HALCMD = """#!{python}
@@ -45,6 +45,9 @@ INI = "[KINS]\nL1 = 591.123456789\nL2 = 582.5\n"
 TUNED = "1e-07"
 
 
+set_pins = partial(command.set_pins, settle_s=0.0)
+
+
 @pytest.fixture
 def pins(tmp_path, monkeypatch) -> Callable[[], dict[str, str]]:
     """What the running LinuxCNC has."""
@@ -57,7 +60,6 @@ def pins(tmp_path, monkeypatch) -> Callable[[], dict[str, str]]:
     program.write_text(HALCMD.format(python=sys.executable, pins=str(kept)))
     program.chmod(0o755)
     monkeypatch.setenv("PATH", str(folder))
-    monkeypatch.setattr(command, "KINEMATICS_CYCLES_S", 0.0)
     return lambda: json.loads(kept.read_text())
 
 

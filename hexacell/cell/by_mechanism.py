@@ -67,16 +67,12 @@ def in_joint_unit(section: type[SectionType], unit: JointUnit) -> type[SectionTy
     return made
 
 
-def cell_model(mechanism: str, *, encoder_scales: bool = False) -> type[CellSettings]:
+@cache
+def cell_model(mechanism: str, encoder_scales: bool = False) -> type[CellSettings]:
     """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed.
 
-    Each has one model only, however it is asked for: settings of two would never be equal.
+    Each has one model only: settings of two would never be equal.
     """
-    return _cell_model(mechanism, encoder_scales)
-
-
-@cache
-def _cell_model(mechanism: str, encoder_scales: bool) -> type[CellSettings]:
     found = mechanism_of(mechanism, encoder_scales=encoder_scales)
     parameters = found.parameters
     geometry, tolerances = geometry_settings(parameters), tolerance_settings(parameters)
@@ -124,31 +120,23 @@ def _in_unit(mechanism: Mechanism, **sections: type[Section]) -> dict[str, Any]:
 
 def geometry_settings(parameters: ParameterSet) -> type[GeometrySettings]:
     """The section for a geometry of these parameters."""
-    fields: dict[str, Any] = {
-        kind.symbol: (_array_type(kind), Field(_default(kind), description=kind.meaning))
-        for kind in parameters.kinds
-    }
+    fields: dict[str, Any] = {}
+    for kind in parameters.kinds:
+        default = ... if kind.default is None else (kind.default,) * LEGS
+        fields[kind.symbol] = (_array_type(kind), Field(default, description=kind.meaning))
     return _derived(GeometrySettings, **fields)
 
 
 def tolerance_settings(parameters: ParameterSet) -> type[ToleranceSettings]:
     """The section for the tolerances of these parameters."""
-    fields: dict[str, Any] = {
-        kind.tolerance_key: (Positive, _tolerance_field(kind)) for kind in parameters.kinds
-    }
+    fields: dict[str, Any] = {}
+    for kind in parameters.kinds:
+        default = ... if kind.default_tolerance is None else kind.default_tolerance
+        fields[kind.tolerance_key] = (Positive, Field(default, description=kind.tolerance_meaning))
     kinds = " and ".join(kind.symbol for kind in parameters.kinds if kind.has_ball_offset)
     description = f"mounting of the ball: an offset common to all {kinds}"
     fields["ball_mm"] = (NotNegative, Field(0.0, description=description))
     return _derived(ToleranceSettings, **fields)
-
-
-def _tolerance_field(kind: ParameterKind) -> Any:  # noqa: ANN401 - what pydantic's Field returns
-    default = ... if kind.default_tolerance is None else kind.default_tolerance
-    return Field(default, description=kind.tolerance_meaning)
-
-
-def _default(kind: ParameterKind) -> Any:  # noqa: ANN401 - what pydantic's Field takes
-    return ... if kind.default is None else (kind.default,) * LEGS
 
 
 def _array_type(kind: ParameterKind) -> Any:  # noqa: ANN401 - a type made here

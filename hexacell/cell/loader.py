@@ -102,7 +102,9 @@ def load_cell(path: Path) -> Cell:
 def checked_cell(path: Path, text: str) -> Cell:
     """The cell of a file's text, whether the file holds it yet or not; raises as ``load_cell`` does."""
     document = TomlDocument.parse(text, path)
-    settings = _checked(document, path)
+    robot = document.data.get("robot")  # decides about keys of other sections too
+    scales = isinstance(robot, dict) and robot.get("encoder_scales") is True
+    settings = validated(document, cell_model(_mechanism(document), scales), path)
     _log.info("read the cell file %s: %s", path, settings.name)
     return Cell(path, settings, document)
 
@@ -174,12 +176,6 @@ def schema() -> dict[str, Any]:
     return cell_model(DEFAULT_MECHANISM).model_json_schema()
 
 
-def _checked(document: TomlDocument, path: Path) -> CellSettings:
-    return validated(
-        document, cell_model(_mechanism(document), encoder_scales=_encoder_scales(document)), path
-    )
-
-
 def validated(document: TomlDocument, model: type[SectionType], path: Path) -> SectionType:
     """The values of a document by the model of its file.
 
@@ -202,12 +198,6 @@ def validated(document: TomlDocument, model: type[SectionType], path: Path) -> S
         count = f"{len(errors)} mistakes" if len(errors) < MOST_REPORTED else "many mistakes; among them"
         raise joined(f"{path} has {count}", in_order[:MOST_REPORTED])
     return settings
-
-
-def _encoder_scales(document: TomlDocument) -> bool:
-    """Whether the file has errors of the encoders' scales, which decides about its other keys too."""
-    robot = document.data.get("robot")
-    return isinstance(robot, dict) and robot.get("encoder_scales") is True
 
 
 def _mechanism(document: TomlDocument) -> str:
@@ -288,9 +278,6 @@ def _masked(value: Any) -> Any:  # noqa: ANN401 - what JSON and TOML can hold
     if not isinstance(value, dict):
         return value
     return {
-        key: _masked(inner) if not _is_secret_text(key, inner) else MASK for key, inner in value.items()
+        key: MASK if is_secret((key,)) and not isinstance(inner, dict | list | None) else _masked(inner)
+        for key, inner in value.items()
     }
-
-
-def _is_secret_text(key: str, value: object) -> bool:
-    return is_secret((key,)) and not isinstance(value, dict | list | None)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from datetime import date
 from typing import Literal, Self, TypeVar
 
-from pydantic import Field, ValidationError, field_validator, model_validator
-from pydantic_core import InitErrorDetails
+from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.devices import (
@@ -51,6 +51,7 @@ from hexacell.cell.uncertainty import (
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.refused_commands import RefusedCommands
+from hexacell.storage.toml_document import KeyPath
 
 MOST_THERMOMETERS = 100
 
@@ -58,6 +59,9 @@ FEWEST_POINTS = 2
 """Fewest points to measure: one alone does not identify the geometry."""
 
 SectionType = TypeVar("SectionType", bound=Section)
+
+
+Named = TypeVar("Named", bound="tuple[GaugeSettings | ThermometerSettings | NotificationSettings, ...]")
 
 
 class ToleranceSettings(Section):
@@ -140,8 +144,6 @@ class CellSettings(Section):
     def _gauges_make_a_triad(cls, gauges: tuple[GaugeSettings, ...]) -> tuple[GaugeSettings, ...]:
         if sorted(gauge.axis for gauge in gauges) != ["x", "y", "z"]:
             raise broken_rule("the three gauges must measure x, y and z, one each", "Correct their axis")
-        if len({gauge.name for gauge in gauges}) != 3:
-            raise broken_rule("two gauges have the same name", "Give each another name")
         inputs = [(gauge.port, gauge.place_on_line) for gauge in gauges if gauge.port is not None]
         if len(set(inputs)) != len(inputs):
             raise broken_rule("two gauges have the same port and channel", "Correct one of them")
@@ -149,41 +151,35 @@ class CellSettings(Section):
 
     @model_validator(mode="after")
     def _plungers_may_move(self) -> Self:
-        """Each gauge is refused at its own place, which gives the error its line."""
         plate, mounting = self.limits.gauge_travel_mm, self.stations.mounting_mm
         refusals = [
-            InitErrorDetails(
-                type=broken_rule(
+            (
+                ("gauges", n, "travel_mm"),
+                broken_rule(
                     f"mounting_mm = {mounting:g} leaves the plunger no room to move: it has "
                     f"{min(plate, gauge.travel_mm / 2):g} mm on either side of the middle",
                     "Lower mounting_mm in [stations], or correct travel_mm",
                 ),
-                loc=("gauges", n, "travel_mm"),
-                input=gauge.travel_mm,
             )
             for n, gauge in enumerate(self.gauges)
             if min(plate, gauge.travel_mm / 2) <= mounting
         ]
         if refusals:
-            raise ValidationError.from_exception_data(self.name, refusals)
+            raise self._refused(*refusals)
         return self
 
-    @field_validator("notifications")
+    @field_validator("gauges", "thermometers", "notifications")
     @classmethod
-    def _notifications_differ(
-        cls, notifications: tuple[NotificationSettings, ...]
-    ) -> tuple[NotificationSettings, ...]:
-        if len({one.name for one in notifications}) != len(notifications):
-            raise broken_rule("two notifications have the same name", "Give each another name")
-        return notifications
+    def _names_differ(cls, named: Named, info: ValidationInfo) -> Named:
+        if len({one.name for one in named}) != len(named):
+            raise broken_rule(f"two {info.field_name} have the same name", "Give each another name")
+        return named
 
     @field_validator("thermometers")
     @classmethod
     def _thermometers_differ(
         cls, thermometers: tuple[ThermometerSettings, ...]
     ) -> tuple[ThermometerSettings, ...]:
-        if len({thermometer.name for thermometer in thermometers}) != len(thermometers):
-            raise broken_rule("two thermometers have the same name", "Give each another name")
         legs = [leg for thermometer in thermometers for leg in thermometer.legs]
         if len(set(legs)) != len(legs):
             raise broken_rule("two thermometers are on the same leg", "Name each leg once")
@@ -215,8 +211,7 @@ class CellSettings(Section):
                     "Lower within_deg, or exclude the whole point: point = ...",
                 )
             if refusal is not None:
-                detail = InitErrorDetails(type=refusal, loc=("exclusions", n), input=None)
-                raise ValidationError.from_exception_data(self.name, [detail])
+                raise self._refused((("exclusions", n), refusal))
         return self
 
     @model_validator(mode="after")
@@ -227,9 +222,7 @@ class CellSettings(Section):
                 f"the cell has no thermometer '{named}'",
                 "Write the name of one of [[thermometers]], or remove it and write temperature_c",
             )
-            place = ("length_check", "thermometer")
-            detail = InitErrorDetails(type=refusal, loc=place, input=named)
-            raise ValidationError.from_exception_data(self.name, [detail])
+            raise self._refused((("length_check", "thermometer"), refusal))
         return self
 
     @model_validator(mode="after")
@@ -240,29 +233,28 @@ class CellSettings(Section):
                 "mechanism are of angles",
                 "Remove [length_check]",
             )
-            detail = InitErrorDetails(type=refusal, loc=("length_check",), input=None)
-            raise ValidationError.from_exception_data(self.name, [detail])
+            raise self._refused((("length_check",), refusal))
         return self
 
     @model_validator(mode="after")
     def _real_devices_can_be_reached(self) -> Self:
-        """Each missing connection is refused at its own place, which gives the error its line."""
         if self.simulation is not None:
             return self
-        connections: list[tuple[tuple[str | int, ...], str, object]] = [
+        connections: list[tuple[KeyPath, str, object]] = [
             *((("gauges", n), "the gauge has no port", gauge.port) for n, gauge in enumerate(self.gauges)),
             (("encoders",), "the encoders have no bus", self.encoders.address),
             (("controller",), "the controller has no port", self.controller.port),
         ]
         refusals = [
-            InitErrorDetails(
-                type=broken_rule(f"{problem}; only a cell with a [simulation] may leave it away", "Add it"),
-                loc=place,
-                input=None,
-            )
+            (place, broken_rule(f"{problem}; only a cell with a [simulation] may leave it away", "Add it"))
             for place, problem, given in connections
             if given is None
         ]
         if refusals:
-            raise ValidationError.from_exception_data(self.name, refusals)
+            raise self._refused(*refusals)
         return self
+
+    def _refused(self, *refusals: tuple[KeyPath, PydanticCustomError]) -> ValidationError:
+        """The error with each refusal at its own place, which gives it its line."""
+        details = [InitErrorDetails(type=rule, loc=place, input=None) for place, rule in refusals]
+        return ValidationError.from_exception_data(self.name, details)

@@ -48,7 +48,8 @@ def with_passwords(
         UsageError: a variable of the environment has control characters or is too long.
     """
     controller = settings.controller
-    found = {**_in_file(controller, folder), **_in_environment(environment)}
+    path = password_path(controller, folder)
+    found = stated_secrets(path, PasswordFile, VARIABLES, environment)
     if not found:
         return settings
     return settings.model_copy(update={"controller": controller.model_copy(update=found)})
@@ -82,11 +83,34 @@ def password_path(controller: ControllerSettings, folder: Path) -> Path | None:
     return None if controller.password_file is None else folder / controller.password_file
 
 
-def _in_file(controller: ControllerSettings, folder: Path) -> dict[str, SecretStr]:
-    path = password_path(controller, folder)
-    if path is None:
-        return {}
-    return {name: value for name, value in private_content(path, PasswordFile) if value is not None}
+def stated_secrets(
+    path: Path | None,
+    model: type[Section],
+    variables: Mapping[str, str],
+    environment: Mapping[str, str],
+) -> dict[str, SecretStr]:
+    """Secrets by name: from the environment, or else from a file of their own, if there is one.
+
+    Args:
+        path: the file, if any.
+        model: what the file may hold.
+        variables: the variable of the environment for each name.
+        environment: the variables.
+
+    Raises:
+        FileError: see :func:`private_content`.
+        UsageError: a variable of the environment has control characters or is too long.
+    """
+    content = () if path is None else private_content(path, model)
+    found: dict[str, SecretStr] = {name: value for name, value in content if value is not None}
+    for name, variable in variables.items():
+        value = environment.get(variable, "")
+        if len(value) > LONGEST_TEXT or not value.isprintable():
+            problem = f"the variable {variable} is too long or has control characters"
+            raise UsageError(problem, action="Correct it")
+        if value:
+            found[name] = SecretStr(value)
+    return found
 
 
 def private_content(path: Path, model: type[SectionType]) -> SectionType:
@@ -95,11 +119,6 @@ def private_content(path: Path, model: type[SectionType]) -> SectionType:
     Raises:
         FileError: it cannot be read, has another content, or others can read or change it.
     """
-    _require_private(path)
-    return validated(TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path), model, path)
-
-
-def _require_private(path: Path) -> None:
     try:
         mode = path.stat().st_mode
     except OSError as error:
@@ -110,14 +129,4 @@ def _require_private(path: Path) -> None:
             subject=path,
             action=f"Use chmod 600 {path}, and change the passwords if somebody may have read them",
         )
-
-
-def _in_environment(environment: Mapping[str, str]) -> dict[str, SecretStr]:
-    given = {name: environment.get(variable, "") for name, variable in VARIABLES.items()}
-    for name, value in given.items():
-        if len(value) > LONGEST_TEXT or not value.isprintable():
-            raise UsageError(
-                f"the variable {VARIABLES[name]} is too long or has control characters",
-                action="Correct it",
-            )
-    return {name: SecretStr(value) for name, value in given.items() if value}
+    return validated(TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path), model, path)

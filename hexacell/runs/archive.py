@@ -166,7 +166,9 @@ class Archive:
                 raise self._unavailable(error) from error
         except SQLAlchemyError as error:
             raise self._unavailable(error) from error
-        self._discard_file()
+        self._is_ready = False
+        for path in (self._file, self._file.with_name(f"{INDEX}-journal")):
+            path.unlink(missing_ok=True)
         try:
             return self._act(act)
         except SQLAlchemyError as error:
@@ -177,15 +179,11 @@ class Archive:
             _make_file(self._file)
         with self._engine.begin() as connection:
             if not self._is_ready:
-                _make_table(connection)
+                if not inspect(connection).has_table(ARCHIVE_TABLE.name):
+                    # Another process may make it at this moment.
+                    connection.execute(CreateTable(ARCHIVE_TABLE, if_not_exists=True))
                 self._is_ready = True
             return act(connection)
-
-    def _discard_file(self) -> None:
-        assert self._file is not None  # noqa: S101 - only a file is found damaged
-        self._is_ready = False
-        for path in (self._file, self._file.with_name(f"{INDEX}-journal")):
-            path.unlink(missing_ok=True)
 
     def _unavailable(self, error: SQLAlchemyError) -> ArchiveUnavailable:
         cause = error.orig if isinstance(error, DBAPIError) else error
@@ -204,12 +202,6 @@ def open_engine(url: URL) -> Engine:
         return create_engine(url, poolclass=NullPool, connect_args={"timeout": PATIENCE_S})
     with_driver = url.set(drivername="postgresql+psycopg")
     return create_engine(with_driver, poolclass=NullPool, connect_args={"connect_timeout": PATIENCE_S})
-
-
-def _make_table(connection: Connection) -> None:
-    """Make the table, unless it is there or another process makes it at this moment."""
-    if not inspect(connection).has_table(ARCHIVE_TABLE.name):
-        connection.execute(CreateTable(ARCHIVE_TABLE, if_not_exists=True))
 
 
 def _make_file(path: Path | None) -> None:

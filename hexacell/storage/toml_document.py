@@ -53,7 +53,7 @@ class TomlDocument:
             line = text.count("\n", 0, found.start()) + 1
             raise FileError("a key has too many parts", subject=source, line=line, action="Shorten it")
         with _file_errors(text, source):
-            return cls(text, tomllib.loads(text.removeprefix(BYTE_ORDER_MARK)), _located(text), source)
+            return cls(text, tomllib.loads(text.removeprefix(BYTE_ORDER_MARK)), locate(text), source)
 
     def to_json(self) -> str:
         """The values as JSON, dates and times as text; raises ``FileError`` for endless integers."""
@@ -95,17 +95,14 @@ class TomlDocument:
     def place(self, path: KeyPath) -> str:
         """A place as a person finds it: ``'S' in [robot.nominal], row 4, number 2``."""
         last = max(depth for depth, key in enumerate(path) if isinstance(key, str))
-        words = f"'{path[last]}' {_table_words(path[:last])}"
+        table = path[:last]
+        numbers = "".join(f" number {key + 1}" for key in table if isinstance(key, int))
+        where = f"in {table_header(table)}{numbers}" if table else "at the top of the file"
+        words = f"'{path[last]}' {where}"
         for depth in range(last + 1, len(path)):
             item = "row" if isinstance(self.value(path[: depth + 1]), list) else "number"
             words += f", {item} {int(path[depth]) + 1}"
         return words
-
-
-@lru_cache(maxsize=8)
-def _located(text: str) -> Mapping[KeyPath, slice]:
-    """The locations, kept for a few texts: these are parsed again and again, and the scanner is slow."""
-    return locate(text)
 
 
 def is_secret(path: KeyPath) -> bool:
@@ -118,13 +115,6 @@ def table_header(path: KeyPath) -> str:
     """The header that opens the table at ``path``: ``[robot.nominal]``, ``[[gauges]]``."""
     names = ".".join(key for key in path if isinstance(key, str))
     return f"[[{names}]]" if isinstance(path[-1], int) else f"[{names}]"
-
-
-def _table_words(path: KeyPath) -> str:
-    if not path:
-        return "at the top of the file"
-    numbers = [f" number {key + 1}" for key in path if isinstance(key, int)]
-    return f"in {table_header(path)}{''.join(numbers)}"
 
 
 def _description(value: object) -> str:
@@ -184,10 +174,12 @@ _BARE_VALUE = re.compile(r"[^,\]}#\r\n]*(?<![ \t])")
 _KEYS = re.compile(rf"""(?:{_BASIC_STRING}|{_LITERAL_STRING}|[^"'=\]])+""")
 
 
-def locate(text: str) -> dict[KeyPath, slice]:
+@lru_cache(maxsize=8)
+def locate(text: str) -> Mapping[KeyPath, slice]:
     """The part of ``text``, valid TOML, that is each table, value and array element.
 
-    That of a table is the header or dotted key that mentions it first.
+    That of a table is the header or dotted key that mentions it first. Kept for a few texts: these are
+    parsed again and again, and the scanner is slow.
     """
     return _Scanner(text).document()
 

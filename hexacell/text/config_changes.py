@@ -78,19 +78,11 @@ def config_history_text(found: ConfigHistory) -> str:
 def _write_text(write: ConfigWrite) -> str:
     one = write.record
     head = f"{one.at:%Y-%m-%d %H:%M:%S}  {_WRITES[one.kind].format(run=one.run)}"
-    parts = [
-        _who(one),
-        _how_much(one),
-        write.why or "no verdict on it is known",
-        f'given as the reason: "{one.reason}"',
-    ]
-    stated = parts if one.reason else parts[:-1]
-    return "\n".join([wrapped(head, indent=2), *(wrapped(f"  {part}", indent=4) for part in stated)])
-
-
-def _who(one: WriteRecord) -> str:
     process = f", as {one.user} on {one.host}" if one.user else ""
-    return f"by {one.by}{process}"
+    parts = [f"by {one.by}{process}", _how_much(one), write.why or "no verdict on it is known"]
+    if one.reason:
+        parts.append(f'given as the reason: "{one.reason}"')
+    return "\n".join([wrapped(head, indent=2), *(wrapped(f"  {part}", indent=4) for part in parts)])
 
 
 def _how_much(one: WriteRecord) -> str:

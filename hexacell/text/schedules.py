@@ -17,8 +17,9 @@ MEANING = {
 
 def written_schedule_text(schedule: Schedule, run: ScheduledRun, stated: UnattendedSettings) -> str:
     """What was written, in words, and how it is put in force."""
+    kind = "quick level" if run.mode == "quick" else run.mode
     explanation = (
-        f"Each day at {run.hour:02}:{run.minute:02} a {_kind(run)} begins. {MEANING[run.mode]} "
+        f"Each day at {run.hour:02}:{run.minute:02} a {kind} begins. {MEANING[run.mode]} "
         f"{_again(run, stated)}{_ending(run, stated)}A day that the computer was off is made up for."
     )
     control = _control(schedule)
@@ -32,11 +33,8 @@ def written_schedule_text(schedule: Schedule, run: ScheduledRun, stated: Unatten
     ]
     if not schedule.is_of_system:
         lines.append("  loginctl enable-linger    # else it runs only while you are logged in")
-    return "\n".join([*lines, "To see how it went:", f"  {_log(schedule)}"])
-
-
-def _kind(run: ScheduledRun) -> str:
-    return "quick level" if run.mode == "quick" else run.mode
+    user = "" if schedule.is_of_system else "--user "
+    return "\n".join([*lines, "To see how it went:", f"  journalctl {user}-u {schedule.unit}"])
 
 
 def _again(run: ScheduledRun, stated: UnattendedSettings) -> str:
@@ -89,8 +87,3 @@ def crontab_text(line: str, stated: UnattendedSettings) -> str:
 
 def _control(schedule: Schedule) -> str:
     return "systemctl" if schedule.is_of_system else "systemctl --user"
-
-
-def _log(schedule: Schedule) -> str:
-    user = "" if schedule.is_of_system else "--user "
-    return f"journalctl {user}-u {schedule.unit}"

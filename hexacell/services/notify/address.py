@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import quote, unquote, urlsplit
 
-from hexacell.cell.fields import LONGEST_TEXT, Password, Section
+from hexacell.cell.fields import Password, Section
 from hexacell.cell.operation import NotificationSettings
-from hexacell.cell.passwords import private_content
+from hexacell.cell.passwords import stated_secrets
 from hexacell.errors import UsageError
 from hexacell.storage.secrets import MASK
 
@@ -75,7 +75,10 @@ def resolved_address(
         FileError: its password file cannot be read, or others can read or change it.
         UsageError: there is no url anywhere, or a variable cannot be one.
     """
-    found = {**_in_file(settings, folder), **_in_environment(settings.name, environment)}
+    file = None if settings.password_file is None else folder / settings.password_file
+    variables = {part: variable(settings.name, part) for part in PARTS}
+    stated = stated_secrets(file, AddressFile, variables, environment)
+    found = {name: value.get_secret_value() for name, value in stated.items()}
     url = found.pop("url", settings.url)
     if not url or "://" not in url:
         raise UsageError(
@@ -89,21 +92,3 @@ def resolved_address(
     return NoticeAddress(
         settings.name, url, topic=topic.rstrip("/"), ca_file=ca_file, open_url=settings.url, **found
     )
-
-
-def _in_file(settings: NotificationSettings, folder: Path) -> dict[str, str]:
-    if settings.password_file is None:
-        return {}
-    content = private_content(folder / settings.password_file, AddressFile)
-    return {name: value.get_secret_value() for name, value in content if value is not None}
-
-
-def _in_environment(name: str, environment: Mapping[str, str]) -> dict[str, str]:
-    given = {part: environment.get(variable(name, part), "") for part in PARTS}
-    for part, value in given.items():
-        if len(value) > LONGEST_TEXT or not value.isprintable():
-            raise UsageError(
-                f"the variable {variable(name, part)} is too long or has control characters",
-                action="Correct it",
-            )
-    return {part: value for part, value in given.items() if value}

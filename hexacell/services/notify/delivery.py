@@ -219,7 +219,7 @@ def send_by_apprise(address: NoticeAddress, notice: Notice, timeout_s: float) ->
     log_of: Any = apprise.LogCapture  # which has no types
     with log_of(level=apprise.logging.WARNING, fmt="%(message)s") as log:
         # Not through Apprise.notify, whose pool of threads would keep this process from ending.
-        service = apprise.Apprise.instantiate(_with_timeout(_with_login(address), timeout_s))
+        service = apprise.Apprise.instantiate(_apprise_url(address, timeout_s))
         if service is None:
             raise NoticeUndelivered("apprise does not know this kind of address; see its documentation")
         attached = _attachment(notice) if address.url.startswith("mailto") else None
@@ -248,14 +248,11 @@ def _kind(notice: Notice) -> str:
     return "info" if Occasion.TEST in notice.occasions else "warning"
 
 
-def _with_login(address: NoticeAddress) -> str:
-    if address.user is None:
-        return address.url
-    scheme, _, rest = address.url.partition("://")
-    password = "" if address.password is None else f":{quote(address.password, safe='')}"
-    return f"{scheme}://{quote(address.user, safe='')}{password}@{rest}"
-
-
-def _with_timeout(url: str, timeout_s: float) -> str:
-    """Apprise has its own words for it, and leaves those away that it does not know."""
+def _apprise_url(address: NoticeAddress, timeout_s: float) -> str:
+    """The address with its login and apprise's own words for a time-out."""
+    url = address.url
+    if address.user is not None:
+        scheme, _, rest = url.partition("://")
+        password = "" if address.password is None else f":{quote(address.password, safe='')}"
+        url = f"{scheme}://{quote(address.user, safe='')}{password}@{rest}"
     return f"{url}{'&' if '?' in url else '?'}rto={timeout_s:g}&cto={timeout_s:g}"

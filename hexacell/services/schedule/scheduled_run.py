@@ -131,7 +131,7 @@ def service_text(run: ScheduledRun, user: str | None, groups: Sequence[str], on_
         "Type=oneshot",
         f"ExecStart={_command(run.words)}",
         *([f"ExecStopPost={_command(run.words_afterwards)}"] if run.metrics else []),
-        f"WorkingDirectory={_path(run.cell.parent)}",
+        f"WorkingDirectory={_plain(str(run.cell.parent))}",
         f"TimeoutStartSec={run.longest_minutes}min",
         f"TimeoutStopSec={STOPPING_S}",
         "KillSignal=SIGTERM",
@@ -202,17 +202,9 @@ def _plain(text: str) -> str:
     return text.replace("%", "%%")
 
 
-def _path(path: Path) -> str:
-    return _plain(str(path))
-
-
 def _command(words: Sequence[str]) -> str:
-    return " ".join(map(_word, words))
-
-
-def _word(text: str) -> str:
-    """An argument of a command line: quoted, with nothing in it replaced."""
-    return _quoted(text).replace("$", "$$")
+    """A command line: each argument quoted, with nothing in it replaced."""
+    return " ".join(_quoted(word).replace("$", "$$") for word in words)
 
 
 def _quoted(text: str) -> str:

@@ -108,7 +108,7 @@ def write_schedule(cell: Cell, request: ScheduleRequest, folder: Path | None) ->
     """
     run = scheduled_run(cell, request)
     place, is_of_system = _place(folder)
-    service, timer = _files(run.unit, place)
+    service, timer = place / f"{run.unit}.service", place / f"{run.unit}.timer"
     for path in (service, timer):
         _require_ours(path, run.cell)
     user = _owner_of(run.cell) if is_of_system else None
@@ -207,10 +207,6 @@ def _place(folder: Path | None) -> tuple[Path, bool]:
     if folder is not None:
         return folder, is_of_system
     return (SYSTEM_UNITS if is_of_system else Path.home() / USER_UNITS), is_of_system
-
-
-def _files(unit: str, place: Path) -> tuple[Path, Path]:
-    return place / f"{unit}.service", place / f"{unit}.timer"
 
 
 def _cell_of(path: Path) -> Path | None:

@@ -105,6 +105,12 @@ def runs_folder(cell: Cell) -> Path:
     return cell.path.parent / "runs" / cell.settings.name
 
 
+def run_folders(cell: Cell) -> list[RunFolder]:
+    """The folders of a cell's runs, by name."""
+    folder = runs_folder(cell)
+    return [RunFolder(path) for path in sorted(folder.iterdir())] if folder.is_dir() else []
+
+
 def runs_folder_of_unreadable(path: Path) -> Path | None:
     """Where the runs of the cell file at ``path``, which has mistakes, are; None if its name is unknown."""
     every = path.parent / "runs"

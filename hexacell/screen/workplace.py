@@ -25,7 +25,7 @@ from hexacell.services.history.past_runs import compare_runs, parameter_trends, 
 from hexacell.services.history.run_index import PastRun
 from hexacell.services.preflight.exclusions import toggle_exclusion
 from hexacell.services.preflight.warnings import exposure_warnings
-from hexacell.services.recorded.journal_soundness import require_sound
+from hexacell.services.recorded.journal_soundness import read_sound
 from hexacell.services.recorded.resumption import LATEST, run_to_resume
 from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, approval_question, read_proposal
@@ -189,5 +189,5 @@ class Workplace:
 
     def _recorded_run(self, run: str) -> RecordedRun:
         folder = find_run(self.cell, run)
-        require_sound(read_journal(folder.journal), self.cell.settings, folder.journal, follows_plan=False)
+        read_sound(folder, self.cell.settings)
         return RecordedRun(folder)

@@ -13,7 +13,7 @@ from dataclasses import replace
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.loader import Cell
 from hexacell.errors import HexacellError
-from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.runs.run_folder import RunFolder, run_folders
 from procedures.journal.line_format import decode
 from procedures.steps import events
 
@@ -34,11 +34,10 @@ def with_changes(cell: Cell, found: Iterable[DeviceIdentity]) -> tuple[DeviceIde
 
 def _last(cell: Cell) -> tuple[str, dict[str, DeviceIdentity]]:
     """The name of the last run, which its time is, and the devices with which it began."""
-    folder = runs_folder(cell)
-    for path in sorted(folder.iterdir(), reverse=True) if folder.is_dir() else ():
-        started = _started(RunFolder(path))
+    for folder in reversed(run_folders(cell)):
+        started = _started(folder)
         if started is not None and started.devices:
-            return path.name, {one.name: one for one in started.devices}
+            return folder.name, {one.name: one for one in started.devices}
     return "", {}
 
 

@@ -15,10 +15,9 @@ from hexacell.config.receipt import AFTER, BEFORE
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.runs.run_folder import CELL_FILE, JOURNAL, MEASUREMENTS, RESULT, RunFolder
-from hexacell.services.recorded.journal_soundness import require_sound
+from hexacell.services.recorded.journal_soundness import read_sound
 from hexacell.services.recorded.recorded_robot import geometry_before
 from hexacell.storage import atomic_files
-from procedures.journal.journal import read_entries
 from procedures.run.state import RunState
 from procedures.steps import events
 
@@ -83,10 +82,8 @@ def reported_run(run: Path) -> ReportedRun:
         raise UsageError("this run never began", subject=run, action=action)
     if not folder.journal.is_file():
         raise UsageError("this is no run folder", subject=run, action="`hexacell history CELL` lists them")
-    entries = read_entries(folder.journal)
     settings = load_cell(folder.cell_file).settings
-    history = (entry.event for entry in entries)
-    state = require_sound(history, settings, folder.journal, follows_plan=False)
+    entries, state = read_sound(folder, settings)
     if state.started is None:
         raise UsageError("nothing happened in this run", subject=run, action="Name another")
     return ReportedRun(

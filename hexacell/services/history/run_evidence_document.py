@@ -14,10 +14,9 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.history.run_index import EvidenceDocument
-from hexacell.services.recorded.journal_soundness import require_sound
+from hexacell.services.recorded.journal_soundness import read_sound
 from hexacell.services.recorded.recorded_robot import started_robot
 from procedures.calibration.calibration import Calibration, Mode
-from procedures.journal.journal import read_entries
 from procedures.run.keys import Phase
 from procedures.run.leg_temperatures import legs_warmer, mean_temperature
 from procedures.run.state import RunState
@@ -33,9 +32,7 @@ def evidence_document(settings: CellSettings, folder: RunFolder) -> EvidenceDocu
     it started from a drawing, a thermometer on a leg never answered, or its journal cannot be read.
     """
     try:
-        entries = read_entries(folder.journal)
-        history = (entry.event for entry in entries)
-        state = require_sound(history, settings, folder.journal, follows_plan=False)
+        entries, state = read_sound(folder, settings)
         counted = _counted(settings, state)
         if counted is None:
             return None

@@ -8,7 +8,7 @@ what it follows from.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,9 @@ from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import AXES
-from procedures.journal.line_format import RESTORE
+from hexacell.runs.run_folder import RunFolder
+from procedures.journal.journal import read_entries
+from procedures.journal.line_format import RESTORE, Entry
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, apply
 from procedures.steps import events
@@ -90,6 +92,17 @@ def require_sound(
             )
         state = apply(state, event)
     return state
+
+
+def read_sound(folder: RunFolder, settings: CellSettings) -> tuple[Sequence[Entry], RunState]:
+    """The journal of a run and the state after it, for its numbers alone.
+
+    Raises:
+        FileError: the journal cannot be read, or cannot be of a run of such a cell.
+    """
+    entries = read_entries(folder.journal)
+    history = (entry.event for entry in entries)
+    return entries, require_sound(history, settings, folder.journal, follows_plan=False)
 
 
 @dataclass(frozen=True, slots=True)

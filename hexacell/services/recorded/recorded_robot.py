@@ -10,8 +10,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.robot.model import Robot, robot_of_start
 from hexacell.runs.run_folder import RunFolder
-from hexacell.services.recorded.journal_soundness import require_sound
-from procedures.journal.journal import read_journal
+from hexacell.services.recorded.journal_soundness import read_sound
 from procedures.run.state import RunState
 from procedures.steps.events import RunStarted
 
@@ -53,7 +52,6 @@ def commanding_geometries(folder: RunFolder, settings: CellSettings) -> tuple[Co
 def _state_of(folder: RunFolder, settings: CellSettings) -> RunState:
     """State of a run; empty if its journal cannot be read, or is of another kind of machine."""
     try:
-        history = read_journal(folder.journal)
-        return require_sound(history, settings, folder.journal, follows_plan=False)
+        return read_sound(folder, settings)[1]
     except HexacellError:
         return RunState()

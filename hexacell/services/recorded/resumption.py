@@ -24,7 +24,7 @@ from hexacell.kinematics.mechanism import SAME_FRAMES
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import Robot, controller_geometry
 from hexacell.robot.stated_limits import stated_limits
-from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
+from hexacell.runs.run_folder import RunFolder, find_run, run_folders, runs_folder
 from hexacell.services.recorded.recorded_robot import started_robot
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import RESTORE
@@ -45,12 +45,11 @@ def run_to_resume(cell: Cell, named: str) -> RunFolder:
     """
     if named != LATEST:
         return find_run(cell, named)
-    folder = runs_folder(cell)
-    runs = [RunFolder(path) for path in folder.iterdir()] if folder.is_dir() else []
-    last_events = {run: at for run in runs if (at := _interrupted_at(run)) is not None}
+    last_events = {run: at for run in run_folders(cell) if (at := _interrupted_at(run)) is not None}
     if not last_events:
         raise UsageError(
-            "no run of this cell was interrupted", action=f"Name one; the cell's runs are in {folder}"
+            "no run of this cell was interrupted",
+            action=f"Name one; the cell's runs are in {runs_folder(cell)}",
         )
     return max(last_events, key=last_events.__getitem__)
 

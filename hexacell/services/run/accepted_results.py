@@ -13,15 +13,14 @@ from hexacell.config.receipt import Receipt
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.results.result import AcceptedResult, LengthResult
-from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.runs.run_folder import RunFolder, run_folders
 from hexacell.services.history.run_summary import judged_accuracy
-from hexacell.services.recorded.journal_soundness import require_sound
+from hexacell.services.recorded.journal_soundness import read_sound
 from hexacell.services.recorded.recorded_robot import started_robot
 from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import with_measured_scale
 from procedures.calibration.calibration import Calibration, Mode
-from procedures.journal.journal import read_entries
 from procedures.run.keys import Phase
 from procedures.run.leg_temperatures import mean_leg_temperatures
 from procedures.run.state import RunState
@@ -37,9 +36,7 @@ def last_accepted_result(cell: Cell) -> AcceptedResult | None:
         FileError: the controller's config cannot be read.
     """
     written = fingerprint(*cell.config_paths)
-    folder = runs_folder(cell)
-    paths = sorted(folder.iterdir()) if folder.is_dir() else []
-    found = (_accepted(cell, path, written) for path in paths)
+    found = (_accepted(cell, folder, written) for folder in run_folders(cell))
     newest = max((one for one in found if one is not None), key=lambda one: one.at, default=None)
     return None if newest is None else _result(cell, newest)
 
@@ -54,21 +51,18 @@ class _AcceptedRun:
     identified: events.Identified
 
 
-def _accepted(cell: Cell, path: Path, sha256: str) -> _AcceptedRun | None:
+def _accepted(cell: Cell, folder: RunFolder, sha256: str) -> _AcceptedRun | None:
     """A run, if it wrote the config with this fingerprint, and its result stayed in the controller."""
     try:
-        if Receipt.of(path).sha256_after != sha256:
+        if Receipt.of(folder.path).sha256_after != sha256:
             return None
-        journal = RunFolder(path).journal
-        entries = read_entries(journal)
-        history = (entry.event for entry in entries)
-        state = require_sound(history, cell.settings, journal, follows_plan=False)
-        is_applied_later = later_approval(RunFolder(path)) is not None
+        entries, state = read_sound(folder, cell.settings)
+        is_applied_later = later_approval(folder) is not None
     except HexacellError:
         return None
     if state.identified is None or not _is_accepted(state, is_applied_later=is_applied_later):
         return None
-    return _AcceptedRun(path, entries[-1].at, state, state.identified)
+    return _AcceptedRun(folder.path, entries[-1].at, state, state.identified)
 
 
 def _is_accepted(state: RunState, *, is_applied_later: bool) -> bool:

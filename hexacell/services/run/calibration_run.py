@@ -20,10 +20,12 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services import search_effort
 from hexacell.services.devices.changed_devices import with_changes
 from hexacell.services.devices.device_setup import Connected, device_addresses, open_devices
+from hexacell.services.history.run_summary import state_of
 from hexacell.services.recorded.journal_soundness import require_sound
 from hexacell.services.recorded.recorded_robot import started_robot
 from hexacell.services.recorded.resumption import require_own_run
 from hexacell.services.run.accepted_results import last_accepted_result
+from hexacell.services.write_back.config_rollback import require_no_provisional
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.devices.device_set import Devices
@@ -35,7 +37,6 @@ from procedures.engine.recovery import RecoveryPolicy
 from procedures.engine.step_executor import StepExecutor
 from procedures.guards.position_check import PositionCheck
 from procedures.journal.journal import Journal, read_journal
-from procedures.resources.config_changes import holds_provisional
 from procedures.run.questions import Operator
 from procedures.run.state import fold
 from procedures.steps import events
@@ -110,7 +111,7 @@ async def calibrate(
             remove_stale_temporaries(path)
         started = _resumed_start(request) if request.resume else None
         if started is None:
-            _require_own_geometry(cell)
+            require_no_provisional(cell)
             calibration = new_calibration(cell, request.mode, length_check=request.length_check)
         else:
             calibration = calibration_of_run(cell, started)
@@ -157,26 +158,7 @@ async def _position_failures(cell: Cell, connected: Connected) -> list[HexacellE
 
 def is_unverified(folder: RunFolder) -> bool:
     """Whether a run, as far as its journal can be read, left a written geometry without a verdict."""
-    try:
-        return fold(read_journal(folder.journal)).is_unverified
-    except HexacellError:
-        return False
-
-
-def _require_own_geometry(cell: Cell) -> None:
-    """Refuse to begin while the config holds the provisional geometry of an interrupted run.
-
-    Raises:
-        UsageError: names that run.
-    """
-    folder = runs_folder(cell)
-    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-        if holds_provisional(RunFolder(path), cell.config_paths):
-            raise UsageError(
-                f"the run {path} was interrupted and left its provisional geometry here",
-                subject=cell.config_path,
-                action="Resume that run, which takes it back",
-            )
+    return state_of(folder).is_unverified
 
 
 async def _run(

@@ -21,7 +21,7 @@ from hexacell.config.write_record import (
 )
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.robot.model import config_layout
-from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
+from hexacell.runs.run_folder import find_run, run_folders, runs_folder
 from hexacell.services.write_back.proposals import COMMAND
 from procedures.journal.line_format import RESTORE
 from procedures.resources.config_changes import holds_provisional
@@ -87,11 +87,10 @@ def _cause(restored: Path, undone: Receipt | None, *, to: str | None, by: str, r
 
 
 def receipts_of(cell: Cell) -> Iterator[Receipt]:
-    """The receipts of the cell's config, the oldest first; unreadable folders are left out."""
-    folder = runs_folder(cell)
-    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
+    """Receipts of the cell's config, the oldest first; folders that cannot be read are left out."""
+    for folder in run_folders(cell):
         try:
-            receipt = Receipt.of(path)
+            receipt = Receipt.of(folder.path)
         except HexacellError:
             continue
         if are_same_files(receipt.paths, cell.config_paths):
@@ -139,19 +138,27 @@ def _written_files(cell: Cell, named: str) -> tuple[tuple[Path, ...], Contents]:
     return written, receipt.written()
 
 
+def require_no_provisional(cell: Cell) -> None:
+    """Refuse a config that holds the provisional geometry of an interrupted run.
+
+    Raises:
+        UsageError: names that run.
+    """
+    for folder in run_folders(cell):
+        if holds_provisional(folder, cell.config_paths):
+            raise UsageError(
+                f"the run {folder.path} was interrupted and left its provisional geometry here",
+                subject=cell.config_path,
+                action="Resume that run, which restores the geometry",
+            )
+
+
 def _require_known(cell: Cell, receipts: list[Receipt], found: Contents) -> None:
     """What a rollback replaces must be kept in a run folder; else an edit would be lost."""
     path, sha256 = cell.config_path, fingerprint_of(found)
     if any(sha256 in {one.sha256_before, one.sha256_after} for one in receipts):
         return
-    folder = runs_folder(cell)
-    for run in sorted(folder.iterdir()) if folder.is_dir() else ():
-        if holds_provisional(RunFolder(run), cell.config_paths):
-            raise UsageError(
-                f"the run {run} left its provisional geometry here",
-                subject=path,
-                action="Resume that run, which takes it back",
-            )
+    require_no_provisional(cell)
     if not receipts:
         raise UsageError(
             "no run of this cell wrote it: it would be lost", subject=path, action="Keep a copy elsewhere"

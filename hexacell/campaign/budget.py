@@ -11,7 +11,7 @@ from hexacell.campaign.pilots import pilots_per_departure
 from hexacell.cell.limits import SpeedSettings
 from hexacell.cell.model import CellSettings
 from hexacell.kinematics.parameters import JointUnit
-from hexacell.motion.duration import SpeedLimits
+from hexacell.motion.trajectory import SpeedLimits
 
 
 @dataclass(frozen=True, slots=True)

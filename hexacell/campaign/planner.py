@@ -42,8 +42,8 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of, joints_of
+from hexacell.motion.path_check import stands_within_limits
 from hexacell.motion.paths import find_route
-from hexacell.motion.standing import stands_within_limits
 from hexacell.robot.model import Robot
 
 PROVISIONAL_SIGMA = float(np.radians(2.0))

@@ -16,7 +16,7 @@ from hexacell.cell.fields import (
     Text,
     broken_rule,
 )
-from hexacell.kinematics.refused_commands import RefusedCommand
+from hexacell.kinematics.commanded_motion import RefusedCommand
 
 SHORTEST_AXIS = 1e-6
 

@@ -48,9 +48,9 @@ from hexacell.cell.simulation import SimulationSettings
 from hexacell.cell.uncertainty import (
     CommonUncertaintySettings,
 )
+from hexacell.kinematics.commanded_motion import RefusedCommands
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import JointUnit
-from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.storage.toml_document import KeyPath
 
 MOST_THERMOMETERS = 100

@@ -17,8 +17,8 @@ from hexacell.checks.check import Check
 from hexacell.drift.run_evidence import Causes, WhitenedRecords, whiten_records
 from hexacell.drift.single_cause import SingleCauseTest, possible_legs, single_cause_test
 from hexacell.identification.problem.prior import IdentifiedBefore
-from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet

@@ -2,47 +2,127 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from hexacell.conformance.example import MechanismExample
 from hexacell.identification.diagnostics.frame_alignment import frame_derivatives
+from hexacell.identification.estimator import identify
+from hexacell.identification.problem.commanded_poses import CommandingGeometry
+from hexacell.identification.problem.prior import Noise, Prior
+from hexacell.identification.problem.problem import Assumptions
+from hexacell.identification.solver.fit import RELEASE_RATIO
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import pose_sensitivity
+from hexacell.measurements.records import MeasurementSet, Record, deviation_of, joints_of
 
 ROUNDING = 1e-8
 LEAST_DETERMINED = 1e-7
 """Of the largest singular value: what is smaller is not determined at all."""
 
+NOISE = Noise(1e-5, 1e-5)
+"""Stated, mm; the records have none."""
 
-def check_rules(example: MechanismExample) -> None:
-    """The rules name parameters of the mechanism, each once, and leave what the frames do not take."""
-    convention, parameters = example.mechanism.convention, example.mechanism.parameters
-    ruled = [*convention.zero, *(name for group in convention.equal for name in group)]
-    if not set(ruled) <= set(parameters.names) or len(set(ruled)) != len(ruled):
-        raise AssertionError("a rule names no parameter, or one that another rule names")
-    fixed = len(parameters) - len(convention.free_names())
-    if fixed != len(example.mechanism.frame_freedom.columns):
-        raise AssertionError(
-            f"the rules fix {fixed} numbers, the frames may be changed in "
-            f"{len(example.mechanism.frame_freedom.columns)} ways"
-        )
+LARGEST_ERROR = 1e-6
+"""Of any parameter, mm or rad."""
 
 
-def check_normal_form(example: MechanismExample) -> None:
-    """The convention's frames satisfy its rules exactly, and are found again from any others."""
-    mechanism = example.mechanism
-    for geometry in example.robots():
-        normal, _ = mechanism.normalize_frames(geometry)
-        _check_rules_of(example, normal)
-        again, change = mechanism.normalize_frames(normal)
-        np.testing.assert_allclose(again.vector, normal.vector, atol=ROUNDING, err_msg="normalized twice")
-        _check_no_change(change)
-        for other in example.changes_of_frames():
-            changed = mechanism.change_frames(geometry, other)
-            found, _ = mechanism.normalize_frames(changed)
-            np.testing.assert_allclose(found.vector, normal.vector, atol=ROUNDING, err_msg=str(other))
+class FrameTests:
+    """The frames take what they explain, the records determine the rest."""
+
+    example: ClassVar[MechanismExample]
+
+    def test_the_rules_take_as_many_numbers_as_the_frames_are_free(self) -> None:
+        """The rules name parameters of the mechanism, each once, and leave what the frames do not take."""
+        example = self.example
+        convention, parameters = example.mechanism.convention, example.mechanism.parameters
+        ruled = [*convention.zero, *(name for group in convention.equal for name in group)]
+        if not set(ruled) <= set(parameters.names) or len(set(ruled)) != len(ruled):
+            raise AssertionError("a rule names no parameter, or one that another rule names")
+        fixed = len(parameters) - len(convention.free_names())
+        if fixed != len(example.mechanism.frame_freedom.columns):
+            raise AssertionError(
+                f"the rules fix {fixed} numbers, the frames may be changed in "
+                f"{len(example.mechanism.frame_freedom.columns)} ways"
+            )
+
+    def test_the_convention_is_idempotent(self) -> None:
+        """The convention's frames satisfy its rules exactly, and are found again from any others."""
+        example = self.example
+        mechanism = example.mechanism
+        for geometry in example.robots():
+            normal, _ = mechanism.normalize_frames(geometry)
+            _check_rules_of(example, normal)
+            again, change = mechanism.normalize_frames(normal)
+            np.testing.assert_allclose(
+                again.vector, normal.vector, atol=ROUNDING, err_msg="normalized twice"
+            )
+            _check_no_change(change)
+            for other in example.changes_of_frames():
+                changed = mechanism.change_frames(geometry, other)
+                found, _ = mechanism.normalize_frames(changed)
+                np.testing.assert_allclose(found.vector, normal.vector, atol=ROUNDING, err_msg=str(other))
+
+    def test_changes_of_frames_change_no_machine(self) -> None:
+        """The same machine in other frames has the same joint variables at the same poses."""
+        example = self.example
+        mechanism = example.mechanism
+        for geometry in example.robots():
+            expected = example.joints(geometry)
+            normal, to_normal = mechanism.normalize_frames(geometry)
+            found = example.joints(normal, to_normal.poses(example.poses))
+            np.testing.assert_allclose(found, expected, atol=ROUNDING, err_msg="in the convention's frames")
+            for change in example.changes_of_frames():
+                changed = mechanism.change_frames(geometry, change)
+                found = example.joints(changed, change.poses(example.poses))
+                np.testing.assert_allclose(found, expected, atol=ROUNDING, err_msg=str(change))
+                back = mechanism.change_frames(changed, change.inverse())
+                np.testing.assert_allclose(back.vector, geometry.vector, atol=ROUNDING)
+
+    def test_the_free_parameters_are_those_that_poses_determine(self) -> None:
+        """The poses determine every free parameter, and no more than those, whatever frames are chosen."""
+        example = self.example
+        convention = example.mechanism.convention
+        all_together = _by_parameters(example, np.eye(len(example.mechanism.parameters)))
+        free = _by_parameters(example, convention.basis())
+        rank = int(np.sum(all_together > LEAST_DETERMINED * all_together[0]))
+        determined = len(free) - example.mechanism.frame_freedom.size
+        if rank != determined:
+            raise AssertionError(
+                f"the poses determine {rank} parameters, the convention leaves {len(free)} free"
+                + (", one of them the size" if example.mechanism.frame_freedom.size else "")
+            )
+        if free[determined - 1] < LEAST_DETERMINED * free[0]:
+            raise AssertionError(
+                f"a free parameter is not determined: {free[determined - 1] / free[0]:.1e}"
+            )
+
+    def test_exact_records_are_identified(self) -> None:
+        """A robot within the tolerances is identified from its records, commanded with the drawing."""
+        example = self.example
+        _, truth, *_ = example.robots()
+        normal, _ = example.mechanism.normalize_frames(truth)
+        problem = Assumptions(
+            example.mechanism,
+            controller=CommandingGeometry.of(example.mechanism, example.drawing),
+            branch=example.branch,
+            prior=Prior.of(example.mechanism, example.drawing, example.widths),
+            noise=NOISE,
+        ).problem(records_without_noise(example, truth))
+        found = identify(problem)
+        # How large a machine is, records without noise seem to tell, and sigma says that they do not.
+        if found.undetermined and not example.mechanism.frame_freedom.size:
+            raise AssertionError(f"not determined: {', '.join(found.undetermined)}")
+        unseen, error = _error(found, example.mechanism.convention.free_parameters(normal))
+        if unseen != example.mechanism.frame_freedom.size:
+            raise AssertionError(f"the records leave {unseen} directions to the tolerances")
+        if not error < LARGEST_ERROR:
+            raise AssertionError(f"the identified geometry is {error:.1e} off")
 
 
 def _check_rules_of(example: MechanismExample, normal: Geometry) -> None:
@@ -55,38 +135,6 @@ def _check_no_change(change: FrameTransform) -> None:
     for turn in (change.base, change.platform):
         np.testing.assert_allclose(turn, np.eye(3), atol=ROUNDING)
     np.testing.assert_allclose(change.origin, 0.0, atol=ROUNDING)
-
-
-def check_changes_of_frames(example: MechanismExample) -> None:
-    """The same machine in other frames has the same joint variables at the same poses."""
-    mechanism = example.mechanism
-    for geometry in example.robots():
-        expected = example.joints(geometry)
-        normal, to_normal = mechanism.normalize_frames(geometry)
-        found = example.joints(normal, to_normal.poses(example.poses))
-        np.testing.assert_allclose(found, expected, atol=ROUNDING, err_msg="in the convention's frames")
-        for change in example.changes_of_frames():
-            changed = mechanism.change_frames(geometry, change)
-            found = example.joints(changed, change.poses(example.poses))
-            np.testing.assert_allclose(found, expected, atol=ROUNDING, err_msg=str(change))
-            back = mechanism.change_frames(changed, change.inverse())
-            np.testing.assert_allclose(back.vector, geometry.vector, atol=ROUNDING)
-
-
-def check_identifiable(example: MechanismExample) -> None:
-    """The poses determine every free parameter, and no more than those, whatever frames are chosen."""
-    convention = example.mechanism.convention
-    all_together = _by_parameters(example, np.eye(len(example.mechanism.parameters)))
-    free = _by_parameters(example, convention.basis())
-    rank = int(np.sum(all_together > LEAST_DETERMINED * all_together[0]))
-    determined = len(free) - example.mechanism.frame_freedom.size
-    if rank != determined:
-        raise AssertionError(
-            f"the poses determine {rank} parameters, the convention leaves {len(free)} free"
-            + (", one of them the size" if example.mechanism.frame_freedom.size else "")
-        )
-    if free[determined - 1] < LEAST_DETERMINED * free[0]:
-        raise AssertionError(f"a free parameter is not determined: {free[determined - 1] / free[0]:.1e}")
 
 
 def _by_parameters(example: MechanismExample, basis: Array) -> Array:
@@ -109,3 +157,37 @@ def _by_parameters(example: MechanismExample, basis: Array) -> Array:
     left = columns - frames @ (frames.T @ columns)
     sizes: Array = np.linalg.svd(left, compute_uv=False)
     return sizes
+
+
+def _error(found: Identification, truth: Array) -> tuple[int, float]:
+    """In how many directions the tolerances alone decide, and the largest error beside those."""
+    factor = np.linalg.cholesky(found.problem.prior.covariance)
+    ratios, directions = np.linalg.eigh(factor.T @ found.solution.information @ factor)
+    seen = directions[:, ratios > RELEASE_RATIO]
+    error = factor @ seen @ seen.T @ np.linalg.solve(factor, found.free - truth)
+    return len(ratios) - seen.shape[1], float(np.abs(error).max())
+
+
+def records_without_noise(example: MechanismExample, truth: Geometry) -> MeasurementSet:
+    """The records of a robot that is commanded with the drawing, at those poses that it can take.
+
+    The gauges have the travel that they need. Their axes are those of the drawing, once both robots are in
+    the convention's frames.
+    """
+    mechanism = example.mechanism
+    normal, _ = mechanism.normalize_frames(truth)
+    drawn, frames = mechanism.normalize_frames(example.drawing)
+    commands = frames.poses(example.poses)
+    joints = example.joints(drawn, commands)
+    actual = continue_solution(
+        mechanism, normal, joints, start=commands, start_geometry=drawn, start_joints=joints
+    )
+    balls, zeros, records = actual.poses.positions @ frames.base, dict[int, Array](), []
+    for row, (point, orientation) in enumerate(example.labels()):
+        if actual.found[row]:
+            deviation = deviation_of(balls[row] - zeros.setdefault(point, balls[row]))
+            pose = example.poses.pose(row)
+            records.append(Record(point, orientation, pose, joints_of(joints[row]), deviation))
+    if 2 * len(records) < len(balls):
+        raise AssertionError("the robot cannot take most of the drawing's poses")
+    return MeasurementSet(tuple(records))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -32,38 +33,115 @@ OFF = np.repeat([3.0, 0.01], 3)
 FAR_MM = 1e5
 
 
-def check_inverse(example: MechanismExample) -> None:
-    """The inverse closes every leg, is on its branch, and gives NaN or a number anywhere."""
-    mechanism = example.mechanism
-    for geometry in example.robots():
-        reached = example.reached(geometry)
-        poses, joints = example.poses[reached], example.joints(geometry)[reached]
-        residual = mechanism.residual_and_jacobian(geometry, poses, joints)[0]
-        np.testing.assert_allclose(residual, 0.0, atol=ROUNDING, err_msg="the inverse leaves legs open")
-        sides = np.array(example.branch or (1,) * 6)
-        found = mechanism.branch(geometry, poses, joints)
-        np.testing.assert_array_equal(found, np.broadcast_to(sides, found.shape), "branch of the inverse")
-    far = PoseBatch.at(np.full(3, FAR_MM), example.poses.rotations)
-    with np.errstate(all="raise"):
-        mechanism.inverse(example.drawing, example.branch, far)
+class KinematicsTests:
+    """Constraints, derivatives, inverse and forward kinematics agree."""
 
+    example: ClassVar[MechanismExample]
 
-def check_lengths(example: MechanismExample) -> None:
-    """A constraint is a leg's error in mm: where it closes, a motion along the leg counts fully."""
-    joints = example.joints(example.drawing)
-    pose = example.mechanism.derivatives(example.drawing, example.poses, joints).pose
-    size = np.linalg.norm(pose[..., :3], axis=-1)
-    np.testing.assert_allclose(size, 1.0, atol=ROUNDING, err_msg="derivatives by the ball's position")
+    def test_the_inverse_closes_every_leg(self) -> None:
+        """The inverse closes every leg, is on its branch, and gives NaN or a number anywhere."""
+        example = self.example
+        mechanism = example.mechanism
+        for geometry in example.robots():
+            reached = example.reached(geometry)
+            poses, joints = example.poses[reached], example.joints(geometry)[reached]
+            residual = mechanism.residual_and_jacobian(geometry, poses, joints)[0]
+            np.testing.assert_allclose(residual, 0.0, atol=ROUNDING, err_msg="the inverse leaves legs open")
+            sides = np.array(example.branch or (1,) * 6)
+            found = mechanism.branch(geometry, poses, joints)
+            np.testing.assert_array_equal(
+                found, np.broadcast_to(sides, found.shape), "branch of the inverse"
+            )
+        far = PoseBatch.at(np.full(3, FAR_MM), example.poses.rotations)
+        with np.errstate(all="raise"):
+            mechanism.inverse(example.drawing, example.branch, far)
 
+    def test_constraints_are_lengths(self) -> None:
+        """A constraint is a leg's error in mm: where it closes, a motion along the leg counts fully."""
+        example = self.example
+        joints = example.joints(example.drawing)
+        pose = example.mechanism.derivatives(example.drawing, example.poses, joints).pose
+        size = np.linalg.norm(pose[..., :3], axis=-1)
+        np.testing.assert_allclose(size, 1.0, atol=ROUNDING, err_msg="derivatives by the ball's position")
 
-def check_derivatives(example: MechanismExample) -> None:
-    """All derivatives are those of the constraints (central differences), off closed poses too."""
-    for geometry in example.robots():
-        random = np.random.default_rng(3)
-        reached = example.reached(geometry)
-        off = OFF * random.uniform(-1.0, 1.0, (len(reached), 6))
-        poses = apply_twist(example.poses[reached], off)
-        _check_derivatives_at(example, geometry, poses, example.joints(geometry)[reached])
+    def test_derivatives_are_those_of_the_constraints(self) -> None:
+        """All derivatives are those of the constraints (central differences), off closed poses too."""
+        example = self.example
+        for geometry in example.robots():
+            random = np.random.default_rng(3)
+            reached = example.reached(geometry)
+            off = OFF * random.uniform(-1.0, 1.0, (len(reached), 6))
+            poses = apply_twist(example.poses[reached], off)
+            _check_derivatives_at(example, geometry, poses, example.joints(geometry)[reached])
+
+    def test_encoder_zeros_are_changes_of_parameters(self) -> None:
+        """A leg with another zero closes with as much less on its encoder; no other leg changes."""
+        example = self.example
+        mechanism = example.mechanism
+        for geometry in example.robots():
+            reached = example.reached(geometry)
+            poses, joints = example.poses[reached], example.joints(geometry)[reached]
+            zeros = mechanism.encoder_zeros(geometry)
+            for leg in range(6):
+                changed = Geometry(mechanism.parameters, geometry.vector + zeros[:, leg])
+                shown = joints - np.eye(6)[leg]
+                left = mechanism.residual_and_jacobian(changed, poses, shown)[0]
+                np.testing.assert_allclose(
+                    left, 0.0, atol=ROUNDING, err_msg=f"encoder zero of leg {leg + 1}"
+                )
+
+    def test_forward_and_inverse_agree(self) -> None:
+        """Forward kinematics from the drawing's pose leads back to where the inverse sends the robot."""
+        example = self.example
+        for geometry in example.robots():
+            reached = example.reached(geometry)
+            found = continue_solution(
+                example.mechanism,
+                geometry,
+                example.joints(geometry)[reached],
+                start=example.poses[reached],
+                start_geometry=example.drawing,
+                start_joints=example.joints(example.drawing)[reached],
+            )
+            if not found.found.all():
+                raise AssertionError(
+                    "forward kinematics finds no pose within the tolerances of the drawing"
+                )
+            poses = example.poses[reached]
+            np.testing.assert_allclose(found.poses.positions, poses.positions, atol=1e-6)
+            np.testing.assert_allclose(found.poses.rotations, poses.rotations, atol=1e-8)
+
+    def test_batches_of_geometries(self) -> None:
+        """One geometry for each pose gives what each gives alone."""
+        example = self.example
+        mechanism, robots = example.mechanism, list(example.robots())
+        rows = np.arange(len(robots))
+        poses, joints = example.poses[rows], example.joints(example.drawing)[rows]
+        batch = GeometryBatch(mechanism.parameters, np.stack([one.vector for one in robots]))
+        together = mechanism.residual_and_jacobian(batch, poses, joints)
+        legs, radii = mechanism.legs(batch, poses, joints), mechanism.platform_radius(batch)
+        for row, geometry in enumerate(robots):
+            at = [row]
+            alone = mechanism.residual_and_jacobian(geometry, poses[at], joints[at])
+            for told, expected in zip(together, alone, strict=True):
+                np.testing.assert_allclose(told[row], expected[0], atol=ROUNDING)
+            own = mechanism.legs(geometry, poses[at], joints[at])
+            np.testing.assert_allclose(legs.base_joints[row], own.base_joints[0], atol=ROUNDING)
+            np.testing.assert_allclose(legs.platform_joints[row], own.platform_joints[0], atol=ROUNDING)
+            np.testing.assert_allclose(radii[row], mechanism.platform_radius(geometry), atol=ROUNDING)
+
+    def test_legs_in_space(self) -> None:
+        """Platform joints are fixed to the platform, their mean distance from the ball is its radius."""
+        example = self.example
+        mechanism, poses = example.mechanism, example.poses
+        legs = mechanism.legs(example.drawing, poses, example.joints(example.drawing))
+        own = np.einsum("nij,nki->nkj", poses.rotations, legs.platform_joints - poses.positions[:, None])
+        np.testing.assert_allclose(own, np.broadcast_to(own[0], own.shape), atol=ROUNDING)
+        radius = np.linalg.norm(own[0], axis=-1).mean()
+        np.testing.assert_allclose(mechanism.platform_radius(example.drawing), radius, atol=ROUNDING)
+        has_guides = mechanism.guides(example.drawing, poses, example.joints(example.drawing)) is not None
+        if has_guides != (mechanism.words.guide is not None):
+            raise AssertionError("a mechanism has a word for its guides exactly if it has guides")
 
 
 def _check_derivatives_at(
@@ -108,68 +186,3 @@ def _compare(told: Array, residual: Callable[[Array], Array], steps: Array, name
         limit = DIFFERENCES * max(1.0, float(np.abs(differences).max()))
         words = f"derivatives by {name}"
         np.testing.assert_allclose(told[..., column], differences, rtol=0.0, atol=limit, err_msg=words)
-
-
-def check_encoder_zeros(example: MechanismExample) -> None:
-    """A leg with a change of its zero closes with as much less on its encoder, and no other leg changes."""
-    mechanism = example.mechanism
-    for geometry in example.robots():
-        reached = example.reached(geometry)
-        poses, joints = example.poses[reached], example.joints(geometry)[reached]
-        zeros = mechanism.encoder_zeros(geometry)
-        for leg in range(6):
-            changed = Geometry(mechanism.parameters, geometry.vector + zeros[:, leg])
-            shown = joints - np.eye(6)[leg]
-            left = mechanism.residual_and_jacobian(changed, poses, shown)[0]
-            np.testing.assert_allclose(left, 0.0, atol=ROUNDING, err_msg=f"encoder zero of leg {leg + 1}")
-
-
-def check_forward(example: MechanismExample) -> None:
-    """The robot goes where the inverse sends it: forward kinematics from the drawing's pose leads back."""
-    for geometry in example.robots():
-        reached = example.reached(geometry)
-        found = continue_solution(
-            example.mechanism,
-            geometry,
-            example.joints(geometry)[reached],
-            start=example.poses[reached],
-            start_geometry=example.drawing,
-            start_joints=example.joints(example.drawing)[reached],
-        )
-        if not found.found.all():
-            raise AssertionError("forward kinematics finds no pose within the tolerances of the drawing")
-        poses = example.poses[reached]
-        np.testing.assert_allclose(found.poses.positions, poses.positions, atol=1e-6)
-        np.testing.assert_allclose(found.poses.rotations, poses.rotations, atol=1e-8)
-
-
-def check_batches(example: MechanismExample) -> None:
-    """One geometry for each pose gives what each gives alone."""
-    mechanism, robots = example.mechanism, list(example.robots())
-    rows = np.arange(len(robots))
-    poses, joints = example.poses[rows], example.joints(example.drawing)[rows]
-    batch = GeometryBatch(mechanism.parameters, np.stack([one.vector for one in robots]))
-    together = mechanism.residual_and_jacobian(batch, poses, joints)
-    legs, radii = mechanism.legs(batch, poses, joints), mechanism.platform_radius(batch)
-    for row, geometry in enumerate(robots):
-        at = [row]
-        alone = mechanism.residual_and_jacobian(geometry, poses[at], joints[at])
-        for told, expected in zip(together, alone, strict=True):
-            np.testing.assert_allclose(told[row], expected[0], atol=ROUNDING)
-        own = mechanism.legs(geometry, poses[at], joints[at])
-        np.testing.assert_allclose(legs.base_joints[row], own.base_joints[0], atol=ROUNDING)
-        np.testing.assert_allclose(legs.platform_joints[row], own.platform_joints[0], atol=ROUNDING)
-        np.testing.assert_allclose(radii[row], mechanism.platform_radius(geometry), atol=ROUNDING)
-
-
-def check_legs(example: MechanismExample) -> None:
-    """Platform joints are fixed to the platform, their mean distance from the ball is its radius."""
-    mechanism, poses = example.mechanism, example.poses
-    legs = mechanism.legs(example.drawing, poses, example.joints(example.drawing))
-    own = np.einsum("nij,nki->nkj", poses.rotations, legs.platform_joints - poses.positions[:, None])
-    np.testing.assert_allclose(own, np.broadcast_to(own[0], own.shape), atol=ROUNDING)
-    radius = np.linalg.norm(own[0], axis=-1).mean()
-    np.testing.assert_allclose(mechanism.platform_radius(example.drawing), radius, atol=ROUNDING)
-    has_guides = mechanism.guides(example.drawing, poses, example.joints(example.drawing)) is not None
-    if has_guides != (mechanism.words.guide is not None):
-        raise AssertionError("a mechanism has a word for its guides exactly if it has guides")

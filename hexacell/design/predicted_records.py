@@ -19,10 +19,14 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import assembly_mode
-from hexacell.kinematics.free_sensitivity import POSITION, free_sensitivity, sensitivity_and_margin
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import pose_jacobian
+from hexacell.kinematics.sensitivity import (
+    POSITION,
+    free_sensitivity,
+    pose_jacobian,
+    sensitivity_and_margin,
+)
 from hexacell.limits.limits import Limits
 
 SAFETY_SIGMAS = 4.0

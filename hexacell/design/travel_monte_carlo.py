@@ -32,11 +32,10 @@ from hexacell.design.candidates import ReachableTargets
 from hexacell.design.predicted_records import GaugeZero, PredictedRecords, predict_records
 from hexacell.identification.belief import SPARE_ANGLE, SPARE_SIGMAS, UNCERTAIN_SIGMA, RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
-from hexacell.kinematics.free_sensitivity import FreeSensitivity, free_sensitivity
 from hexacell.kinematics.geometry import GeometryBatch
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import has_singularity_margin
+from hexacell.kinematics.sensitivity import FreeSensitivity, free_sensitivity, has_singularity_margin
 from hexacell.limits.limits import Limits
 from hexacell.motion.paths import Path
 

@@ -8,14 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.identification.problem.prior import Noise
-from hexacell.kinematics.commanded_motion import ActualPoses, CommandedRobot
+from hexacell.kinematics.commanded_motion import ActualPoses, CommandedRobot, RefusedCommands
 from hexacell.kinematics.forward import apply_twist
-from hexacell.kinematics.free_sensitivity import FreeSensitivity, free_sensitivity
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.sensitivity import FreeSensitivity, free_sensitivity
 from hexacell.limits.limits import Limits
 
 SPARE_ANGLE = float(np.radians(0.5))

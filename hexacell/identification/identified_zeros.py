@@ -28,9 +28,8 @@ import numpy as np
 
 from hexacell.identification.diagnostics.frame_alignment import frame_derivatives
 from hexacell.identification.solver.result import UNDETERMINED_RATIO, Identification
-from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.mechanism import Mechanism, free_parameter_derivatives
 from hexacell.kinematics.rotations import Array
 
 SAME_CHANGE = 1e-6

@@ -9,6 +9,10 @@ and the command that brings the robot to a pose x_a is x_c = FK(G_c, IK(G_a, x_a
 several solutions. Numerical continuation finds the one on the assembly mode of the known pose: the joint
 variables are fixed, and the geometry changes in stages from one to the other
 (:func:`hexacell.kinematics.forward.continue_solution`).
+
+Some commands are not given: those that a controller refused, or the cell file excludes. A command beyond
+the limit of an axis says that every command at least as far out along it is refused as well. One that the
+cell file excludes may concern all that are near it. Any other refusal concerns that command alone.
 """
 
 from __future__ import annotations
@@ -22,8 +26,7 @@ from numpy.typing import NDArray
 from hexacell.kinematics.forward import ForwardResult, continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
-from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.refused_commands import RefusedCommands
+from hexacell.kinematics.pose import AXES, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 COMMAND_STAGES = (3,)
@@ -31,6 +34,66 @@ COMMAND_STAGES = (3,)
 
 JOINT_TOLERANCE_MM = 1e-6
 """Largest difference between the joint variables of a command and the required ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class RefusedCommand:
+    """A command that is not given, in the controller's frames.
+
+    Attributes:
+        pose: x, y, z, a, b, c, mm and deg.
+        axis: the axis beyond whose limit it is, one of ``xyzabc``; None if another reason was given.
+        is_highest: whether that limit is the axis' highest value, not its lowest.
+        within_mm, within_deg: commands that are as near as both are concerned as well, unless
+            ``within_deg`` is zero.
+    """
+
+    pose: tuple[float, float, float, float, float, float]
+    axis: str | None = None
+    is_highest: bool = True
+    within_mm: float = 0.0
+    within_deg: float = 0.0
+
+    def concerns(self, poses: PoseBatch) -> Mask:
+        """Which of n commands, in the controller's frames, are this one, near it, or as far out."""
+        this = PoseBatch.of([Pose(*self.pose)])
+        concerned = np.asarray(poses.is_same(this))
+        if self.within_deg > 0.0:
+            apart = np.linalg.norm(poses.positions - this.positions, axis=-1)
+            concerned |= (apart <= self.within_mm) & (poses.angles_to(this) <= np.radians(self.within_deg))
+        if self.axis is None:
+            return concerned
+        column, sign = AXES.index(self.axis), 1.0 if self.is_highest else -1.0
+        beyond = sign * (poses.numbers()[:, column] - self.pose[column]) >= 0.0
+        return np.asarray(concerned | beyond)
+
+
+@dataclass(frozen=True, slots=True)
+class RefusedCommands:
+    """All commands that are not given; none at first."""
+
+    commands: tuple[RefusedCommand, ...] = ()
+
+    def __or__(self, others: RefusedCommands) -> RefusedCommands:
+        """These commands and others, each once."""
+        return RefusedCommands(tuple(dict.fromkeys((*self.commands, *others.commands))))
+
+    def allow(self, poses: PoseBatch, frames: FrameTransform | None = None) -> Mask:
+        """Which of n commands no refusal concerns.
+
+        They are in the controller's frames, or in those that ``frames`` leads to from there.
+        """
+        allowed = np.ones(len(poses), dtype=bool)
+        if not self.commands:
+            return allowed
+        commands = poses if frames is None else frames.inverse().poses(poses)
+        for refused in self.commands:
+            allowed &= ~refused.concerns(commands)
+        return allowed
+
+    def allows(self, pose: tuple[float, float, float, float, float, float]) -> bool:
+        """Whether no refusal concerns a single command in the controller's frames."""
+        return bool(self.allow(PoseBatch.of([Pose(*pose)]))[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -56,11 +56,11 @@ class WithEncoderScales:
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Length errors of the legs (n, 6), mm, and their derivatives by the pose (n, 6, 6)."""
         return self.exact.residual_and_jacobian(self._exact(geometry), poses, _actual(geometry, joints))
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Derivatives of the legs' length errors by pose, joint variables and parameters."""
         exact = self.exact.derivatives(self._exact(geometry), poses, _actual(geometry, joints))
         by_scale = (exact.joints * joints)[..., None]
         return ConstraintDerivatives(
@@ -70,22 +70,22 @@ class WithEncoderScales:
         )
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Joint variables (n, 6) at n poses; NaN out of reach."""
         actual = self.exact.inverse(self._exact(geometry), branch, poses)
         shown: Array = actual / (1.0 + geometry["encoder_scale"])
         return shown
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The inverse solution, -1 or 1, that each leg is on (n, 6)."""
         return self.exact.branch(self._exact(geometry), poses, _actual(geometry, joints))
 
     def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
-        """As the exact mechanism does."""
+        """The machine in the frames of the convention, and the change of frames."""
         exact, change = self.exact.normalize_frames(self._exact(geometry))
         return self.with_scales(exact, geometry["encoder_scale"]), change
 
     def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The geometry of the machine in other frames."""
         changed = self.exact.change_frames(self._exact(geometry), change)
         return self.with_scales(changed, geometry["encoder_scale"])
 
@@ -95,15 +95,15 @@ class WithEncoderScales:
         return np.vstack([exact, np.zeros((len(self.parameters) - len(exact), exact.shape[1]))])
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The guides of the sliders at n poses."""
         return self.exact.guides(self._exact(geometry), poses, _actual(geometry, joints))
 
     def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The legs in space at n poses."""
         return self.exact.legs(self._exact(geometry), poses, _actual(geometry, joints))
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Mean distance of the platform joints from the ball, mm."""
         return self.exact.platform_radius(self._exact(geometry))
 
     def with_scales(self, exact: Geometry, scales: Array) -> Geometry:

@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 from hexacell.errors import ReachError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.legs import Legs
-from hexacell.kinematics.parameters import LEGS, GeometricParameter, JointUnit, ParameterSet
+from hexacell.kinematics.parameters import GeometricParameter, JointUnit, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
 Sign = Literal[1, -1]
 Branch = tuple[Sign, Sign, Sign, Sign, Sign, Sign] | tuple[()]
 """Which of its two inverse solutions each leg is on; empty where a leg has only one."""
+
+STEP = 1e-4
+"""Step of differences, mm or rad: a change of frames is nearly linear over it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,13 +89,6 @@ class FrameConvention:
         equal = [name for group in self.equal for name in group[1:]]
         rows = self.parameters.rows(equal)
         return tuple(zip(rows.tolist(), self._columns[rows].tolist(), strict=True))
-
-    @cached_property
-    def leg_columns(self) -> NDArray[np.intp]:
-        """Which free parameter each number of each leg is (6, c), in the order of the kinds; -1 if none."""
-        columns = np.empty(len(self.parameters), dtype=np.intp)
-        columns[self.parameters.leg_order] = self._columns
-        return columns.reshape(LEGS, -1)
 
     @cached_property
     def _columns(self) -> NDArray[np.intp]:
@@ -310,3 +306,18 @@ def inverse_kinematics(mechanism: Mechanism, geometry: Geometry, branch: Branch,
         row, leg = np.argwhere(np.isnan(joints))[0]
         raise ReachError(f"leg {leg + 1} cannot reach the pose {poses.pose(row)}")
     return joints
+
+
+def free_parameter_derivatives(mechanism: Mechanism, geometry: Geometry) -> Array:
+    """Derivatives (P, p) of the free parameters by all parameters of a geometry, in frames of its own.
+
+    A parameter that the frame convention fixes moves the frames, and with them the others.
+    """
+    convention, vector = mechanism.convention, geometry.vector
+
+    def free(values: Array) -> Array:
+        normal, _ = mechanism.normalize_frames(Geometry(mechanism.parameters, values))
+        return convention.free_parameters(normal)
+
+    steps = STEP * np.eye(len(vector))
+    return np.array([(free(vector + step) - free(vector - step)) / (2.0 * STEP) for step in steps])

@@ -5,6 +5,9 @@ parameters p. By the implicit function theorem
 
     dx/dq = -J^-1 dc/dq,    dx/dp = -J^-1 dc/dp,    J = dc/dx.
 
+A free parameter stands for one parameter of a leg, or for several that a frame convention makes equal. Its
+derivative is the sum of theirs: most are one number of one leg, so that they are picked and few are added.
+
 The distance from a singularity is the smallest singular value s of J, with rotations scaled by the
 platform's mean radius. Whether s is at least m is decided without a singular value decomposition for most
 poses. With A = J^-1, ``1/s = ||A||_2``, and the Frobenius norm bounds it for a 6 x 6 matrix:
@@ -21,7 +24,7 @@ Only poses between these bounds need the decomposition. Source: Golub and Van Lo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,60 +35,97 @@ from hexacell.kinematics.mechanism import ConstraintDerivatives, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
-
-def pose_jacobian(
-    mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
-) -> Array:
-    """Derivatives (n, 6, 6) of the constraints by the ball's position, mm, and the rotation vector, rad."""
-    return mechanism.residual_and_jacobian(geometry, poses, joints)[1]
+POSITION = 3
+POSE = 6
+"""How many of a pose's coordinates are wanted: the ball's position, or all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
     """Derivatives of a pose by the joint variables (n, 6, 6) and the parameters (n, 6, P).
 
-    Rows are the ball's position, mm, then the rotation vector in the base frame, rad. ``mode`` (n,) is the
-    assembly mode.
+    Rows are the ball's position, mm, then the rotation vector in the base frame, rad.
     """
 
     joints: Array
     parameters: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeSensitivity:
+    """Derivatives of a pose by the joint variables (n, m, 6) and the free parameters (n, m, p).
+
+    Rows are the ball's position, mm, then, if m is 6, the rotation vector in the base frame, rad. ``mode``
+    (n,) is the assembly mode.
+    """
+
+    joints: Array
+    free: Array
     mode: Array
 
-    def __getitem__(self, rows: NDArray[np.intp]) -> Sensitivity:
-        return Sensitivity(self.joints[rows], self.parameters[rows], self.mode[rows])
+    def __getitem__(self, rows: NDArray[np.intp]) -> FreeSensitivity:
+        return FreeSensitivity(self.joints[rows], self.free[rows], self.mode[rows])
+
+
+def pose_jacobian(
+    mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+) -> Array:
+    """Derivatives of the constraints by the pose.
+
+    Args:
+        mechanism: of the robot.
+        geometry: one for all poses, or one for each.
+        poses: n poses.
+        joints: joint variables (n, 6), in their unit.
+
+    Returns:
+        Derivatives (n, 6, 6) by the ball's position, mm, and the rotation vector, rad.
+    """
+    return mechanism.residual_and_jacobian(geometry, poses, joints)[1]
 
 
 def pose_sensitivity(
     mechanism: Mechanism, geometry: Geometry, poses: PoseBatch, joints: Array
 ) -> Sensitivity:
-    """Implicit derivatives ``-J_pose^-1 J`` at n poses that close the mechanism."""
+    """Derivatives ``-J_pose^-1 J`` of n poses that close the mechanism, by joints and all parameters.
+
+    Args:
+        mechanism: of the robot.
+        geometry: of the robot.
+        poses: n poses.
+        joints: joint variables (n, 6), in their unit.
+
+    Raises:
+        LinAlgError: a pose is exactly at a singularity.
+    """
     linear = mechanism.derivatives(geometry, poses, joints)
-    inverse, mode = inverse_and_mode(linear.pose)
-    by_constraints = -inverse
+    by_constraints = -np.linalg.inv(linear.pose)
     return Sensitivity(
         joints=by_constraints * linear.joints[..., None, :],
         parameters=_by_parameters(mechanism, by_constraints, linear),
-        mode=mode,
     )
 
 
 def position_sensitivity(
     mechanism: Mechanism, geometry: Geometry, poses: PoseBatch, joints: Array
 ) -> tuple[Array, Array]:
-    """Derivatives of the ball's position: (n, 3, P) by the parameters, (n, 3, 6) by the joint variables."""
-    linear = mechanism.derivatives(geometry, poses, joints)
-    by_constraints = -inverse_and_mode(linear.pose)[0][:, :3]
-    return _by_parameters(mechanism, by_constraints, linear), by_constraints * linear.joints[..., None, :]
+    """Derivatives of the ball's position at n poses that close the mechanism.
 
+    Args:
+        mechanism: of the robot.
+        geometry: of the robot.
+        poses: n poses.
+        joints: joint variables (n, 6), in their unit.
 
-def inverse_and_mode(pose_jacobian: Array) -> tuple[Array, Array]:
-    """Inverses (n, 6, 6) of pose Jacobians (n, 6, 6), and their assembly modes (n,).
+    Returns:
+        Derivatives (n, 3, P) by all parameters and (n, 3, 6) by the joint variables, mm per unit of each.
 
     Raises:
-        LinAlgError: one is exactly singular.
+        LinAlgError: a pose is exactly at a singularity.
     """
-    return np.linalg.inv(pose_jacobian), assembly_mode(pose_jacobian)
+    linear = mechanism.derivatives(geometry, poses, joints)
+    by_constraints = -np.linalg.inv(linear.pose)[:, :3]
+    return _by_parameters(mechanism, by_constraints, linear), by_constraints * linear.joints[..., None, :]
 
 
 def _by_parameters(mechanism: Mechanism, by_constraints: Array, linear: ConstraintDerivatives) -> Array:
@@ -95,6 +135,67 @@ def _by_parameters(mechanism: Mechanism, by_constraints: Array, linear: Constrai
     return np.take(flat, mechanism.parameters.leg_order, axis=-1)
 
 
+def free_sensitivity(
+    mechanism: Mechanism, geometry: Geometry, poses: PoseBatch, joints: Array, coordinates: int = POSE
+) -> FreeSensitivity:
+    """Derivatives of n poses that close the mechanism, by joints and free parameters.
+
+    Args:
+        mechanism: of the robot.
+        geometry: of the robot, in the frames of the convention.
+        poses: n poses.
+        joints: joint variables (n, 6), in their unit.
+        coordinates: ``POSITION`` or ``POSE``.
+
+    Raises:
+        LinAlgError: a pose is exactly at a singularity.
+    """
+    linear = mechanism.derivatives(geometry, poses, joints)
+    inverse, mode = np.linalg.inv(linear.pose), assembly_mode(linear.pose)
+    return _by_inverse(mechanism, linear, inverse, mode, coordinates)
+
+
+def sensitivity_and_margin(
+    mechanism: Mechanism,
+    geometry: Geometry,
+    poses: PoseBatch,
+    joints: Array,
+    coordinates: int,
+    margin: float,
+) -> tuple[FreeSensitivity, Mask]:
+    """:func:`free_sensitivity`, and at which of n poses there is a ``margin`` to singularities.
+
+    One inverse of the pose Jacobian serves both. Exactly at a singularity, where there is no margin, the
+    derivatives mean nothing.
+    """
+    linear = mechanism.derivatives(geometry, poses, joints)
+    is_regular = np.ones(len(joints), dtype=bool)
+    try:
+        inverse, mode = np.linalg.inv(linear.pose), assembly_mode(linear.pose)
+    except np.linalg.LinAlgError:
+        is_regular = np.linalg.det(linear.pose) != 0.0
+        linear = replace(linear, pose=np.where(is_regular[:, None, None], linear.pose, np.eye(6)))
+        inverse, mode = np.linalg.inv(linear.pose), assembly_mode(linear.pose)
+    radius = float(mechanism.platform_radius(geometry))
+    scaled = np.concatenate([inverse[:, :3], radius * inverse[:, 3:]], axis=1)
+    sensitivity = _by_inverse(mechanism, linear, inverse, mode, coordinates)
+    return sensitivity, _inverse_has_margin(scaled, margin) & is_regular
+
+
+def _by_inverse(
+    mechanism: Mechanism, linear: ConstraintDerivatives, inverse: Array, mode: Array, coordinates: int
+) -> FreeSensitivity:
+    """The sensitivity by the inverses (n, 6, 6) of the pose Jacobians."""
+    by_constraints = -inverse[:, :coordinates]
+    products = by_constraints[..., None] * linear.parameters[..., None, :, :]
+    of_legs = products.reshape(*by_constraints.shape[:2], len(mechanism.parameters))
+    order, convention = mechanism.parameters.leg_order, mechanism.convention
+    by_free: Array = np.take(of_legs, order[convention.free_rows()], axis=-1)
+    for row, column in convention.dependent:
+        by_free[..., column] += of_legs[..., order[row]]
+    return FreeSensitivity(by_constraints * linear.joints[..., None, :], by_free, mode)
+
+
 def singularity_margin(
     mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
 ) -> Array:
@@ -102,11 +203,15 @@ def singularity_margin(
 
     Rotations are scaled by the platform's mean radius. With the value 0.1 there is a motion of the
     platform by 1 mm that changes the six leg lengths by 0.1 mm together (Euclidean norm).
+
+    Args:
+        mechanism: of the robot.
+        geometry: one for all poses, or one for each.
+        poses: n poses.
+        joints: joint variables (n, 6), in their unit.
     """
-    smallest: Array = np.linalg.svd(_dimensionless(mechanism, geometry, poses, joints), compute_uv=False)[
-        ..., -1
-    ]
-    return smallest
+    jacobian = _dimensionless(mechanism, geometry, poses, joints)
+    return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[..., -1])
 
 
 def has_singularity_margin(
@@ -125,16 +230,18 @@ def margin_and_mode(
 
 
 def _has_margin(jacobian: Array, margin: float) -> Mask:
-    """Bounds of the smallest singular value by norms of the inverse, see the head of this file."""
     try:
         inverse = np.linalg.inv(jacobian)
     except np.linalg.LinAlgError:
         return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[..., -1] >= margin)
-    return inverse_has_margin(inverse, margin)
+    return _inverse_has_margin(inverse, margin)
 
 
-def inverse_has_margin(inverse: Array, margin: float) -> Mask:
-    """:func:`has_singularity_margin` by the inverses (n, 6, 6) of dimensionless pose Jacobians."""
+def _inverse_has_margin(inverse: Array, margin: float) -> Mask:
+    """Whether there is the margin, by the inverses (n, 6, 6) of dimensionless pose Jacobians.
+
+    The bounds are those at the head of this file.
+    """
     bound = np.linalg.norm(inverse, axis=(-2, -1)) * margin
     has_margin: Mask = bound <= 1.0
     undecided = np.flatnonzero(~has_margin & (bound <= np.sqrt(6.0)))

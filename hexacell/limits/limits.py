@@ -11,7 +11,6 @@ from hexacell.kinematics.mechanism import SAME_FRAMES, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.limits.gauge_travel import GaugeRoom, GaugeTravel
-from hexacell.limits.joint_ranges import ZeroedRanges
 from hexacell.limits.leg_limits import ROUNDING, LegLimits
 
 
@@ -40,6 +39,28 @@ class AxisLimits:
 
 
 NO_AXIS_LIMITS = AxisLimits()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ZeroedRanges:
+    """Ranges (6,) of the joint variables, and of what a controller shows: with the encoders' zeros.
+
+    Attributes:
+        lowest, highest: joint variable of each leg.
+        lowest_told, highest_told: joint variable plus zero, which a calibration changes.
+    """
+
+    lowest: Array
+    highest: Array
+    lowest_told: Array
+    highest_told: Array
+
+    def at(self, zeros: Array) -> tuple[Array, Array]:
+        """Lowest and highest joint variables that both allow, where a controller has these zeros (6,)."""
+        return (
+            np.maximum(self.lowest, self.lowest_told - zeros),
+            np.minimum(self.highest, self.highest_told - zeros),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

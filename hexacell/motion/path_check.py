@@ -3,7 +3,8 @@
 A line is sampled. Joint ranges and what may be commanded are checked on a fine sampling of the commands.
 The singularity margin is checked on a coarser one, for the controller's geometry and for the estimated one;
 both must keep their assembly mode. Tilt, passive joints and legs there are those of the estimated robot,
-and the ball's distance from the reference is computed from its path.
+and the ball's distance from the reference is computed from its path. Whether a robot can stand at a command
+is the same question without a line.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from hexacell.kinematics.commanded_motion import ActualPoses
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import margin_and_mode
+from hexacell.kinematics.sensitivity import has_singularity_margin, margin_and_mode
 from hexacell.motion.trajectory import interpolate_lines, trace_path
 
 MARGIN_SHARE = 0.7
@@ -160,3 +161,34 @@ class LinesFrom:
     @cached_property
     def _actual_start(self) -> ActualPoses:
         return self.belief.commanded.actual_poses(self.start)
+
+
+def stands_clear(belief: RobotBelief, commands: PoseBatch, actual: ActualPoses) -> Mask:
+    """At which of n commands a robot that stands there, ``actual``, is clear of singularities.
+
+    It is what :func:`~hexacell.motion.path_check.is_clear` says of the line from a command to itself: other
+    limits it may be beyond.
+    """
+    found = np.flatnonzero(actual.found)
+    geometries = (belief.controller, commands[found]), (belief.estimate, actual.poses[found])
+    least = MARGIN_SHARE * belief.limits.singularity_margin
+    clear, joints = np.array(actual.found), actual.joints[found]
+    for geometry, poses in geometries:
+        clear[found] &= has_singularity_margin(belief.mechanism, geometry, poses, joints, least)
+    return clear
+
+
+def stands_within_limits(belief: RobotBelief, commands: PoseBatch, *, certainly: bool) -> Mask:
+    """At which of n commands the estimated robot keeps its limits and is clear of singularities.
+
+    ``certainly``: so that it also keeps those of passive joints and legs for what is not known of it.
+    """
+    actual = belief.commanded.actual_poses(commands)
+    found = np.flatnonzero(actual.found)
+    at = actual[found]
+    margins = belief.limits.leg_margins(belief.mechanism, belief.estimate, at.poses, at.joints)
+    wanted = belief.margins_at(at) if certainly else belief.least_margins
+    kept = belief.limits.allow_poses(at.poses, at.joints) & (margins >= wanted).all(axis=-1)
+    stands = np.array(actual.found)
+    stands[found] = kept
+    return stands & stands_clear(belief, commands, actual)

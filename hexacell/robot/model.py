@@ -29,12 +29,11 @@ from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.prior import Noise, Prior, Tolerances
 from hexacell.identification.problem.problem import Assumptions, Problem
 from hexacell.identification.solver.result import GeometryEstimate, Identification
-from hexacell.kinematics.commanded_motion import CommandedRobot
+from hexacell.kinematics.commanded_motion import CommandedRobot, RefusedCommands
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
 from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet

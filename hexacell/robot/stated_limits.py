@@ -15,9 +15,8 @@ from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joi
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.gauge_travel import GaugeTravel
-from hexacell.limits.joint_ranges import ZeroedRanges
 from hexacell.limits.leg_limits import LegLimits
-from hexacell.limits.limits import AxisLimits, Limits
+from hexacell.limits.limits import AxisLimits, Limits, ZeroedRanges
 
 NO_CONE_DEG = 180.0
 

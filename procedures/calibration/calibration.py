@@ -24,9 +24,9 @@ from hexacell.checks.quick_level import QuickLevel
 from hexacell.design.search_effort import USUAL_EFFORT, SearchEffort
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.commanded_motion import RefusedCommands
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
-from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.results.result import AcceptedResult

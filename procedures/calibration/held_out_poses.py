@@ -19,8 +19,8 @@ from hexacell.design.validation_poses import select_near, select_validation_pose
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.commanded_motion import RefusedCommands
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot
 from procedures.run.keys import SixNumbers

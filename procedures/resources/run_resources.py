@@ -19,7 +19,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.position_agreement import PositionReports
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of, joints_of
-from hexacell.motion.duration import LineDurations
+from hexacell.motion.trajectory import LineDurations
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.calibration import Calibration

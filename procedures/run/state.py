@@ -11,7 +11,7 @@ from functools import reduce
 from typing import TYPE_CHECKING, TypeVar
 
 from hexacell.cell.recovery import FailureKind
-from hexacell.kinematics.refused_commands import RefusedCommand, RefusedCommands
+from hexacell.kinematics.commanded_motion import RefusedCommand, RefusedCommands
 from hexacell.measurements.records import MeasurementSet, Record
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.readings import Reading

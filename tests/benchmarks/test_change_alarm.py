@@ -21,8 +21,8 @@ import pytest
 from hexacell.checks.change_alarm import ChangeAlarm, change_alarm, leg_expansion
 from hexacell.checks.check import Check
 from hexacell.dry_run.campaign import VirtualCampaign
-from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot

@@ -25,8 +25,8 @@ from hexacell.checks.check import Check, identified_before
 from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.identification.estimator import identify
-from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot, robot_of
 from hexacell.robot.virtual_robot import VirtualRobot

@@ -21,9 +21,9 @@ import numpy as np
 
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit, PoseErrors, pose_errors
-from hexacell.kinematics.free_sensitivity import free_sensitivity
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.sensitivity import free_sensitivity
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,9 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
-from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.mechanism import Mechanism, free_parameter_derivatives
 from hexacell.kinematics.parameters import LEGS, ParameterSet, ParameterUnit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array

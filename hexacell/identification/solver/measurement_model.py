@@ -28,9 +28,9 @@ import numpy as np
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.problem.problem import Problem
 from hexacell.kinematics.forward import ForwardResult, apply_twist, forward_kinematics
-from hexacell.kinematics.free_sensitivity import free_sensitivity
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask, skew
+from hexacell.kinematics.sensitivity import free_sensitivity
 
 LARGEST_AMPLIFICATION = 100.0
 """mm of the ball per mm of a slider. Beyond it a record has no information and its linearization fails."""

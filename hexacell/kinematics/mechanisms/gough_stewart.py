@@ -24,8 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_vectors import axes_through, by_pose, mean_radius
-from hexacell.kinematics.legs import Legs
+from hexacell.kinematics.legs import Legs, axes_through, by_pose, mean_radius
 from hexacell.kinematics.mechanism import (
     Branch,
     ConstraintDerivatives,
@@ -91,12 +90,12 @@ class GoughStewart:
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Length errors of the legs (n, 6), mm, and their derivatives by the pose (n, 6, 6)."""
         b, length, n = _legs(geometry, poses)
         return length - geometry["offset"] - joints, by_pose(b, n)
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Derivatives of the legs' length errors by pose, joint variables and parameters."""
         b, _, n = _legs(geometry, poses)
         by_length = -np.ones((*joints.shape, 1))
         return ConstraintDerivatives(
@@ -106,12 +105,12 @@ class GoughStewart:
         )
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; every pose has a solution."""
+        """Joint variables (n, 6) at n poses; every pose has a solution."""
         joints: Array = _legs(geometry, poses)[1] - geometry["offset"]
         return joints
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The inverse solution, -1 or 1, that each leg is on (n, 6)."""
         return np.ones_like(joints)
 
     def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
@@ -127,26 +126,26 @@ class GoughStewart:
         return self.convention.geometry(self.convention.free_parameters(moved)), change
 
     def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The geometry of the machine in other frames."""
         base = (geometry["base"] - change.origin) @ change.base.T
         return gough_stewart_geometry(base, geometry["platform"] @ change.platform.T, geometry["offset"])
 
     def encoder_zeros(self, geometry: Geometry) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; the offsets."""
+        """Changes (P, 6) of the parameters by the encoders' zeros: the offsets."""
         return self.parameters.changes("offset", np.eye(6))
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`: it has none."""
+        """None: its legs have no guides."""
         return None
 
     def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The legs in space at n poses."""
         b, length, n = _legs(geometry, poses)
         at_platform = poses.positions[:, None, :] + b
         return Legs(at_platform - length[..., None] * n, at_platform, poses.rotations)
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Mean distance of the platform joints from the ball, mm."""
         return mean_radius(geometry, "platform")
 
 

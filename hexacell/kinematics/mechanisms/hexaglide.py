@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_vectors import CLOSEST_JOINTS_MM, axes_through, by_pose, mean_radius
-from hexacell.kinematics.legs import Legs
+from hexacell.kinematics.legs import CLOSEST_JOINTS_MM, Legs, axes_through, by_pose, mean_radius
 from hexacell.kinematics.mechanism import (
     Branch,
     ConstraintDerivatives,
@@ -83,12 +82,12 @@ class Hexaglide:
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Length errors of the legs (n, 6), mm, and their derivatives by the pose (n, 6, 6)."""
         b, v = _leg_vectors(geometry, poses, joints)
         return _leg_errors(geometry, v), by_pose(b, -v / geometry["l"][..., None])
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Derivatives of the legs' length errors by pose, joint variables and parameters."""
         b, v = _leg_vectors(geometry, poses, joints)
         n = v / geometry["l"][:, None]
         by_length = -0.5 * (np.sum(n * n, axis=-1, keepdims=True) + 1.0)
@@ -99,7 +98,7 @@ class Hexaglide:
         )
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Joint variables (n, 6) at n poses; NaN out of reach."""
         v = geometry["S"] - poses.positions[:, None, :] - _to_platform(geometry, poses)
         along_rail_squared = geometry["l"] ** 2 - v[..., 1] ** 2 - v[..., 2] ** 2
         reachable = along_rail_squared >= 0.0
@@ -107,7 +106,7 @@ class Hexaglide:
         return np.asarray(branch) * along_rail - v[..., 0]
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The inverse solution, -1 or 1, that each leg is on (n, 6)."""
         _, v = _leg_vectors(geometry, poses, joints)
         return np.where(v[..., 0] < 0.0, -1, 1)
 
@@ -126,29 +125,29 @@ class Hexaglide:
         return hexaglide_geometry(S, B, geometry["l"]), change
 
     def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The geometry of the machine in other frames."""
         S = (geometry["S"] - change.origin) @ change.base.T
         return hexaglide_geometry(S, geometry["B"] @ change.platform.T, geometry["l"])
 
     def encoder_zeros(self, geometry: Geometry) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; the joints on the sliders, along x."""
+        """Changes (P, 6) of the parameters by the encoders' zeros: the joints on the sliders, along x."""
         moved = np.zeros((6, 3, 6))
         moved[np.arange(6), 0, np.arange(6)] = 1.0
         return self.parameters.changes("S", moved)
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The guides of the sliders at n poses."""
         _, v = _leg_vectors(geometry, poses, joints)
         n = v / geometry["l"][:, None]
         return Guides(RAILS, along=geometry["S"][:, 0] + joints, across=n[..., 1:])
 
     def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The legs in space at n poses."""
         at_platform = poses.positions[:, None, :] + _to_platform(geometry, poses)
         return Legs(_at_sliders(geometry, joints), at_platform, poses.rotations)
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Mean distance of the platform joints from the ball, mm."""
         return mean_radius(geometry, "B")
 
 

@@ -31,8 +31,7 @@ from numpy.typing import ArrayLike
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_vectors import axes_through, by_pose, mean_radius
-from hexacell.kinematics.legs import Legs
+from hexacell.kinematics.legs import Legs, axes_through, by_pose, mean_radius
 from hexacell.kinematics.mechanism import (
     Branch,
     ConstraintDerivatives,
@@ -135,13 +134,13 @@ class RotaryCranks:
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Length errors of the legs (n, 6), mm, and their derivatives by the pose (n, 6, 6)."""
         b, v = _rods(geometry, poses, joints)
         length = np.sqrt(np.einsum("nij,nij->ni", v, v))
         return length - geometry["rod"], by_pose(b, -v / length[..., None])
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Derivatives of the legs' length errors by pose, joint variables and parameters."""
         b, v = _rods(geometry, poses, joints)
         n = v / np.linalg.norm(v, axis=-1, keepdims=True)
         axes, crank = TurnedAxes.by(geometry["axis"]), geometry["crank"]
@@ -160,7 +159,7 @@ class RotaryCranks:
         )
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; within half a turn of where q is 0."""
+        """Joint variables (n, 6) at n poses; within half a turn of where q is 0."""
         across, rest = _in_plane(geometry, poses)
         wanted = rest / (2.0 * geometry["crank"])
         cosine = wanted / np.hypot(across[..., 0], across[..., 1])
@@ -170,7 +169,7 @@ class RotaryCranks:
         return joints
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The inverse solution, -1 or 1, that each leg is on (n, 6)."""
         across, _ = _in_plane(geometry, poses)
         cosine, sine = _cosine_and_sine(geometry, joints)
         beyond = sine[..., 0] * across[..., 0] - cosine[..., 0] * across[..., 1]
@@ -191,7 +190,7 @@ class RotaryCranks:
         return self.convention.geometry(self.convention.free_parameters(moved)), change
 
     def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The geometry of the machine in other frames."""
         before = TurnedAxes.by(geometry["axis"])
         turns = turns_of(before.axis @ change.base.T)
         after = TurnedAxes.by(turns)
@@ -209,15 +208,15 @@ class RotaryCranks:
         return Geometry.of(ROTARY_CRANKS_PARAMETERS, values)
 
     def encoder_zeros(self, geometry: Geometry) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; the cranks' zeros."""
+        """Changes (P, 6) of the parameters by the encoders' zeros: the cranks' zeros."""
         return self.parameters.changes("zero", np.eye(6))
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`: it has none."""
+        """None: its legs have no guides."""
         return None
 
     def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; the legs are the rods."""
+        """The rods in space at n poses."""
         b, v = _rods(geometry, poses, joints)
         at_platform = poses.positions[:, None, :] + b
         axes, (cosine, sine) = TurnedAxes.by(geometry["axis"]), _cosine_and_sine(geometry, joints)
@@ -226,7 +225,7 @@ class RotaryCranks:
         return Legs(at_platform + v, at_platform, poses.rotations, carriers)
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Mean distance of the platform joints from the ball, mm."""
         return mean_radius(geometry, "platform")
 
 

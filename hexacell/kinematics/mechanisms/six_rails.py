@@ -27,8 +27,7 @@ from numpy.typing import ArrayLike
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_vectors import CLOSEST_JOINTS_MM, axes_through, by_pose, mean_radius
-from hexacell.kinematics.legs import Legs
+from hexacell.kinematics.legs import CLOSEST_JOINTS_MM, Legs, axes_through, by_pose, mean_radius
 from hexacell.kinematics.mechanism import (
     Branch,
     ConstraintDerivatives,
@@ -112,13 +111,13 @@ class SixRails:
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Length errors of the legs (n, 6), mm, and their derivatives by the pose (n, 6, 6)."""
         b, v = _leg_vectors(geometry, poses, joints)
         length = np.sqrt(np.einsum("nij,nij->ni", v, v))
         return length - geometry["l"], by_pose(b, -v / length[..., None])
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Derivatives of the legs' length errors by pose, joint variables and parameters."""
         b, v = _leg_vectors(geometry, poses, joints)
         n = v / np.linalg.norm(v, axis=-1, keepdims=True)
         directions, by_turns = directions_of_rails(geometry["rail"])
@@ -131,7 +130,7 @@ class SixRails:
         )
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Joint variables (n, 6) at n poses; NaN out of reach."""
         _, v = _leg_vectors(geometry, poses, np.zeros((len(poses), 6)))
         along = np.einsum("nij,ij->ni", v, _directions(geometry["rail"]))
         squared = geometry["l"] ** 2 - np.einsum("nij,nij->ni", v, v) + along**2
@@ -140,7 +139,7 @@ class SixRails:
         return joints
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The inverse solution, -1 or 1, that each leg is on (n, 6)."""
         _, v = _leg_vectors(geometry, poses, joints)
         along = np.einsum("nij,ij->ni", v, _directions(geometry["rail"]))
         return np.where(along < 0.0, -1, 1)
@@ -157,7 +156,7 @@ class SixRails:
         return self.convention.geometry(self.convention.free_parameters(moved)), change
 
     def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The geometry of the machine in other frames."""
         return six_rails_geometry(
             (geometry["S"] - change.origin) @ change.base.T,
             turns_of(_directions(geometry["rail"]) @ change.base.T),
@@ -166,13 +165,13 @@ class SixRails:
         )
 
     def encoder_zeros(self, geometry: Geometry) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; the sliders, along their rails."""
+        """Changes (P, 6) of the parameters by the encoders' zeros: the sliders, along their rails."""
         moved = np.zeros((6, 3, 6))
         moved[np.arange(6), :, np.arange(6)] = _directions(geometry["rail"])
         return self.parameters.changes("S", moved)
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`; across as the rail leans by a and b."""
+        """The guides of the sliders at n poses."""
         _, v = _leg_vectors(geometry, poses, joints)
         n = v / np.linalg.norm(v, axis=-1, keepdims=True)
         directions, by_turns = directions_of_rails(geometry["rail"])
@@ -181,13 +180,13 @@ class SixRails:
         return Guides(OWN_RAILS, along, across)
 
     def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """The legs in space at n poses."""
         b, v = _leg_vectors(geometry, poses, joints)
         at_platform = poses.positions[:, None, :] + b
         return Legs(at_platform + v, at_platform, poses.rotations)
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        """Mean distance of the platform joints from the ball, mm."""
         return mean_radius(geometry, "B")
 
 

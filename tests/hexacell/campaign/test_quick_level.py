@@ -15,7 +15,7 @@ from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.dry_run.quick_level import try_quick_level
 from hexacell.identification.estimator import identify
-from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
+from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.verdict.decision import ErrorLimits

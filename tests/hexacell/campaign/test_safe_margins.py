@@ -15,8 +15,8 @@ from hexacell.design.candidates import ReachableTargets, outcomes_of
 from hexacell.design.predicted_records import predict_records
 from hexacell.design.travel_monte_carlo import MARGIN_SIGMAS, TravelConstraint
 from hexacell.identification.belief import SPARE_ANGLE, SPARE_SIGMAS
-from hexacell.kinematics.free_sensitivity import free_sensitivity
 from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.sensitivity import free_sensitivity
 from tests.hexacell.campaign.conftest import Campaign, Taken
 
 Choice = tuple[TravelConstraint, ReachableTargets]

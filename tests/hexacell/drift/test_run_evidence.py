@@ -11,8 +11,8 @@ from hexacell.drift.carried_posterior import CarriedPosterior
 from hexacell.drift.run_evidence import whiten_records
 from hexacell.drift.single_cause import single_cause_test
 from hexacell.identification.problem.prior import SystematicErrors
-from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import free_parameter_derivatives
 
 EXPANSION_MM = 0.05 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 

@@ -10,7 +10,7 @@ import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.conformance import MechanismExample
-from hexacell.conformance.identification_checks import records_without_noise
+from hexacell.conformance.frame_checks import records_without_noise
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.estimator import estimate_online, identify
 from hexacell.identification.identified_zeros import (

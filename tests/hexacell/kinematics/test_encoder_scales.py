@@ -11,7 +11,7 @@ import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.conformance import MechanismConformance, MechanismExample
-from hexacell.conformance.identification_checks import records_without_noise
+from hexacell.conformance.frame_checks import records_without_noise
 from hexacell.errors import FileError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification

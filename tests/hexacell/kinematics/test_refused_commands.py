@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hexacell.kinematics.commanded_motion import RefusedCommand, RefusedCommands
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.refused_commands import RefusedCommand, RefusedCommands
 
 POSE = (10.0, -20.0, 550.0, 5.0, -12.0, 40.0)
 

@@ -13,8 +13,13 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion.duration import SHORTEST_S, LineDurations, SpeedLimits, shortest_duration
-from hexacell.motion.trajectory import interpolate_line
+from hexacell.motion.trajectory import (
+    SHORTEST_S,
+    LineDurations,
+    SpeedLimits,
+    interpolate_line,
+    shortest_duration,
+)
 from hexacell.robot.model import robot_of
 
 ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))

@@ -9,8 +9,7 @@ import pytest
 
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.limits.leg_limits import LegLimits
-from hexacell.motion.path_check import is_clear
-from hexacell.motion.standing import stands_clear, stands_within_limits
+from hexacell.motion.path_check import is_clear, stands_clear, stands_within_limits
 
 COMMANDS = PoseBatch.of(
     [

@@ -21,8 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.leg_vectors import axes_through, by_pose
-from hexacell.kinematics.legs import Legs
+from hexacell.kinematics.legs import Legs, axes_through, by_pose
 from hexacell.kinematics.mechanism import (
     Branch,
     ConstraintDerivatives,

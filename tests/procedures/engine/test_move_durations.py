@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion.duration import SHORTEST_S
+from hexacell.motion.trajectory import SHORTEST_S
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events

@@ -154,21 +154,17 @@ async def _keep_reading(
     shown: LiveValue[Any], connect: Callable[[], Awaitable[Any]], read: Callable[[], Awaitable[Any]]
 ) -> None:
     """Open a device, as often as it takes, and read it; its live value says what is wrong."""
-    while not await _is_open(shown, connect):  # noqa: ASYNC110 - nothing reports when it is plugged in
+    while True:  # nothing reports when it is plugged in
+        try:
+            await connect()
+            break
+        except HexacellError as error:
+            shown.fail(str(error))
         await asyncio.sleep(OPEN_EVERY_S)
     while True:
         with suppress(HexacellError):  # the live value says why
             await read()
         await asyncio.sleep(READ_EVERY_S)
-
-
-async def _is_open(shown: LiveValue[Any], connect: Callable[[], Awaitable[Any]]) -> bool:
-    try:
-        await connect()
-    except HexacellError as error:
-        shown.fail(str(error))
-        return False
-    return True
 
 
 class RunDeviceWatch:

@@ -91,8 +91,8 @@ class ScreenModel:
             ScreenAction.PREVIEW: self._preview,
             ScreenAction.EXCLUDE: self._exclude,
             ScreenAction.COMPARE: self._compare,
-            ScreenAction.ROLL_BACK: self._roll_back,
-            ScreenAction.APPLY: self._apply,
+            ScreenAction.ROLL_BACK: partial(self._change_config, workplace.roll_back),
+            ScreenAction.APPLY: partial(self._change_config, workplace.apply),
             ScreenAction.OPEN: self._open,
             ScreenAction.DRIFT: self._drift,
             ScreenAction.STEP: self._step,
@@ -183,10 +183,13 @@ class ScreenModel:
 
     def checklist(self) -> ChecklistView:
         """Everything that must hold before motion."""
+        forecast = (
+            (TRYING,) if self._trial is not None else () if self._tried is None else self._tried.lines
+        )
         return checklist_view(
             self._run.picture.live if self._is_running else self._devices.live,
             self._checked,
-            (TRYING,) if self._trial is not None else () if self._tried is None else self._tried.lines,
+            tuple(filter(None, (excluded, *((TRYING,) if self._trial is not None else lines)))),
             is_checking=self._is_checking,
             refusal=RUNNING if self._is_running else STARTING if self._is_starting else "",
             has_fixture=self._workplace.cell.settings.length_check is not None,
@@ -337,17 +340,13 @@ class ScreenModel:
     async def _drift(self, _: str) -> None:
         self._compared = await self._workplace.drift()
 
-    async def _roll_back(self, run: str) -> str:
-        return await self._change_config(partial(self._workplace.roll_back, run, PERSON))
-
-    async def _apply(self, run: str) -> str:
-        return await self._change_config(partial(self._workplace.apply, run, PERSON))
-
-    async def _change_config(self, change: Callable[[], Awaitable[tuple[str, ...]]]) -> str:
+    async def _change_config(
+        self, change: Callable[[str, str], Awaitable[tuple[str, ...]]], run: str
+    ) -> str:
         """Where somebody has edited the config since, the three versions are shown."""
         try:
             async with self._devices.released():
-                self._compared = await change()
+                self._compared = await change(run, PERSON)
         except ConfigEditedSince as edited:
             self._compared = tuple(versions_text(edited.versions).splitlines())
             raise

@@ -22,7 +22,7 @@ from hexacell.text.screens.help_texts import (
     SCREEN_HELP,
     reflowed,
 )
-from hexacell.text.screens.views import Choice, FaultView, QuestionView
+from hexacell.text.screens.views import FaultView, QuestionView
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
@@ -63,7 +63,10 @@ class AnswerOverlay(ModalScreen[ScreenResultType]):
                 yield TextPanel(view.refusal, id="refusal")
             yield TextPanel(view.instruction, id="instruction")
             for choice in view.choices:
-                yield TextPanel(_line(choice, view), classes=_classes(choice, view))
+                is_refused = choice.is_consent and bool(view.refusal)
+                key = choice.key if len(choice.key) == 1 else choice.key.capitalize()
+                line = f"  {'--' if is_refused else key:8} {choice.label}"
+                yield TextPanel(line, classes="choice refused" if is_refused else "choice")
             if view.typed and not view.refusal:
                 yield Input(placeholder=view.typed, id="typed", compact=True, max_length=LONGEST_TYPED)
 
@@ -80,8 +83,10 @@ class AnswerOverlay(ModalScreen[ScreenResultType]):
 
     async def on_key(self, event: Key) -> None:
         """Take an answer of one key."""
+        is_typing = isinstance(self.focused, Input) and len(event.key) == 1
         for choice in self.view.choices:
-            if event.key == choice.key and self._may_be_given(choice):
+            is_refused = choice.is_consent and bool(self.view.refusal)
+            if event.key == choice.key and not is_typing and not is_refused:
                 event.stop()
                 await self.give(choice.value)
 
@@ -89,20 +94,6 @@ class AnswerOverlay(ModalScreen[ScreenResultType]):
         """Take consent that is typed in full."""
         if event.value.strip().lower() == self.view.typed.lower():
             await self.give(self.view.consent)
-
-    def _may_be_given(self, choice: Choice) -> bool:
-        is_typing = isinstance(self.focused, Input) and len(choice.key) == 1
-        return not is_typing and not (choice.is_consent and bool(self.view.refusal))
-
-
-def _line(choice: Choice, view: QuestionView) -> str:
-    blocked = choice.is_consent and view.refusal
-    key = choice.key if len(choice.key) == 1 else choice.key.capitalize()
-    return f"  {'--' if blocked else key:8} {choice.label}"
-
-
-def _classes(choice: Choice, view: QuestionView) -> str:
-    return "choice refused" if choice.is_consent and view.refusal else "choice"
 
 
 class ConfirmOverlay(AnswerOverlay[bool]):

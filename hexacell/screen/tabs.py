@@ -76,7 +76,7 @@ class CellScreen(TabScreen):
         view = model.cell()
         self.query_one(DevicePanel).show(view.live)
         self.query_one("#settings-title", TextPanel).show(view.title)
-        self.query_one("#settings", TextList).show([*view.problems, *view.warnings, *view.settings])
+        self.query_one("#settings", TextList).show([*view.warnings, *view.settings])
 
 
 class PreflightScreen(TabScreen):

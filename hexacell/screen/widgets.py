@@ -159,8 +159,7 @@ class RowList(OptionList):
     @property
     def chosen(self) -> str | None:
         """The name of the chosen row; None without rows."""
-        row = self.highlighted
-        return None if row is None or row >= len(self._rows) else self._rows[row][0]
+        return None if self.highlighted_option is None else self.highlighted_option.id
 
     def show(self, rows: Sequence[tuple[str, str]]) -> None:
         """Show these rows: name and line of each."""
@@ -169,10 +168,11 @@ class RowList(OptionList):
         name, row = self.chosen, self.highlighted or 0
         self._rows = list(rows)
         self.clear_options()
-        self.add_options(Option(Content(line)) for _, line in rows)
+        self.add_options(Option(Content(line), id=name) for name, line in rows)
         names = [one for one, _ in rows]
-        last = len(names) - 1
-        self.highlighted = None if not names else names.index(name) if name in names else min(row, last)
+        self.highlighted = (
+            names.index(name) if name in names else min(row, len(names) - 1) if names else None
+        )
 
 
 TABS = {
@@ -215,7 +215,12 @@ class TabLine(Static):
         super().__init__(Content("  ").join(parts))
 
 
-PALETTE = "^p palette"
+_ACTIONS = {
+    f"perform('{action}')": action
+    for action in ScreenAction
+    if any(one.show and one.action == f"perform('{action}')" for one in KEYS)
+}
+"""The actions that may have no effect, by what a key performs."""
 
 
 class KeyLine(Static):
@@ -235,7 +240,7 @@ class KeyLine(Static):
 
     def _content(self) -> Content:
         parts = [self._part(str(one.id), one.action, one.description) for one in KEYS if one.show]
-        palette = Content.from_markup(f"[@click=app.command_palette()]{PALETTE}[/]")
+        palette = Content.from_markup("[@click=app.command_palette()]^p palette[/]")
         return Content("  ").join([*parts, palette])
 
     def _part(self, name: str, action: str, word: str) -> Content:
@@ -243,11 +248,3 @@ class KeyLine(Static):
         has_effect = action not in _ACTIONS or self._has_effect[_ACTIONS[action]]
         text = "[b]$key[/b] $word" if has_effect else "[dim][b]$key[/b] $word[/dim]"
         return Content.from_markup(f"[@click=app.{call}]{text}[/]", key=self._keys[name], word=word)
-
-
-_ACTIONS = {
-    f"perform('{action}')": action
-    for action in ScreenAction
-    if any(one.show and one.action == f"perform('{action}')" for one in KEYS)
-}
-"""The actions that may have no effect, by what a key performs."""

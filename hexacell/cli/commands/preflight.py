@@ -15,6 +15,7 @@ from hexacell.services.run.calibration_run import new_calibration, preflight
 from hexacell.text.documents import preflight_document, quick_preflight_document
 from hexacell.text.layout import wrapped
 from hexacell.text.planning import plan_trial_lines, preflight_lines, quick_trial_text
+from hexacell.text.screens.planned_poses import exclusions_text
 from procedures.calibration.calibration import Mode
 
 MISSING = (PortLost, GaugeSilent, WrongAnswer, BusError, SilentNodeError, ConnectionLost)
@@ -37,6 +38,8 @@ def main(options: argparse.Namespace) -> ExitCode:
         raise
     for line in preflight_lines(devices):
         console.print(wrapped(line, indent=6))
+    if excluded := exclusions_text(cell.settings):
+        console.print(wrapped(excluded))
     if mode is Mode.QUICK:
         tried = try_quick_level(new_calibration(cell, mode).at_start.quick)
         console.document(quick_preflight_document(devices, tried))

@@ -30,6 +30,7 @@ from hexacell.services.schedule.unattended_runs import (
     repetition,
 )
 from hexacell.text.documents import run_document
+from hexacell.text.layout import wrapped
 from hexacell.text.line_face import LETTERS
 from hexacell.text.run import (
     NOT_REPEATED_ALARM,
@@ -41,6 +42,7 @@ from hexacell.text.run import (
     demo_opening,
     resume_hint,
 )
+from hexacell.text.screens.planned_poses import exclusions_text
 from procedures.calibration.calibration import Mode, expected_records
 from procedures.engine.commands import CommandQueue, UnattendedOperator
 from procedures.engine.engine import Listener
@@ -114,6 +116,8 @@ def _run_to_end(request: RunRequest, console: Console, stream: EventStream | Non
     factor = request.cell.settings.timing.clock_factor
     if factor != 1.0:
         console.print(clock_notice(factor))
+    if excluded := exclusions_text(request.cell.settings):
+        console.print(wrapped(excluded))
     with notified_afterwards(request, console) as news:
         news.end = end = _run_and_repeat(request, console, stream)
     console.document(run_document(end.request, end.ended, end.state))

@@ -198,16 +198,12 @@ class FaultView:
 
 @dataclass(frozen=True, slots=True)
 class CellView:
-    """The cell: its devices live, and what its file says with the origin of each value.
-
-    ``problems`` are mistakes in the file, one a paragraph; then there is no more.
-    """
+    """The cell: its devices live, and what its file says with the origin of each value."""
 
     title: str
     live: LiveView
     settings: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
-    problems: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

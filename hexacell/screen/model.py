@@ -18,7 +18,7 @@ from hexacell.screen.workplace import TriedPlan, Workplace
 from hexacell.text.config_changes import RELOAD, versions_text
 from hexacell.text.screens.live import RUNNING, STARTING, TRYING, checklist_view, live_view
 from hexacell.text.screens.measuring import fault_view, measure_view
-from hexacell.text.screens.planned_poses import plan_view
+from hexacell.text.screens.planned_poses import exclusions_text, plan_view
 from hexacell.text.screens.questions import PERSON, question_view
 from hexacell.text.screens.reviewing import PROPOSAL_WAITS, history_view, review_view, rollback_question
 from hexacell.text.screens.run_picture import header_view
@@ -183,9 +183,8 @@ class ScreenModel:
 
     def checklist(self) -> ChecklistView:
         """Everything that must hold before motion."""
-        forecast = (
-            (TRYING,) if self._trial is not None else () if self._tried is None else self._tried.lines
-        )
+        lines = () if self._tried is None else self._tried.lines
+        excluded = exclusions_text(self._workplace.cell.settings)
         return checklist_view(
             self._run.picture.live if self._is_running else self._devices.live,
             self._checked,

@@ -23,14 +23,9 @@ SHELLS = ("bash", "zsh", "fish")
 
 
 def add_operation_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
-    """Add those to the commands of a parser."""
-    _devices(commands)
-    _schedule(commands)
-    _status(commands)
-    _notify(commands)
-    _serve(commands)
-    _cell(commands)
-    _completion(commands)
+    """Add these commands to a parser."""
+    for add in (_devices, _schedule, _status, _notify, _serve, _cell, _completion):
+        add(commands)
 
 
 def _devices(commands: Any) -> None:  # noqa: ANN401
@@ -161,11 +156,9 @@ def _completion(commands: Any) -> None:  # noqa: ANN401
 
 
 def add_result_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
-    """Add those to the commands of a parser."""
-    _apply(commands)
-    _rollback(commands)
-    _history(commands)
-    _report(commands)
+    """Add these commands to a parser."""
+    for add in (_apply, _rollback, _history, _report):
+        add(commands)
 
 
 def _apply(commands: Any) -> None:  # noqa: ANN401

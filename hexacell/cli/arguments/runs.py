@@ -19,14 +19,9 @@ from hexacell.cli.arguments.commands import (
 
 
 def add_run_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
-    """Add those to the commands of a parser."""
-    _demo(commands)
-    _run(commands)
-    _tui(commands)
-    _length(commands)
-    _preflight(commands)
-    _simulate(commands)
-    _host(commands)
+    """Add these commands to a parser."""
+    for add in (_demo, _run, _tui, _length, _preflight, _simulate, _host):
+        add(commands)
 
 
 def _demo(commands: Any) -> None:  # noqa: ANN401
@@ -128,10 +123,9 @@ def _host(commands: Any) -> None:  # noqa: ANN401
 
 
 def add_record_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
-    """Add those to the commands of a parser."""
-    _next(commands)
-    _fit(commands)
-    _replay(commands)
+    """Add these commands to a parser."""
+    for add in (_next, _fit, _replay):
+        add(commands)
 
 
 def _next(commands: Any) -> None:  # noqa: ANN401
@@ -214,7 +208,7 @@ STUDIES = (
 
 
 def add_study_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
-    """Add them to the commands of a parser."""
+    """Add the studies to the commands of a parser."""
     parser = add_parser(commands, "study", "repeat what was published of the method, on simulated robots")
     studies = parser.add_subparsers(title="studies", metavar="STUDY", required=True)
     for study in STUDIES:

@@ -6,8 +6,8 @@ import argparse
 
 from hexacell import __version__
 from hexacell.cli.arguments.commands import Parser
-from hexacell.cli.arguments.operation import add_operation_commands, add_result_commands
-from hexacell.cli.arguments.runs import add_record_commands, add_run_commands, add_study_commands
+from hexacell.cli.arguments.operation import add_operation_commands
+from hexacell.cli.arguments.runs import add_run_commands, add_study_commands
 
 EXIT_CODES = """exit codes:
   0 done, within limits            4 an answer or approval is needed
@@ -36,8 +36,6 @@ def make_parser() -> Parser:
         title="commands", prog="hexacell", metavar="COMMAND [...]", required=True
     )
     add_run_commands(commands)
-    add_record_commands(commands)
-    add_result_commands(commands)
     add_operation_commands(commands)
     add_study_commands(commands)
     return parser

@@ -24,7 +24,19 @@ SHELLS = ("bash", "zsh", "fish")
 
 def add_operation_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
     """Add these commands to a parser."""
-    for add in (_devices, _schedule, _status, _notify, _serve, _cell, _completion):
+    for add in (
+        _apply,
+        _rollback,
+        _history,
+        _report,
+        _devices,
+        _schedule,
+        _status,
+        _notify,
+        _serve,
+        _cell,
+        _completion,
+    ):
         add(commands)
 
 
@@ -118,9 +130,7 @@ def _status(commands: Any) -> None:  # noqa: ANN401
 
 
 def _notify(commands: Any) -> None:  # noqa: ANN401
-    parser = add_command(
-        commands, "notify", "who is notified of unattended runs: list, try, send what waits"
-    )
+    parser = add_command(commands, "notify", "who hears of unattended runs: list, try, send what waits")
     add_cell(parser)
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--test", action="store_true", help="notify everybody of a test now")
@@ -153,12 +163,6 @@ def _completion(commands: Any) -> None:  # noqa: ANN401
         commands, "completion", "print a script that lets a shell complete commands and files"
     )
     parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help=f"one of {', '.join(SHELLS)}")
-
-
-def add_result_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
-    """Add these commands to a parser."""
-    for add in (_apply, _rollback, _history, _report):
-        add(commands)
 
 
 def _apply(commands: Any) -> None:  # noqa: ANN401

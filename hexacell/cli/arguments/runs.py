@@ -20,7 +20,7 @@ from hexacell.cli.arguments.commands import (
 
 def add_run_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
     """Add these commands to a parser."""
-    for add in (_demo, _run, _tui, _length, _preflight, _simulate, _host):
+    for add in (_demo, _run, _tui, _length, _preflight, _simulate, _host, _next, _fit, _replay):
         add(commands)
 
 
@@ -120,12 +120,6 @@ def _host(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument("--mode", choices=("check", "quick", "optimise", "length"), required=True)
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--length-check", action="store_true")
-
-
-def add_record_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
-    """Add these commands to a parser."""
-    for add in (_next, _fit, _replay):
-        add(commands)
 
 
 def _next(commands: Any) -> None:  # noqa: ANN401

@@ -7,7 +7,6 @@ perhaps on purpose.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from configparser import Error as SyntaxFault
 from configparser import RawConfigParser
 from dataclasses import dataclass
@@ -68,13 +67,12 @@ class DataSheet:
                     subject=node.leg.subject,
                     action="Name the EDS file of this device under [encoders], or check what was mounted",
                 )
-        return ", ".join(self._differences(node))
-
-    def _differences(self, node: EncoderNode) -> Iterator[str]:
+        differences = []
         for name, entry in HOW_IT_IS_SET.items():
             found, stated = node.read_optional(entry), self.values.get(entry)
             if None not in (found, stated) and found != stated:
-                yield f"{name} {found}, where {self.path.name} has {stated}"
+                differences.append(f"{name} {found}, where {self.path.name} has {stated}")
+        return ", ".join(differences)
 
 
 def read_data_sheet(path: Path) -> DataSheet:
@@ -85,8 +83,7 @@ def read_data_sheet(path: Path) -> DataSheet:
     """
     try:
         text = path.read_text(encoding="utf-8", errors="replace")  # names may be in any encoding
-        _require_sections(text)
-        dictionary = import_eds(StringIO(text), None)  # type: ignore[no-untyped-call]
+        dictionary = _dictionary_in(text)
     except OSError as error:
         raise FileError(
             f"cannot be read: {error.strerror}", subject=path, action="Correct eds under [encoders]"
@@ -100,12 +97,13 @@ def read_data_sheet(path: Path) -> DataSheet:
     return DataSheet(path, values)
 
 
-def _require_sections(text: str) -> None:
-    """Raise ``ValueError`` for a text without what every EDS file has: canopen would only warn."""
+def _dictionary_in(text: str) -> ObjectDictionary:
     parser = RawConfigParser(inline_comment_prefixes=(";",))
     parser.read_string(text)
-    if not parser.has_section(ABOUT):
+    if not parser.has_section(ABOUT):  # canopen would only warn
         raise ValueError(f"it has no section [{ABOUT}]")
+    dictionary: ObjectDictionary = import_eds(StringIO(text), None)  # type: ignore[no-untyped-call]
+    return dictionary
 
 
 def _no_data_sheet(path: Path, reason: str) -> FileError:
@@ -118,18 +116,13 @@ def _no_data_sheet(path: Path, reason: str) -> FileError:
 
 def _default(dictionary: ObjectDictionary, entry: ObjectEntry) -> int | None:
     """The default of an entry as a node sends it, unsigned; what the file is about has its own section."""
-    stated = _variable(dictionary, entry)
-    value = None if stated is None else stated.default
+    found = dictionary.get(entry.index)
+    if isinstance(found, ODVariable):
+        found = found if entry.subindex == 0 else None
+    elif found is not None:
+        found = found.get(entry.subindex)
+    value = None if found is None else found.default
     if value is None and entry in (VENDOR, PRODUCT):
         about = dictionary.device_information
         value = about.vendor_number if entry is VENDOR else about.product_number
     return int(value) % (1 << 8 * entry.size) if isinstance(value, int) else None
-
-
-def _variable(dictionary: ObjectDictionary, entry: ObjectEntry) -> ODVariable | None:
-    if entry.index not in dictionary:
-        return None
-    found = dictionary[entry.index]
-    if isinstance(found, ODVariable):
-        return found if entry.subindex == 0 else None
-    return found.get(entry.subindex)

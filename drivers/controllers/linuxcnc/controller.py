@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import PurePath
 
-from drivers.controllers import reload_command
 from drivers.controllers.linuxcnc import startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.protocol import (
@@ -182,7 +181,7 @@ class LinuxcncrshController:
             with self._ready_if_done():
                 await self._switch_off(await self._session.synchronized())
                 if command := self._settings.reload_command:
-                    await reload_command.run(command, self._name, self._timeouts.reload)
+                    await startup.run_reload_command(command, self._name, self._timeouts.reload)
                 await self._make_ready(await self._session.reconnect(), permitted, stops)
 
     async def close(self) -> None:

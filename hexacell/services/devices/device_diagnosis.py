@@ -132,20 +132,14 @@ async def _watch_gauge(gauge: Gauge, stated_mm: float, seconds: float) -> Device
     try:
         identity = await gauge.open()
         watched = await _watched(read, seconds)
-        problem = watched.problem or await _check(gauge)
+        if not watched.problem:
+            try:
+                await gauge.check()
+            except HexacellError as error:
+                watched.problem = str(error)
     finally:
         await gauge.close()
-    figures = _figures(watched.values, [f"gauge {gauge.name}"], "mm")
-    return DeviceDiagnosis(
-        gauge.name,
-        (identity,),
-        watched.seconds,
-        len(watched.values),
-        figures,
-        watched.failure_figures(),
-        problem,
-        stated_mm,
-    )
+    return watched.diagnosis(gauge.name, (identity,), [f"gauge {gauge.name}"], "mm", stated_mm)
 
 
 async def _watch_encoders(devices: Devices, settings: CellSettings, seconds: float) -> DeviceDiagnosis:
@@ -157,17 +151,8 @@ async def _watch_encoders(devices: Devices, settings: CellSettings, seconds: flo
         watched = await _watched(read, seconds)
     finally:
         await devices.encoders.close()
-    names = [f"encoder {leg}" for leg in range(1, 7)]
-    return DeviceDiagnosis(
-        ENCODERS,
-        identities,
-        watched.seconds,
-        len(watched.values),
-        _figures(watched.values, names, str(settings.encoders.unit)),
-        watched.failure_figures(),
-        watched.problem,
-        settings.noise.encoder,
-    )
+    names, unit = [f"encoder {leg}" for leg in range(1, 7)], str(settings.encoders.unit)
+    return watched.diagnosis(ENCODERS, identities, names, unit, settings.noise.encoder)
 
 
 @dataclass
@@ -179,9 +164,26 @@ class _Watched:
     failures: defaultdict[Failure, list[str]] = field(default_factory=lambda: defaultdict(list))
     problem: str = ""
 
-    def failure_figures(self) -> tuple[FailureFigures, ...]:
-        """Failures by kind: each damaged answer is damaged in its own way."""
-        return tuple(FailureFigures(kind, len(said), said[-1]) for kind, said in self.failures.items())
+    def diagnosis(
+        self,
+        device: str,
+        identities: tuple[DeviceIdentity, ...],
+        names: Sequence[str],
+        unit: str,
+        stated_noise: float,
+    ) -> DeviceDiagnosis:
+        """The figures of all readings; failures by kind, as each damaged answer is another one."""
+        columns = np.array(self.values).T if self.values else ()
+        return DeviceDiagnosis(
+            device,
+            identities,
+            self.seconds,
+            len(self.values),
+            tuple(_figures(name, unit, column) for name, column in zip(names, columns, strict=False)),
+            tuple(FailureFigures(kind, len(said), said[-1]) for kind, said in self.failures.items()),
+            self.problem,
+            stated_noise,
+        )
 
 
 async def _watched(read: Read, seconds: float) -> _Watched:
@@ -199,31 +201,9 @@ async def _watched(read: Read, seconds: float) -> _Watched:
     return watched
 
 
-async def _check(gauge: Gauge) -> str:
-    try:
-        await gauge.check()
-    except HexacellError as error:
-        return str(error)
-    return ""
-
-
-def _figures(
-    values: Sequence[tuple[float, ...]], names: Sequence[str], unit: str
-) -> tuple[SeriesFigures, ...]:
-    if not values:
-        return ()
-    columns = np.array(values).T
-    return tuple(
-        SeriesFigures(
-            name,
-            unit,
-            float(column.min()),
-            float(column.max()),
-            _scatter(column),
-            len(set(column.tolist())),
-        )
-        for name, column in zip(names, columns, strict=True)
-    )
+def _figures(name: str, unit: str, values: np.ndarray) -> SeriesFigures:
+    lowest, highest, distinct = float(values.min()), float(values.max()), len(set(values.tolist()))
+    return SeriesFigures(name, unit, lowest, highest, _scatter(values), distinct)
 
 
 def _scatter(values: np.ndarray) -> float | None:

@@ -107,8 +107,8 @@ def select_from_list(
 ) -> SelectedPose:
     """The first of some commands (n) that almost surely stays inside the travel.
 
-    As :func:`select_pose`; the list's order takes the place of the gain. The first ``skipped`` of those
-    inside the travel are left out.
+    The list's order takes the place of the gain. The first ``skipped`` of those inside the travel are left
+    out.
 
     Raises:
         LimitError: none of them does.
@@ -150,21 +150,21 @@ class _PathSearch:
     def first_of_few(
         self, records: PredictedRecords, commands: PoseBatch, gains: Array, holds: Mask | None = None
     ) -> SelectedPose | None:
-        """The best of a few, straight paths first; ``holds``: at which the constraint does, if known."""
+        """The best of a few ranked candidates: straight paths first, those over the reference last.
+
+        ``holds`` says at which of them the constraint on the travel holds, if that is known.
+        """
         rows = np.flatnonzero(self.travel.holds(records) if holds is None else holds)
         if not len(rows):
             return None
         paths = self.planner.options(commands)
-        found = self._first(paths.straight, rows)
+        straight = self._first(paths.straight, rows)
         worth_waypoints = rows
-        if found is not None:
-            better = rows[rows < found[0]]
-            worth_waypoints = better[gains[better] >= WAYPOINT_GAIN_RATIO * gains[found[0]]]
-        found = (
-            self._first(paths.via_waypoints, worth_waypoints)
-            or found
-            or self._first(paths.via_reference, rows)
-        )
+        if straight is not None:
+            better = rows[rows < straight[0]]
+            worth_waypoints = better[gains[better] >= WAYPOINT_GAIN_RATIO * gains[straight[0]]]
+        over_waypoints = self._first(paths.via_waypoints, worth_waypoints)
+        found = over_waypoints or straight or self._first(paths.via_reference, rows)
         if found is None:
             return None
         row, path = found

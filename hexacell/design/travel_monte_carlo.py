@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexacell.design.candidates import ReachableTargets
 from hexacell.design.predicted_records import GaugeZero, PredictedRecords, predict_records
@@ -40,14 +41,14 @@ from hexacell.limits.limits import Limits
 from hexacell.motion.paths import Path
 
 LINEAR_SHARE = 0.4
-"""Of the travel. Within it, at four sigma, linear propagation is believed unless the orientation is
+"""Share of the travel. Within it, at four sigma, linear propagation is believed unless the orientation is
 uncertain: the ball stays inside even if the prediction is wrong by a factor of two."""
 
 HALF_TRAVEL_SIGMA = float(np.radians(6.0))
 """Standard deviation of the orientation, rad, at which half of the travel may be used."""
 
 UNCERTAIN_SHARE = 0.4
-"""Of the travel, where the orientation is uncertain."""
+"""Share of the travel that may be used where the orientation is uncertain."""
 
 SAMPLES = 24
 SAMPLES_UNCERTAIN = 240
@@ -64,11 +65,11 @@ FEWEST_SAMPLES = 6
 """Sampled robots that can take the reference pose; fewer are not sufficient."""
 
 MARGIN_SHARE = 0.5
-"""Of the singularity margin, which all sampled robots must keep."""
+"""Share of the singularity margin that all sampled robots must keep."""
 
 
 TOLERANCE_MM = 1e-4
-"""Of the constraints of sampled robots, whose deviations are compared with millimetres of travel."""
+"""Largest constraint of sampled robots, whose deviations are compared with millimetres of travel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,13 +116,14 @@ class TravelConstraint:
         # The reference is estimated from its records, so that it closes the legs only approximately.
         poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
         sensitivity = free_sensitivity(belief.mechanism, belief.estimate, poses, joints)
+        scenario = _Scenario(belief, joints, poses, sensitivity)
         sigma = belief.orientation_sigma_from(sensitivity)
         if sigma > UNCERTAIN_SIGMA:
-            return _nearly_all_hold(belief, joints, poses, sensitivity)
-        sampled = _sample(belief, _standard_normal(SAMPLES, len(belief.free)), joints, poses, sensitivity)
-        if len(sampled.found) < FEWEST_SAMPLES:
+            return scenario.nearly_all_hold()
+        robots = scenario.sampled(_standard_normal(SAMPLES, len(belief.free)), np.arange(len(targets)))
+        if len(robots) < FEWEST_SAMPLES:
             return np.zeros(len(targets), dtype=bool)
-        holds = _all_within(sampled, belief.limits, 1.0 / (1.0 + sigma / HALF_TRAVEL_SIGMA))
+        holds = _all_within(robots, belief.limits, 1.0 / (1.0 + sigma / HALF_TRAVEL_SIGMA))
         holds[holds] = self._margins_suffice(targets[holds])
         return holds
 
@@ -181,61 +183,80 @@ class _SampledRobots:
         )
 
 
-def _nearly_all_hold(
-    belief: RobotBelief, joints: Array, poses: PoseBatch, sensitivity: FreeSensitivity
-) -> Mask:
-    """At which targets the constraint holds on all of many sampled robots but the worst.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Scenario:
+    """The reference, first, and n targets of the estimated robot, for robots sampled from the belief.
 
-    A few of them are tried first: what they exclude, which is most, all of them exclude.
+    Attributes:
+        joints: (n + 1, 6) joint variables.
+        poses: those of the estimated robot.
+        sensitivity: of these poses.
     """
-    few, *others = np.split(_standard_normal(SAMPLES_UNCERTAIN, len(belief.free)), STAGES_UNCERTAIN)
-    sampled = _sample(belief, few, joints, poses, sensitivity)
-    within = _nearly_all_within(sampled, belief.limits, UNCERTAIN_SHARE)
-    holds = within.copy()
-    for more in others:
-        if not holds.any():
-            break
-        at = np.append(0, 1 + np.flatnonzero(holds))
-        sampled = sampled.at(within).with_others(
-            _sample(belief, more, joints[at], poses[at], sensitivity[at])
+
+    belief: RobotBelief
+    joints: Array
+    poses: PoseBatch
+    sensitivity: FreeSensitivity
+
+    def nearly_all_hold(self) -> Mask:
+        """At which targets (n,) the constraint holds on all of many sampled robots but the worst.
+
+        A few robots are tried first: most targets are excluded by them already.
+        """
+        possible = np.arange(len(self.joints) - 1)
+        robots: _SampledRobots | None = None
+        every = _standard_normal(SAMPLES_UNCERTAIN, len(self.belief.free))
+        for variates in np.split(every, STAGES_UNCERTAIN):
+            if not len(possible):
+                break
+            more = self.sampled(variates, possible)
+            robots = more if robots is None else robots.with_others(more)
+            within = _nearly_all_within(robots, self.belief.limits, UNCERTAIN_SHARE)
+            possible, robots = possible[within], robots.at(within)
+        holds = np.zeros(len(self.joints) - 1, dtype=bool)
+        holds[possible] = robots is not None and len(robots) >= FEWEST_SAMPLES
+        return holds
+
+    def sampled(self, variates: Array, targets: NDArray[np.intp]) -> _SampledRobots:
+        """Robots sampled by normal ``variates`` (r, p), solved at the reference and some of the targets.
+
+        Robots that cannot take the reference are dropped: the true robot could.
+        """
+        belief, mechanism = self.belief, self.belief.mechanism
+        at = np.append(0, 1 + targets)
+        errors = variates @ np.linalg.cholesky(belief.covariance).T
+        # Each robot at each pose is one row: all poses of the first robot, then those of the next one.
+        rows = np.tile(at, len(errors))
+        vectors = belief.estimate.vector + errors @ belief.basis.T
+        geometries = GeometryBatch(mechanism.parameters, vectors.repeat(len(at), axis=0))
+        # Newton's method starts where linear propagation puts the pose of each robot.
+        steps = (errors @ self.sensitivity.free[at].reshape(-1, errors.shape[1]).T).reshape(-1, 6)
+        solved = forward_kinematics(
+            mechanism,
+            geometries,
+            self.joints[rows],
+            apply_twist(self.poses[rows], steps),
+            mode=self.sensitivity.mode[rows],
+            tolerance_mm=TOLERANCE_MM,
         )
-        within = _nearly_all_within(sampled, belief.limits, UNCERTAIN_SHARE)
-        holds[holds] = within
-    return holds & (len(sampled) >= FEWEST_SAMPLES)
+        everywhere = geometries, solved.poses, self.joints[rows]
+        margin = belief.limits.singularity_margin
+        found = solved.found & has_singularity_margin(mechanism, *everywhere, MARGIN_SHARE * margin)
+        leg_margins = belief.limits.leg_margins(mechanism, *everywhere)
+        # A robot next to a singularity at its reference is refused before anything moves, and one whose
+        # joints are at their end there does not come to the reference.
+        first = np.arange(0, len(rows), len(at))
+        at_reference = geometries.subset(first), solved.poses[first], self.joints[rows[first]]
+        kept = found[first] & has_singularity_margin(mechanism, *at_reference, margin)
+        kept &= (leg_margins[first] >= 0.0).all(axis=-1)
 
-
-def _sample(
-    belief: RobotBelief, variates: Array, joints: Array, poses: PoseBatch, sensitivity: FreeSensitivity
-) -> _SampledRobots:
-    """Solve n poses, the reference first, for robots sampled from the belief by normal ``variates`` (r, p).
-
-    Samples that cannot take the reference are dropped: the true robot could.
-    """
-    samples, root = len(variates), np.linalg.cholesky(belief.covariance)
-    errors = variates @ root.T
-    count, margin = len(joints), belief.limits.singularity_margin
-    # Newton's method starts where linear propagation puts the pose of each robot.
-    steps = (errors @ sensitivity.free.reshape(-1, errors.shape[1]).T).reshape(-1, 6)
-    rows = np.tile(np.arange(count), samples)
-    vectors = (belief.estimate.vector + errors @ belief.basis.T).repeat(count, axis=0)
-    robots = GeometryBatch(belief.mechanism.parameters, vectors)
-    start, mode = apply_twist(poses[rows], steps), sensitivity.mode[rows]
-    result = forward_kinematics(
-        belief.mechanism, robots, joints[rows], start, mode=mode, tolerance_mm=TOLERANCE_MM
-    )
-    found = result.found.reshape(samples, count)
-    everywhere = (robots, result.poses, joints[rows])
-    is_clear = has_singularity_margin(belief.mechanism, *everywhere, MARGIN_SHARE * margin)
-    found &= is_clear.reshape(samples, count)
-    leg_margins = belief.limits.leg_margins(belief.mechanism, *everywhere).reshape(samples, count, -1)
-    first = np.arange(samples) * count
-    at_reference = (robots.subset(first), result.poses[first], joints[np.zeros(samples, dtype=int)], margin)
-    # A robot next to a singularity at its reference is refused before anything moves, and one whose joints
-    # are at their end there does not come to the reference.
-    kept = found[:, 0] & has_singularity_margin(belief.mechanism, *at_reference)
-    kept &= (leg_margins[:, 0] >= 0.0).all(axis=-1)
-    positions = result.poses.positions.reshape(samples, count, 3)[kept]
-    return _SampledRobots(found[kept, 1:], positions[:, 1:] - positions[:, :1], leg_margins[kept, 1:])
+        shape = len(errors), len(at)
+        positions = solved.poses.positions.reshape(*shape, 3)[kept]
+        return _SampledRobots(
+            found=found.reshape(shape)[kept, 1:],
+            deviations=positions[:, 1:] - positions[:, :1],
+            leg_margins=leg_margins.reshape(*shape, -1)[kept, 1:],
+        )
 
 
 def _nearly_all_within(sampled: _SampledRobots, limits: Limits, share: float) -> Mask:

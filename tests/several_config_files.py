@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.config.hal_pins import HalPins
 from hexacell.config.layout import ConfigLayout, FormatOfFile
+from hexacell.config.linuxcnc_hal import HalPins
 from hexacell.config.linuxcnc_ini import LinuxcncIni
 from hexacell.config.toml_format import NativeToml
 from hexacell.kinematics.geometry import Geometry

@@ -41,7 +41,7 @@ TYPED = [
     ("hexacell comple", "tion"),
     ("hexacell run my", "-robot.toml"),
     ("hexacell run my-robot.toml --mode opt", "imise"),
-    ("hexacell run my-robot.toml --deta", "chable"),
+    ("hexacell run my-robot.toml --unatt", "ended"),
     ("hexacell fit my-robot.toml --measurements rec", "ords.csv"),
     ("hexacell report runs/my-robot/20", "26-11-20T103000Z"),
     ("hexacell cell val", "idate"),

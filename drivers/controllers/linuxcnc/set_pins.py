@@ -21,7 +21,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from hexacell.config.hal_pins import SETP
+from hexacell.config.linuxcnc_hal import SETP
 from hexacell.config.linuxcnc_ini import IniText
 from hexacell.errors import HexacellError, UsageError
 from hexacell.storage.atomic_files import read_text

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.config.hal_pins import HalPins
 from hexacell.config.interface import ConfigFormat
 from hexacell.config.line_templates import LineTemplates
+from hexacell.config.linuxcnc_hal import HalPins
 from hexacell.config.linuxcnc_ini import LinuxcncIni
 from hexacell.config.number_tokens import write_number
 from hexacell.errors import FileError, UsageError

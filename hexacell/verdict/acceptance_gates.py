@@ -46,7 +46,7 @@ def gates(
         residuals: the chi-square test of the residuals.
         largest_change_mm: what may change without a person.
         before: the controller's geometry, in the same convention: other frames are no other robot.
-        expired: instruments whose certificate had expired when the run began; None where none has one.
+        expired: instruments whose certificate had expired when the run began; None without certificates.
     """
     certified = () if expired is None else (_certified(expired),)
     return (

@@ -52,7 +52,7 @@ class RunStarted(BaseEvent):
     accepted: AcceptedResult | None = None
     length_check: bool = False
     joint_ranges: tuple[tuple[float, float], ...] | None = None
-    limits: ControllerLimits | None = None
+    limits: ControllerLimits = ControllerLimits()
     expired: tuple[str, ...] = ()
     further_configs: tuple[str, ...] = ()
 

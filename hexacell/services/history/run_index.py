@@ -52,7 +52,7 @@ class RunSummary(Frozen):
         line: how it ended, in words; why its journal cannot be read, if it cannot.
         has_result: whether it identified a geometry of its own, with which no other result took part.
         is_over: whether it has ended; one that has not can be resumed.
-        written_sha256: fingerprint of the controller's config as it wrote it; None where it wrote none.
+        written_sha256: fingerprint of the controller's config as it wrote it; None if it did not.
         has_written: whether it wrote the config at all, whatever was undone.
         has_proposal: whether it has a proposal that is not in the config, and can be applied.
         has_begun: whether it began at all; one that was refused each time did not.
@@ -151,7 +151,7 @@ class RunIndex:
         runs: Iterable[str] | None = None,
         context: str = "",
     ) -> dict[str, Document]:
-        """The documents of all runs, or of some, by name; without those that have none.
+        """The documents of all runs, or of some, by name; runs without one are left out.
 
         ``read`` derives a document from its folder, or None. ``context`` is a word for
         what it depends on beside the folder: documents of another one are derived again.

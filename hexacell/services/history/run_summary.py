@@ -45,7 +45,7 @@ def run_summary(folder: RunFolder) -> RunSummary:
 
 
 def _summary_of_attempts(refused: StartAttempts) -> RunSummary:
-    """Of a run that never began."""
+    """Summary of a run that never began."""
     first, last = refused.attempts[0].at, refused.last.at
     return RunSummary(
         began=first, ended=last, mode=refused.mode, line=refused.line, is_over=True, has_begun=False

@@ -274,9 +274,7 @@ def _joint_range_problems(ranges: JointRanges | None) -> Iterator[str]:
     yield from _out_of_range(ranges, LARGEST_NUMBER)
 
 
-def _limit_problems(limits: ControllerLimits | None) -> Iterator[str]:
-    if limits is None:
-        return
+def _limit_problems(limits: ControllerLimits) -> Iterator[str]:
     yield from _joint_range_problems(limits.joints)
     if limits.axes is not None:
         if len(limits.axes) != len(AXES):

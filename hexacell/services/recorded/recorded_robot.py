@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from hexacell.cell.model import CellSettings
-from hexacell.config.interface import ControllerLimits
 from hexacell.errors import HexacellError
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.kinematics.geometry import Geometry
@@ -17,8 +16,7 @@ from procedures.steps.events import RunStarted
 
 def started_robot(settings: CellSettings, started: RunStarted) -> Robot:
     """The robot by a cell's settings, which may be newer, and its controller when a run began."""
-    limits = started.limits or ControllerLimits(joints=started.joint_ranges)
-    return robot_of_start(settings, started.controller, started.branch, started.taught, limits)
+    return robot_of_start(settings, started.controller, started.branch, started.taught, started.limits)
 
 
 def geometry_before(settings: CellSettings, started: RunStarted) -> Geometry:

@@ -15,7 +15,7 @@ import numpy as np
 
 from hexacell.cell.loader import Cell
 from hexacell.config.change import ConfigChange
-from hexacell.config.interface import ControllerGeometry, ControllerLimits
+from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import are_same_files, fingerprint_of, read_contents_if_present
 from hexacell.config.receipt import BEFORE, RECEIPT, Receipt, kept_paths
 from hexacell.errors import FileError, HexacellError, UsageError
@@ -122,8 +122,7 @@ def _require_own_geometry(
     if not _is_same(found, stated, started):
         raise _differs(folder, f"another geometry than {paths[0]}")
     own = stated_limits(cell.settings, found, SAME_FRAMES).joint_ranges
-    limits = started.limits or ControllerLimits(joints=found.limits.joints)  # of older versions: no axes
-    if started.joint_ranges != own or limits != found.limits:
+    if started.joint_ranges != own or started.limits != found.limits:
         raise _differs(
             folder, f"other limits than the cell file, {paths[0]} and [limits] ini, if one is named"
         )

@@ -1,15 +1,27 @@
-"""Pose errors after frame alignment."""
+"""Frames are fitted before errors are compared, and chosen so that taught poses move least."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import least_squares, minimize
 from scipy.spatial.transform import Rotation
 
-from hexacell.identification.diagnostics.frame_alignment import FrameFit, pose_errors
-from hexacell.kinematics.mechanism import FrameTransform
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.identification.diagnostics.frame_alignment import (
+    FrameChoice,
+    FrameFit,
+    choose_frames,
+    closest_frames,
+    pose_errors,
+)
+from hexacell.kinematics.forward import forward_kinematics
+from hexacell.kinematics.mechanism import FrameFreedom, FrameTransform
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.pose import Pose, PoseBatch
 
 LENGTH = 180.0
 
@@ -98,3 +110,174 @@ def test_a_base_frame_is_turned_about_the_axes_that_can_be_taught_alone(poses, a
     linear = pose_errors(seen, poses)
     removed = FrameFit(poses, LENGTH, turns).remove_frame_motion(poses, linear, linear)
     np.testing.assert_allclose(removed[:, :3], pose_errors(aligned, poses)[:, :3], atol=2e-3)
+
+
+TASK = [
+    Pose(0.0, 0.0, 550.0),
+    Pose(0.0, -150.0, 550.0, 15.0),
+    Pose(80.0, -80.0, 500.0, 0.0, 15.0, 10.0),
+    Pose(-100.0, 100.0, 500.0, -10.0, 10.0, -20.0),
+]
+WORKSHOP = FrameTransform(
+    base=Rotation.from_rotvec([-0.7, 0.0, 0.0]).as_matrix(),
+    origin=np.array([50.0, 200.0, -900.0]),
+    platform=Rotation.from_rotvec([0.3, 0.1, -0.5]).as_matrix(),
+)
+"""From the paper's frames to those in which the robot was taught."""
+
+place = st.floats(-500.0, 500.0)
+turn = st.floats(-1.5, 1.5)
+
+
+@pytest.fixture(scope="module")
+def calibrated(paper) -> FrameChoice:
+    """The paper's simulated robot, taught by its drawing."""
+    return choose(paper, TASK)
+
+
+def choose(paper: Any, poses: list[Pose]) -> FrameChoice:
+    """The frames after the calibration of a robot that was taught with its drawing."""
+    return choose_frames(
+        Hexaglide(), paper.branch, taught=paper.nominal, new=paper.actual, poses=PoseBatch.of(poses)
+    )
+
+
+def radius(geometry: Any) -> float:
+    return float(np.linalg.norm(geometry["B"], axis=1).mean())
+
+
+@given(st.tuples(place, place, place), turn, st.tuples(turn, turn, turn))
+def test_the_same_machine_returns_to_the_frames_it_was_taught_in(paper, origin, roll, platform):
+    change = FrameTransform(
+        Rotation.from_rotvec([roll, 0.0, 0.0]).as_matrix(),
+        np.array(origin),
+        Rotation.from_rotvec(platform).as_matrix(),
+    )
+    taught = Hexaglide().change_frames(paper.actual, change)
+    poses = change.poses(PoseBatch.of(TASK))
+    chosen = choose_frames(Hexaglide(), paper.branch, taught=taught, new=paper.actual, poses=poses)
+    assert chosen.found.all()
+    np.testing.assert_allclose(chosen.geometry.vector, taught.vector, atol=1e-8)
+    assert chosen.displacement.position_largest_mm < 1e-8
+    assert chosen.displacement.orientation_largest_deg < 1e-8
+
+
+def test_no_other_frames_move_the_task_poses_less(paper, reach, vector_of, calibrated):
+    """A general minimizer over six numbers, on poses that scipy found, gets as far and no farther."""
+    seen = [reach(paper.actual, paper.nominal, pose)[1] for pose in TASK]
+    wanted = np.array([vector_of(pose) for pose in TASK])
+    length = radius(paper.actual)
+
+    def left(frames):
+        moved = np.array(seen)[:, :3] + frames[:3]
+        turned = Rotation.from_rotvec(np.array(seen)[:, 3:]) * Rotation.from_rotvec(frames[3:])
+        return moved - wanted[:, :3], (turned * Rotation.from_rotvec(wanted[:, 3:]).inv()).as_rotvec()
+
+    def cost(frames):
+        distance, angle = left(frames)
+        return float(np.sum(distance**2) + length**2 * np.sum(angle**2))
+
+    best = minimize(cost, np.zeros(6), method="BFGS", options={"gtol": 1e-7}).x
+    distance, angle = left(best)
+    found = calibrated.displacement
+    np.testing.assert_allclose(found.distances_mm, np.linalg.norm(distance, axis=1), rtol=1e-4)
+    np.testing.assert_allclose(found.angles, np.linalg.norm(angle, axis=1), rtol=1e-4)
+    assert cost(np.zeros(6)) > 1.5 * cost(best)  # the convention's frames move them farther
+
+
+def test_every_free_change_of_the_chosen_frames_moves_the_task_poses_more(paper, calibrated):
+    targets, weights = PoseBatch.of(TASK), np.repeat([1.0, radius(paper.actual)], 3)
+    joints = Hexaglide().inverse(paper.nominal, paper.branch, targets)
+    here = _poses_at(calibrated, joints, targets)
+    least = np.sum((pose_errors(here, targets) * weights) ** 2)
+    for column in FrameFreedom(base="").columns:
+        for size in (-1e-3, 1e-3):
+            step = np.zeros(9)
+            step[column] = size * (100.0 if column < 3 else 1.0)
+            turns = Rotation.from_rotvec(step[3:].reshape(2, 3)).as_matrix()
+            moved = FrameTransform(turns[0], step[:3], turns[1]).poses(here)
+            assert np.sum((pose_errors(moved, targets) * weights) ** 2) > least
+
+
+def test_the_chosen_geometry_has_the_displaced_poses_at_the_joints_of_the_taught_ones(
+    paper, legs, vector_of, calibrated
+):
+    for row, pose in enumerate(TASK):
+        joints = legs(paper.nominal).joints(vector_of(pose))
+        there = legs(calibrated.geometry).closed(joints, vector_of(pose))
+        angle = Rotation.from_rotvec(there[3:]) * Rotation.from_rotvec(vector_of(pose)[3:]).inv()
+        distance = np.linalg.norm(there[:3] - vector_of(pose)[:3])
+        assert distance == pytest.approx(calibrated.displacement.distances_mm[row], abs=1e-7)
+        assert angle.magnitude() == pytest.approx(calibrated.displacement.angles[row], abs=1e-9)
+
+
+def test_the_chosen_geometry_is_the_new_one_in_other_frames(paper, calibrated):
+    back, _ = Hexaglide().normalize_frames(calibrated.geometry)
+    np.testing.assert_allclose(back.vector, paper.actual.vector, atol=1e-9)
+    again = Hexaglide().change_frames(paper.actual, calibrated.frames)
+    np.testing.assert_array_equal(again.vector, calibrated.geometry.vector)
+
+
+def test_the_displacement_does_not_depend_on_the_frames_of_teaching(paper, calibrated):
+    taught = Hexaglide().change_frames(paper.nominal, WORKSHOP)
+    poses = WORKSHOP.poses(PoseBatch.of(TASK))
+    elsewhere = choose_frames(Hexaglide(), paper.branch, taught=taught, new=paper.actual, poses=poses)
+    np.testing.assert_allclose(
+        elsewhere.displacement.distances_mm, calibrated.displacement.distances_mm, rtol=1e-9
+    )
+    expected = Hexaglide().change_frames(calibrated.geometry, WORKSHOP)
+    np.testing.assert_allclose(elsewhere.geometry.vector, expected.vector, atol=1e-8)
+
+
+def test_the_base_is_not_turned_for_the_gauges_stay_along_its_axes(paper, calibrated):
+    np.testing.assert_array_equal(calibrated.frames.base, np.eye(3))
+    taught = Hexaglide().change_frames(paper.nominal, WORKSHOP)
+    poses = WORKSHOP.poses(PoseBatch.of(TASK))
+    chosen = choose_frames(Hexaglide(), paper.branch, taught=taught, new=paper.actual, poses=poses)
+    np.testing.assert_allclose(chosen.frames.base, WORKSHOP.base, atol=1e-12)
+
+
+def test_poses_out_of_reach_do_not_count(paper, calibrated):
+    far = Pose(0.0, 900.0, 550.0)
+    some = choose(paper, [TASK[0], far, *TASK[1:]])
+    assert some.found.tolist() == [True, False, True, True, True]
+    np.testing.assert_allclose(some.geometry.vector, calibrated.geometry.vector, atol=1e-9)
+    assert len(some.displacement.distances_mm) == 4
+
+
+def test_without_a_pose_the_frames_stay_as_the_convention_has_them(paper):
+    for poses in ([], [Pose(0.0, 900.0, 550.0)]):
+        nothing = choose(paper, poses)
+        np.testing.assert_array_equal(nothing.geometry.vector, paper.actual.vector)
+        assert len(nothing.displacement.distances_mm) == 0
+
+
+def test_one_pose_alone_stays_and_its_surroundings_follow_it(paper):
+    alone = choose(paper, TASK[:1])
+    assert alone.displacement.position_largest_mm < 1e-8
+    assert alone.displacement.orientation_largest_deg < 1e-8
+    near = PoseBatch.of([Pose(20.0, -20.0, 560.0, 5.0)])
+    joints = Hexaglide().inverse(paper.nominal, paper.branch, near)
+    distance, *_ = np.linalg.norm(pose_errors(_poses_at(alone, joints, near), near)[:, :3], axis=1)
+    assert distance < 5.0
+
+
+def test_rails_keep_their_direction_whatever_the_poses_ask_for():
+    random = np.random.default_rng(7)
+    targets = PoseBatch.of(Pose(*random.uniform(-200.0, 200.0, 3).tolist()) for _ in range(8))
+    pitch = FrameTransform(
+        Rotation.from_rotvec([0.01, 0.02, 0.03]).as_matrix(), np.array([1.0, 2.0, 3.0]), np.eye(3)
+    )
+    rails = closest_frames(Hexaglide.frame_freedom, 100.0, pitch.poses(targets), targets)
+    np.testing.assert_allclose(rails.base[0], [1.0, 0.0, 0.0], atol=1e-15)
+    left = pose_errors(rails.poses(pitch.poses(targets)), targets)
+    assert np.abs(left[:, :3]).max() > 1.0
+    free = closest_frames(FrameFreedom(), 100.0, pitch.poses(targets), targets)
+    np.testing.assert_allclose(free.base @ pitch.base, np.eye(3), atol=1e-9)
+
+
+def _poses_at(choice: FrameChoice, joints: Any, start: PoseBatch) -> PoseBatch:
+
+    found = forward_kinematics(Hexaglide(), choice.geometry, joints, start)
+    assert found.found.all()
+    return found.poses

@@ -23,7 +23,6 @@ from hexacell.design.predicted_records import GaugeZero, gauge_zero_at
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online, without_gross_errors
-from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.fit import COARSE, INCREMENTAL
 from hexacell.identification.solver.multistart import restarts
@@ -251,7 +250,7 @@ def _continued(problem: Problem, before: Identification) -> Identification:
     if poses is None:
         return estimate_online(problem)
     # While the records leave much open, undamped steps may diverge.
-    options = INCREMENTAL if is_determined(problem) else COARSE
+    options = INCREMENTAL if problem.is_determined else COARSE
     return estimate_online(problem.starting_at(before.free, poses), options)
 
 

@@ -10,7 +10,6 @@ from hexacell.campaign.forecast import Forecaster
 from hexacell.campaign.online_estimate import RecordEstimator
 from hexacell.campaign.pilots import are_counted
 from hexacell.cell.model import CellSettings
-from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.measurements.records import MeasurementSet
 
 REFUSALS = 3
@@ -90,7 +89,7 @@ class StoppingRules:
         if estimate.identification is None:
             return None
         problem = estimate.identification.problem
-        if not is_determined(problem.subset(are_counted(problem))):
+        if not problem.subset(are_counted(problem)).is_determined:
             return None
         worst = self.forecaster.worst_error(state, estimate.belief)
         if worst is None or worst > target:

@@ -16,7 +16,6 @@ from hexacell.checks.check import Check, check_settings
 from hexacell.checks.drift_estimator import DriftEstimator, ScaledEstimate
 from hexacell.design.criteria import add_information
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.problem.data_requirements import is_overdetermined
 from hexacell.identification.problem.prior import IdentifiedBefore, Prior
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
@@ -143,7 +142,7 @@ class QuickLevel:
             return None
         estimate = self._drifting.likeliest(measurements).estimate
         found = estimate.identification
-        if found is None or not is_overdetermined(found.problem):
+        if found is None or not found.problem.is_overdetermined:
             return None
         return self._worst(estimate.belief)
 

@@ -20,7 +20,6 @@ from hexacell.campaign.decisions import (
 from hexacell.campaign.planner import Plan
 from hexacell.dry_run.verdict_forecast import VerdictForecast, predicted_verdicts
 from hexacell.errors import HexacellError, ReachError
-from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
@@ -228,7 +227,7 @@ def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
     except HexacellError:
         return None
     found = estimate.of_records_alone()
-    if found is None or not is_determined(found.problem):
+    if found is None or not found.problem.is_determined:
         return None
     zeros, belief = plan.robot.identified_zeros(found), plan.robot.belief(found)
     belief = belief if zeros is None else replace(belief, covariance=zeros.free_covariance)

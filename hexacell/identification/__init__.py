@@ -13,7 +13,7 @@ of the ball. :func:`.estimator.identify` goes through these steps:
    stations.
 3. ``data_faults/``: :func:`.screen` repeats the fit without records that have a fault. Stepwise selection
    (:mod:`.stepwise_selection`) takes :mod:`.hypotheses` by :mod:`.score_tests` forward, by trial refits
-   where a fit is unreliable (:mod:`.hypothesis_search`), and gives records back by
+   where a fit is unreliable (:mod:`.trial_fits`), and gives records back by
    :mod:`.deletion_tests`. The words are added at the end (:mod:`.messages`).
 4. The result is an :class:`.Identification`: parameters, covariance, tests of the residuals, data faults.
 

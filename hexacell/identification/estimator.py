@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hexacell.identification.data_faults.hypothesis_search import LARGEST_REJECTED_SHARE
 from hexacell.identification.data_faults.score_tests import OutlierStatistics
 from hexacell.identification.data_faults.stepwise_selection import screen
+from hexacell.identification.data_faults.trial_fits import LARGEST_REJECTED_SHARE
 from hexacell.identification.problem.data_requirements import (
-    is_overdetermined,
     require_enough_records,
     require_rotation_diversity,
 )
@@ -74,7 +73,7 @@ def without_gross_errors(found: Identification) -> Iterator[Identification]:
     while rejected < largest:
         ratio = OutlierStatistics.of(found.linear_model).threshold_ratio(rejected)
         kept = np.arange(found.records) != int(np.argmax(ratio))
-        if ratio.max() <= 1.0 or not is_overdetermined(found.problem.subset(kept)):
+        if ratio.max() <= 1.0 or not found.problem.subset(kept).is_overdetermined:
             return
         everywhere = np.ones(found.records, dtype=bool)
         some = found.problem.starting_at(found.free, found.poses, everywhere).subset(kept)

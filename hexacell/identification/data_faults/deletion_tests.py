@@ -13,8 +13,8 @@ them. The less they are, the further beyond its critical value the statistic of 
 - the rest agrees, or agrees well without several faults, of which the most significant counts: 4 times;
 - the rest disagrees: 10 times, by the scatter that the records really have. No imperfect machine does that.
 
-The agreement of the rest is evidence only with equations to spare (:func:`.is_overdetermined`). What is not
-proven stays in the fit, and no cause is named.
+The agreement of the rest is evidence only with equations to spare (:attr:`.Problem.is_overdetermined`).
+What is not proven stays in the fit, and no cause is named.
 
 The factors separate the worlds of ``tests/benchmarks/worlds``: the largest statistic of an imperfect
 machine is 4.1 critical values, and that of a reading off by 0.5 mm in a good one at least 4.8.
@@ -30,14 +30,13 @@ import numpy as np
 from hexacell.distributions import chi_square_limit
 from hexacell.identification.data_faults.hypotheses import (
     GAUGE_FAULTS,
-    CorrectedFit,
     FaultHypothesis,
     OutlierHypothesis,
     ZeroShiftHypothesis,
 )
 from hexacell.identification.data_faults.score_tests import OutlierStatistics
+from hexacell.identification.data_faults.trial_fits import CorrectedFit
 from hexacell.identification.problem.commanded_poses import ACCEPTED_MM
-from hexacell.identification.problem.data_requirements import is_overdetermined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linear_model import LinearizedModel
@@ -190,7 +189,7 @@ def proven_faults(
 ) -> tuple[FaultHypothesis, ...]:
     """The faults of a fit that the rest of its records proves; ``tests`` are those of the left-out ones."""
     rest = selected.fit.goodness
-    can_prove = is_overdetermined(selected.fit.problem)
+    can_prove = selected.fit.problem.is_overdetermined
     records = {record: _significance(tests[record], can_prove) for record in selected.rejected}
     shifts = {shift: shift.significance for shift in selected.zero_shifts}
     significances = [*shifts.values(), *records.values()]

@@ -1,4 +1,4 @@
-"""Hypotheses on what is wrong with some records, and fits of records that are corrected for them.
+"""Hypotheses on what is wrong with some records, and what the records are without it.
 
 There are three kinds. A gross error concerns single records, which disagree with all the others. When the
 zero of the gauges shifts, all later records of the point are off by one constant. A gauge fault (gauges
@@ -15,24 +15,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.chi_square import ChiSquareVerdict
-from hexacell.identification.solver.fit import QUICK, fit_regularized
-from hexacell.identification.solver.result import GAUGES, DataFaultKind, Identification
+from hexacell.identification.solver.result import GAUGES, DataFaultKind
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import RecordId
 
 PENALTY_PER_UNKNOWN = 10.0
 """How much a hypothesis must lower the chi-square for each number that it is free to choose."""
-
-SUFFICIENT_DECREASE = 20.0
-"""Factor of the mean square residual for a hypothesis to count although the fit is not yet consistent."""
-
-SETTLING_DECREASE = 400.0
-SETTLING_MISFIT = 4.0
-"""Factor and largest mean square residual for a hypothesis to need no comparison with others."""
-
-LARGEST_TRUSTED_RATIO = 10.0
-"""Residuals over the stated noise up to which first-order tests around the solution are valid."""
 
 MM_PER_INCH = 25.4
 
@@ -156,100 +144,3 @@ class GaugeFaultHypothesis(FaultHypothesis):
 
 
 ALL_IN_INCHES = GaugeFaultHypothesis(gain=0.0, unknowns=0, gauge_fault=GAUGE_FAULTS[-1], point=None)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CorrectedFit:
-    """A fit of records that are corrected for data faults.
-
-    Attributes:
-        original: all records as measured.
-        problem: the records after correction.
-        fit: of those; the solver may have left out some of them, next to a singularity.
-        faults: what was corrected, in the order of selection.
-    """
-
-    original: Problem
-    problem: Problem
-    fit: Identification
-    faults: tuple[FaultHypothesis, ...] = ()
-
-    @classmethod
-    def uncorrected(cls, problem: Problem) -> CorrectedFit:
-        """The fit of all records as measured."""
-        return cls(problem, problem, fit_regularized(problem, QUICK))
-
-    def corrected_for(self, hypothesis: FaultHypothesis) -> CorrectedFit:
-        """The fit after correction for one more fault."""
-        problem = hypothesis.corrected(self.problem)
-        fit = fit_regularized(problem, QUICK)
-        return replace(self, problem=problem, fit=fit, faults=(*self.faults, hypothesis))
-
-    def converged(self) -> CorrectedFit:
-        """The fit with the solver's full number of iterations, where the quick fit was cut short."""
-        if self.fit.converged:
-            return self
-        return replace(self, fit=fit_regularized(self.problem))
-
-    @property
-    def rejected(self) -> list[RecordId]:
-        """The records rejected for gross errors."""
-        outliers = (fault for fault in self.faults if isinstance(fault, OutlierHypothesis))
-        return [record for outlier in outliers for record in outlier.records]
-
-    @property
-    def zero_shifts(self) -> list[ZeroShiftHypothesis]:
-        """The shifts of the gauges' zero that were corrected."""
-        return [fault for fault in self.faults if isinstance(fault, ZeroShiftHypothesis)]
-
-    def after(self, shift: ZeroShiftHypothesis) -> list[RecordId]:
-        """All records after a shift of the zero."""
-        return self.original.subset(shift.rows(self.original)).record_ids
-
-    @property
-    def lost(self) -> int:
-        """How many records the solver left out."""
-        return self.problem.records - self.fit.records
-
-    @property
-    def is_reliable(self) -> bool:
-        """Whether the solution is good enough for first-order tests around it."""
-        is_near = self.fit.goodness.ratio <= LARGEST_TRUSTED_RATIO
-        return not self.lost and self.fit.converged and is_near
-
-    @property
-    def is_consistent(self) -> bool:
-        """Whether all records agree with the stated noise."""
-        return self.is_reliable and self.fit.goodness.agreement is not ChiSquareVerdict.TOO_LARGE
-
-    @property
-    def misfit(self) -> float:
-        """The mean square residual; a lost record counts as one at the largest trusted ratio."""
-        squares = self.fit.goodness.ratio**2 * self.fit.records + LARGEST_TRUSTED_RATIO**2 * self.lost
-        return squares / self.problem.records
-
-    def is_better_by_far_than(self, other: CorrectedFit) -> bool:
-        """Whether it explains so much more that it is right although something else is still wrong."""
-        return self.misfit < other.misfit / SUFFICIENT_DECREASE
-
-    def settles(self, other: CorrectedFit) -> bool:
-        """Whether no other hypothesis can explain it better: it agrees, or an imperfect machine is left."""
-        is_near_noise = self.is_reliable and self.misfit <= SETTLING_MISFIT
-        return self.is_consistent or (is_near_noise and self.misfit < other.misfit / SETTLING_DECREASE)
-
-
-class UncorrectableFaultError(Exception):
-    """A fault of the records that cannot be corrected by leaving some of them out.
-
-    Attributes:
-        fault: what is wrong.
-        before: the fit that does not explain it.
-        after: the fit corrected for it.
-        left: the records that are left without it.
-    """
-
-    def __init__(
-        self, fault: FaultHypothesis, before: CorrectedFit, after: CorrectedFit, left: Problem
-    ) -> None:
-        super().__init__(fault)
-        self.fault, self.before, self.after, self.left = fault, before, after, left

@@ -9,13 +9,11 @@ import numpy as np
 from hexacell.identification.data_faults.deletion_tests import DeletionTest
 from hexacell.identification.data_faults.hypotheses import (
     MM_PER_INCH,
-    CorrectedFit,
     GaugeFault,
     GaugeFaultHypothesis,
-    UncorrectableFaultError,
     ZeroShiftHypothesis,
 )
-from hexacell.identification.problem.data_requirements import equations
+from hexacell.identification.data_faults.trial_fits import CorrectedFit, UncorrectableFaultError
 from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
 from hexacell.measurements.records import Deviation, RecordId
 
@@ -37,7 +35,7 @@ def refused(error: UncorrectableFaultError) -> DataFault:
     """A fault for which the data are refused."""
     match error.fault:
         case ZeroShiftHypothesis() as shift:
-            found = equations(error.left)
+            found = error.left.equations
             consequence = f", and the records before it and at the other points give only {found} equations"
             return _zero_shift(shift, consequence)
         case GaugeFaultHypothesis() as fault:

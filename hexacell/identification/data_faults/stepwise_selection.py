@@ -7,7 +7,7 @@ of the chi-square, is a score statistic that needs no second fit (:mod:`.score_t
 
 1. Forward (:func:`_forward`). Fit the records. Of all significant hypotheses take the one of lowest cost
    that a refit of the corrected records confirms, and repeat. Where the fit is unreliable, first-order
-   tests around it are not valid: hypotheses are tried by refits instead (:mod:`.hypothesis_search`).
+   tests around it are not valid: hypotheses are tried by refits instead (:mod:`.trial_fits`).
 2. Backward (:func:`_readmitted`). Test each rejected record against the final fit, in which it takes no
    part, readmit those that agree, and go forward again.
 3. Proof (:func:`_only_proven`). Readmit those whose fault the rest of the records does not prove
@@ -37,20 +37,19 @@ from hexacell.identification.data_faults import messages
 from hexacell.identification.data_faults.deletion_tests import deletion_tests, proven_faults
 from hexacell.identification.data_faults.hypotheses import (
     ALL_IN_INCHES,
-    CorrectedFit,
     FaultHypothesis,
     GaugeFaultHypothesis,
     OutlierHypothesis,
-    UncorrectableFaultError,
     ZeroShiftHypothesis,
 )
-from hexacell.identification.data_faults.hypothesis_search import (
+from hexacell.identification.data_faults.trial_fits import (
     LARGEST_REJECTED_SHARE,
+    CorrectedFit,
+    UncorrectableFaultError,
     hypotheses_at_solution,
     refitted,
     search,
 )
-from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.fit import FINE, fit_regularized
 from hexacell.identification.solver.multistart import restarts
@@ -134,8 +133,9 @@ def confirmed_by_refit(current: CorrectedFit, hypothesis: FaultHypothesis) -> Co
     must have a sufficient part of the first-order gain, and be a proof: it agrees with the noise, or is
     better by far.
     """
-    if isinstance(hypothesis, OutlierHypothesis) and not is_determined(
-        hypothesis.corrected(current.problem)
+    if (
+        isinstance(hypothesis, OutlierHypothesis)
+        and not hypothesis.corrected(current.problem).is_determined
     ):
         return None
     corrected = refitted(current, hypothesis)
@@ -151,7 +151,7 @@ def _require_correctable(current: CorrectedFit, extended: CorrectedFit) -> None:
     left = current.problem
     for fault in extended.faults[len(current.faults) :]:
         left = fault.corrected(left)
-        is_refused_shift = isinstance(fault, ZeroShiftHypothesis) and not is_determined(left)
+        is_refused_shift = isinstance(fault, ZeroShiftHypothesis) and not left.is_determined
         if is_refused_shift or isinstance(fault, GaugeFaultHypothesis):
             raise UncorrectableFaultError(fault, current, extended, left)
 

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.errors import IdentifiabilityError
-from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY, ChiSquareTest
 from hexacell.identification.solver.fit import FINE, solve_around_singularities
@@ -68,7 +67,7 @@ def leave_one_point_out(found: Identification) -> tuple[PointPrediction, ...]:
     return tuple(
         PointPrediction(point, _prediction_test(costs, rows))
         for point, rows in each
-        if is_determined(found.problem.subset(~rows))
+        if found.problem.subset(~rows).is_determined
     )
 
 

@@ -15,28 +15,6 @@ SAME_AXIS_RATIO = 0.02
 SMALLEST_ROTATION = 1e-3
 """rad, root mean square; below it the platform counts as not rotated."""
 
-LEAST_SPARE_EQUATIONS = 13
-"""Beyond the parameters, from which the agreement of some records is a proof: fewer agree by chance."""
-
-MAX_COUNTED_POSES = 1000
-"""With more records, all poses count as different."""
-
-
-def equations(problem: Problem) -> int:
-    """The number of equations: three for each different pose, minus three for each point's reference."""
-    return 3 * (_different_poses(problem) - problem.points)
-
-
-def is_determined(problem: Problem) -> bool:
-    """Whether at least two points give at least as many equations as parameters."""
-    return problem.points >= 2 and equations(problem) >= len(problem.prior.covariance)
-
-
-def is_overdetermined(problem: Problem) -> bool:
-    """Whether at least two points give so many equations to spare that their agreement proves something."""
-    spare = equations(problem) - len(problem.prior.covariance)
-    return problem.points >= 2 and spare >= LEAST_SPARE_EQUATIONS
-
 
 def require_enough_records(problem: Problem) -> None:
     """Require enough points and different poses to determine the parameters.
@@ -50,10 +28,10 @@ def require_enough_records(problem: Problem) -> None:
             f"records at one point cannot determine the {parameters} parameters, whatever their number",
             action="Measure at two points at least",
         )
-    found = equations(problem)
+    found = problem.equations
     if found < parameters:
         missing = -(-(parameters - found) // 3)
-        repeated = problem.records - _different_poses(problem)
+        repeated = problem.records - problem.different_poses
         repeats = f", {repeated} of them of a pose measured before," if repeated else ""
         raise IdentifiabilityError(
             f"{problem.records} records at {problem.points} points{repeats} give {found} equations for "
@@ -102,13 +80,3 @@ def _axis_and_missing(direction: Array) -> tuple[str, str]:
     return axis, " and ".join(
         rotation for name, rotation in rotations_about.items() if name != axis
     ) + " too"
-
-
-def _different_poses(problem: Problem) -> int:
-    """The number of different poses."""
-    if problem.records > MAX_COUNTED_POSES:
-        return problem.records
-    poses = problem.commands.poses
-    matrices = poses.rotations.reshape(-1, 9)
-    numbers = np.column_stack([problem.labels[:, 0], poses.positions, matrices]).round(9)
-    return len(set(map(tuple, numbers.tolist())))

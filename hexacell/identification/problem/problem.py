@@ -32,6 +32,12 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import MeasurementSet, RecordId
 
+LEAST_SPARE_EQUATIONS = 13
+"""Equations beyond the parameters from which agreement is a proof: fewer agree by chance."""
+
+MAX_COUNTED_POSES = 1000
+"""Number of records above which all poses count as different."""
+
 Values = TypeVar("Values", Array, Mask)
 
 
@@ -97,6 +103,32 @@ class Problem:
     def coordinates(self) -> int:
         """The number of measured coordinates, less the unknown constants of the points."""
         return 3 * (self.records - self.points)
+
+    @property
+    def different_poses(self) -> int:
+        """The number of different poses."""
+        if self.records > MAX_COUNTED_POSES:
+            return self.records
+        poses = self.commands.poses
+        matrices = poses.rotations.reshape(-1, 9)
+        numbers = np.column_stack([self.labels[:, 0], poses.positions, matrices]).round(9)
+        return len(set(map(tuple, numbers.tolist())))
+
+    @property
+    def equations(self) -> int:
+        """Three equations for each different pose, less three for each point's reference."""
+        return 3 * (self.different_poses - self.points)
+
+    @property
+    def is_determined(self) -> bool:
+        """Whether at least two points give at least as many equations as parameters."""
+        return self.points >= 2 and self.equations >= len(self.prior.covariance)
+
+    @property
+    def is_overdetermined(self) -> bool:
+        """Whether at least two points give so many equations to spare that agreement proves something."""
+        spare = self.equations - len(self.prior.covariance)
+        return self.points >= 2 and spare >= LEAST_SPARE_EQUATIONS
 
     def geometry(self, free: Array) -> Geometry:
         """The geometry of free parameters (p,), mm."""

@@ -17,7 +17,6 @@ from hexacell.campaign.online_estimate import (
 )
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import estimate_online
-from hexacell.identification.problem.data_requirements import is_overdetermined
 from hexacell.identification.solver import multistart
 from hexacell.measurements.records import MeasurementSet
 
@@ -77,7 +76,7 @@ def test_a_false_record_is_left_out_as_soon_as_the_others_prove_it(noisy, chain)
     spoilt = with_change(noisy, OTHERS, one_mm_more)
     every = chain(spoilt)
     first = next(number for number, one in enumerate(every) if one.false_records)
-    assert is_overdetermined(every[first].identification.problem)
+    assert every[first].identification.problem.is_overdetermined
     assert all(one.false_records == {OTHERS} for one in every[first:])
     assert first < 25
 

@@ -9,13 +9,9 @@ import pytest
 
 from hexacell.identification.data_faults import deletion_tests as proof
 from hexacell.identification.data_faults.deletion_tests import required_significance
-from hexacell.identification.data_faults.hypotheses import (
-    ALL_IN_INCHES,
-    LARGEST_TRUSTED_RATIO,
-    CorrectedFit,
-)
-from hexacell.identification.data_faults.hypothesis_search import refitted
+from hexacell.identification.data_faults.hypotheses import ALL_IN_INCHES
 from hexacell.identification.data_faults.stepwise_selection import confirmed_by_refit
+from hexacell.identification.data_faults.trial_fits import LARGEST_TRUSTED_RATIO, CorrectedFit, refitted
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.fit import fit_regularized

@@ -1,4 +1,4 @@
-"""The search for data faults where the fit itself is wrong: each candidate is tried by a refit.
+"""Fits corrected for data faults, and the search for faults by such fits where the fit itself is wrong.
 
 First-order tests around a wrong solution are unreliable. The drawing is a better expansion point: it is
 within millimetres of the truth, whatever the gauges read. The candidates, in the order in which they are
@@ -21,7 +21,7 @@ each other around a fit to all of them, and show around one that they did not in
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 
 import numpy as np
@@ -29,7 +29,6 @@ import numpy as np
 from hexacell.distributions import chi_square_limit
 from hexacell.identification.data_faults.hypotheses import (
     SPLIT_POINT,
-    CorrectedFit,
     FaultHypothesis,
     GaugeFaultHypothesis,
     OutlierHypothesis,
@@ -40,13 +39,24 @@ from hexacell.identification.data_faults.score_tests import (
     rank_hypotheses,
     score_gauge_faults,
 )
-from hexacell.identification.problem.data_requirements import is_determined, is_overdetermined
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.chi_square import ChiSquareTest
+from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
+from hexacell.identification.solver.fit import QUICK, fit_regularized
 from hexacell.identification.solver.linear_model import LinearizedModel
 from hexacell.identification.solver.measurement_model import predict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.measurements.records import RecordId
+
+SUFFICIENT_DECREASE = 20.0
+"""Factor of the mean square residual for a hypothesis to count although the fit is not yet consistent."""
+
+SETTLING_DECREASE = 400.0
+SETTLING_MISFIT = 4.0
+"""Factor and largest mean square residual for a hypothesis to need no comparison with others."""
+
+LARGEST_TRUSTED_RATIO = 10.0
+"""Residuals over the stated noise up to which first-order tests around the solution are valid."""
 
 LARGEST_REJECTED_SHARE = 0.1
 """Share of all records above which those that disagree are not single mistakes."""
@@ -58,6 +68,103 @@ LARGEST_TRIMMED_SHARE = 0.25
 
 SIGNIFICANCE = 1e-4
 """Probability that a good record counts as an outlier around the drawing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CorrectedFit:
+    """A fit of records that are corrected for data faults.
+
+    Attributes:
+        original: all records as measured.
+        problem: the records after correction.
+        fit: of those; the solver may have left out some of them, next to a singularity.
+        faults: what was corrected, in the order of selection.
+    """
+
+    original: Problem
+    problem: Problem
+    fit: Identification
+    faults: tuple[FaultHypothesis, ...] = ()
+
+    @classmethod
+    def uncorrected(cls, problem: Problem) -> CorrectedFit:
+        """The fit of all records as measured."""
+        return cls(problem, problem, fit_regularized(problem, QUICK))
+
+    def corrected_for(self, hypothesis: FaultHypothesis) -> CorrectedFit:
+        """The fit after correction for one more fault."""
+        problem = hypothesis.corrected(self.problem)
+        fit = fit_regularized(problem, QUICK)
+        return replace(self, problem=problem, fit=fit, faults=(*self.faults, hypothesis))
+
+    def converged(self) -> CorrectedFit:
+        """The fit with the solver's full number of iterations, where the quick fit was cut short."""
+        if self.fit.converged:
+            return self
+        return replace(self, fit=fit_regularized(self.problem))
+
+    @property
+    def rejected(self) -> list[RecordId]:
+        """The records rejected for gross errors."""
+        outliers = (fault for fault in self.faults if isinstance(fault, OutlierHypothesis))
+        return [record for outlier in outliers for record in outlier.records]
+
+    @property
+    def zero_shifts(self) -> list[ZeroShiftHypothesis]:
+        """The shifts of the gauges' zero that were corrected."""
+        return [fault for fault in self.faults if isinstance(fault, ZeroShiftHypothesis)]
+
+    def after(self, shift: ZeroShiftHypothesis) -> list[RecordId]:
+        """All records after a shift of the zero."""
+        return self.original.subset(shift.rows(self.original)).record_ids
+
+    @property
+    def lost(self) -> int:
+        """How many records the solver left out."""
+        return self.problem.records - self.fit.records
+
+    @property
+    def is_reliable(self) -> bool:
+        """Whether the solution is good enough for first-order tests around it."""
+        is_near = self.fit.goodness.ratio <= LARGEST_TRUSTED_RATIO
+        return not self.lost and self.fit.converged and is_near
+
+    @property
+    def is_consistent(self) -> bool:
+        """Whether all records agree with the stated noise."""
+        return self.is_reliable and self.fit.goodness.agreement is not ChiSquareVerdict.TOO_LARGE
+
+    @property
+    def misfit(self) -> float:
+        """The mean square residual; a lost record counts as one at the largest trusted ratio."""
+        squares = self.fit.goodness.ratio**2 * self.fit.records + LARGEST_TRUSTED_RATIO**2 * self.lost
+        return squares / self.problem.records
+
+    def is_better_by_far_than(self, other: CorrectedFit) -> bool:
+        """Whether it explains so much more that it is right although something else is still wrong."""
+        return self.misfit < other.misfit / SUFFICIENT_DECREASE
+
+    def settles(self, other: CorrectedFit) -> bool:
+        """Whether no other hypothesis can explain it better: it agrees, or an imperfect machine is left."""
+        is_near_noise = self.is_reliable and self.misfit <= SETTLING_MISFIT
+        return self.is_consistent or (is_near_noise and self.misfit < other.misfit / SETTLING_DECREASE)
+
+
+class UncorrectableFaultError(Exception):
+    """A fault of the records that cannot be corrected by leaving some of them out.
+
+    Attributes:
+        fault: what is wrong.
+        before: the fit that does not explain it.
+        after: the fit corrected for it.
+        left: the records that are left without it.
+    """
+
+    def __init__(
+        self, fault: FaultHypothesis, before: CorrectedFit, after: CorrectedFit, left: Problem
+    ) -> None:
+        super().__init__(fault)
+        self.fault, self.before, self.after, self.left = fault, before, after, left
 
 
 def search(current: CorrectedFit) -> CorrectedFit | None:
@@ -81,7 +188,7 @@ def refitted(current: CorrectedFit, hypothesis: FaultHypothesis) -> CorrectedFit
     match hypothesis:
         case ZeroShiftHypothesis() if not _is_constant(current, hypothesis):
             return None
-        case GaugeFaultHypothesis() if not is_overdetermined(current.problem):
+        case GaugeFaultHypothesis() if not current.problem.is_overdetermined:
             return None
     return current.corrected_for(hypothesis)
 
@@ -89,9 +196,9 @@ def refitted(current: CorrectedFit, hypothesis: FaultHypothesis) -> CorrectedFit
 def _is_constant(current: CorrectedFit, shift: ZeroShiftHypothesis) -> bool:
     """Whether the records after a shift of the zero agree with the others up to a constant."""
     split = CorrectedFit.uncorrected(shift.split(current.problem))
-    if not split.is_reliable or not is_overdetermined(split.problem):
+    if not split.is_reliable or not split.problem.is_overdetermined:
         return False
-    if not split.is_consistent and not is_determined(shift.corrected(current.problem)):
+    if not split.is_consistent and not shift.corrected(current.problem).is_determined:
         return False
     concerned = np.isin(split.fit.problem.labels[:, 0], [shift.point, SPLIT_POINT])
     statistics = OutlierStatistics.of(split.fit.linear_model)

@@ -65,7 +65,7 @@ def as_written(settings: CellSettings, robot: Robot, identified: Geometry) -> Wr
 
     With zeros alone it keeps its frames: other ones would change all its numbers.
     """
-    if robot.taught is None or robot.identifies is not ParameterChoice.ALL:
+    if robot.identifies is not ParameterChoice.ALL:
         return WrittenGeometry(robot.for_controller(identified), None)
     choice = choose_frames(
         robot.mechanism,

@@ -61,8 +61,7 @@ class Robot:
         known: what is known before measuring, if that is more than the drawing with its tolerances.
         known_effects: what the systematic effects did to that, as errors (p, k) of the free parameters by
             the name of the effect.
-        taught: the geometry with which points and frames were taught last, in the frames of that time; None
-            if they are taken to be those of the convention.
+        taught: the geometry with which points and frames were taught last, in the frames of that time.
         earlier: geometries that may have commanded older records: the drawing, the taught one, and those
             that the controller had before in the same run.
         work_frame: the axes of the controller's base frame about which a work frame can be taught.
@@ -79,11 +78,11 @@ class Robot:
     noise: Noise
     limits: Limits
     frames: FrameTransform
+    taught: Geometry
     provisional: tuple[Geometry, ...] = ()
     uses_provisional: bool = False
     known: Prior | None = None
     known_effects: Mapping[str, Array] = field(default_factory=dict)
-    taught: Geometry | None = None
     earlier: tuple[CommandingGeometry, ...] = ()
     work_frame: str = "xyz"
     effects: tuple[Effect, ...] = ()
@@ -332,15 +331,13 @@ def robot_of_start(
     settings: CellSettings,
     controller: GeometryDocument,
     branch: Branch,
-    taught: GeometryDocument | None,
+    taught: GeometryDocument,
     limits: ControllerLimits,
 ) -> Robot:
     """The robot of a cell's settings and of what its controller had at the start of a run."""
     parameters = settings.mechanism.parameters
     commanding = ControllerGeometry(Geometry.of(parameters, controller), branch, limits)
-    return make_robot(
-        settings, commanding, taught=None if taught is None else Geometry.of(parameters, taught)
-    )
+    return make_robot(settings, commanding, taught=Geometry.of(parameters, taught))
 
 
 def noise_of(settings: CellSettings) -> Noise:
@@ -357,7 +354,10 @@ def noise_of(settings: CellSettings) -> Noise:
 def make_robot(
     settings: CellSettings, controller: ControllerGeometry, *, taught: Geometry | None = None
 ) -> Robot:
-    """The robot of a cell's settings and a controller geometry; ``taught`` as in :class:`Robot`."""
+    """The robot of a cell's settings and a controller geometry.
+
+    ``taught`` is the geometry with which points and frames were taught; by default the controller's.
+    """
     mechanism = settings.mechanism
     nominal = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
     drawn = CommandingGeometry.of(mechanism, nominal)
@@ -371,7 +371,7 @@ def make_robot(
         noise=noise_of(settings),
         limits=stated_limits(settings, controller, frames),
         frames=frames,
-        taught=taught,
+        taught=controller.geometry if taught is None else taught,
         earlier=(drawn,) if taught is None else (drawn, CommandingGeometry.of(mechanism, taught)),
         work_frame=settings.task.work_frame,
         effects=stated_effects(settings),

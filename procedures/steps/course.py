@@ -26,10 +26,9 @@ if TYPE_CHECKING:
 class RunStarted(BaseEvent):
     """The first event of a run.
 
-    ``taught`` is the geometry with which the robot was taught last, in frames of its own. Without it the
-    result is written in frames by the mechanism's convention. ``accepted`` is the result that a check, the
-    quick level or a length check starts from, if there is one. ``length_check`` is whether a calibration
-    has one.
+    ``taught`` is the geometry with which the robot was taught last, in frames of its own. ``accepted`` is
+    the result that a check, the quick level or a length check starts from, if there is one.
+    ``length_check`` is whether a calibration has one.
     ``joint_ranges`` are those of cell file and config together, mm; ``limits`` are what the controller's
     config and its INI file state.
     ``expired`` are the instruments whose certificate had expired on the day it began.
@@ -48,11 +47,11 @@ class RunStarted(BaseEvent):
     branch: Branch
     devices: tuple[DeviceIdentity, ...]
     pose_list: str | None = None
-    taught: GeometryDocument | None = None
+    taught: GeometryDocument
     accepted: AcceptedResult | None = None
     length_check: bool = False
-    joint_ranges: tuple[tuple[float, float], ...] | None = None
-    limits: ControllerLimits = ControllerLimits()
+    joint_ranges: tuple[tuple[float, float], ...]
+    limits: ControllerLimits
     expired: tuple[str, ...] = ()
     further_configs: tuple[str, ...] = ()
 

@@ -27,6 +27,7 @@ from hexacell.cell.simulation import SimulatedFault
 from hexacell.checks.check_result import check_line, check_result
 from hexacell.cli.app import main
 from hexacell.config.change import propose
+from hexacell.config.interface import ControllerLimits
 from hexacell.config.layout import fingerprint
 from hexacell.config.write_back import commit, rollback
 from hexacell.dry_run.campaign import VirtualCampaign
@@ -253,7 +254,6 @@ class VirtualNight:
 
     def _started(self) -> events.RunStarted:
         robot = self.calibration.robot
-        assert robot.taught is not None
         return events.RunStarted(
             software="hexacell 0",
             cell=self.cell.settings.name,
@@ -265,6 +265,8 @@ class VirtualNight:
             branch=robot.branch,
             devices=(),
             taught=robot.taught.document(),
+            joint_ranges=robot.limits.joint_ranges,
+            limits=ControllerLimits(),
             accepted=self.calibration.accepted,
         )
 

@@ -215,7 +215,7 @@ def run_started(
         branch=robot.branch,
         devices=identities,
         pose_list=None if calibration.listed is None else read_text(calibration.listed.path),
-        taught=None if robot.taught is None else robot.taught.document(),
+        taught=robot.taught.document(),
         accepted=calibration.accepted,
         joint_ranges=robot.limits.joint_ranges,
         limits=controller_geometry(cell).limits,

@@ -148,14 +148,6 @@ def test_the_frames_are_those_of_teaching_whatever_the_controller_has_now(cell, 
     np.testing.assert_allclose(written.geometry.vector, taught.vector, atol=1e-8)
 
 
-def test_a_run_that_noted_nothing_taught_writes_in_the_conventions_frames(cell, paper, taught_with):
-    robot = replace(taught_with(Hexaglide().change_frames(paper.nominal, WORKSHOP)), taught=None)
-    written = as_written(cell.settings, robot, paper.actual)
-    expected = Hexaglide().change_frames(paper.actual, WORKSHOP)
-    np.testing.assert_allclose(written.geometry.vector, expected.vector, atol=1e-9)
-    assert written.displacement is None
-
-
 def test_without_task_poses_those_across_the_workspace_count(cell, paper, taught_with):
     nameless = cell.settings.model_copy(update={"task": TaskSettings()})
     displacement = as_written(nameless, taught_with(paper.nominal), paper.actual).displacement

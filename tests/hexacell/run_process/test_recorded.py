@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from hexacell.config.interface import ControllerLimits
 from hexacell.errors import FileError, UsageError
 from hexacell.run_process.messages import (
     CursorMoved,
@@ -36,7 +37,8 @@ KEY = SetKey(phase=Phase.IDENTIFY, point=1)
 POSE = (100.0, -100.0, 500.0, 0.0, 0.0, 0.0)
 STARTED = events.RunStarted(
     software="hexacell 0", cell="a cell", cell_text="", mode="optimise", config="c", config_sha256="",
-    controller={}, branch=(1, 1, 1, 1, 1, 1), devices=(),
+    controller={}, branch=(1, 1, 1, 1, 1, 1), devices=(), taught={}, joint_ranges=(),
+    limits=ControllerLimits(),
 )  # fmt: skip
 HISTORY: tuple[Any, ...] = (
     STARTED,

@@ -10,6 +10,7 @@ from typing import Any
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.change import ConfigChange, propose
+from hexacell.config.interface import ControllerLimits
 from hexacell.config.layout import fingerprint
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import config_layout, robot_of
@@ -93,6 +94,9 @@ def _history(
             controller=calibration.robot.controller.document(),
             branch=calibration.robot.branch,
             devices=(),
+            taught=calibration.robot.taught.document(),
+            joint_ranges=calibration.robot.limits.joint_ranges,
+            limits=ControllerLimits(),
         ),
         events.Proposed(gates=gates, written=change.after),
     ]

@@ -11,6 +11,7 @@ import numpy as np
 
 from hexacell.cell.loader import Cell
 from hexacell.checks.check_result import CheckResult
+from hexacell.config.interface import ControllerLimits
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
@@ -103,6 +104,9 @@ class Nights:
             controller=self.robot.controller.document(),
             branch=self.robot.branch,
             devices=(),
+            taught=self.robot.taught.document(),
+            joint_ranges=self.robot.limits.joint_ranges,
+            limits=ControllerLimits(),
             accepted=accepted,
         )
         history = [started, *map(self.taken, records), result, events.Ended(exit_code=0, line="over")]

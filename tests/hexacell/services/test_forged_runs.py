@@ -57,10 +57,6 @@ FORGERIES: dict[str, tuple[Callable[[History], None], str]] = {
         lambda h: changed(h, events.RunStarted, joint_ranges=((-800.0, 800.0),) * 6),
         "states other limits than",
     ),
-    "no joint ranges": (
-        lambda h: changed(h, events.RunStarted, joint_ranges=None),
-        "states other limits than",
-    ),
     "wider limits of the controller": (
         lambda h: changed(h, events.RunStarted, limits=ControllerLimits(axes=((-1e3, 1e3),) * 6)),
         "states other limits than",

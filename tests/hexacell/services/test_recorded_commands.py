@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
+from hexacell.config.interface import ControllerLimits
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.geometry import Geometry
@@ -66,6 +67,9 @@ def started(controller: Geometry, paper) -> events.RunStarted:
         controller=controller.document(),
         branch=paper.branch,
         devices=(),
+        taught=controller.document(),
+        joint_ranges=(),
+        limits=ControllerLimits(),
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import dataclasses
 import itertools
 import random
 import time
@@ -17,7 +16,6 @@ import pytest
 
 from drivers.errors import GaugeAtEnd
 from hexacell.errors import HexacellError, LimitError
-from hexacell.robot.model import robot_of
 from hexacell.services.run.calibration_run import calibration_of_run
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Mode
@@ -27,7 +25,7 @@ from procedures.replay.comparison import Aspect, ReplayReport
 from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Replayer, Scope
 from procedures.run.keys import Phase, SetKey
-from procedures.run.state import RunState, fold
+from procedures.run.state import RunState
 from procedures.steps import events
 
 Replay = Callable[..., ReplayReport]
@@ -72,21 +70,6 @@ def test_a_run_is_reproduced(recording, replay) -> None:
     assert report.decisions == len(begun)
     assert report.results == len(begun) + 1, "every step has its result, and so has the run"
     assert report.taken == 1, "only the beginning is taken as it stands"
-
-
-def test_a_run_without_a_taught_geometry_is_reproduced(make_rig, replay) -> None:
-    """It writes its result in frames by the mechanism's convention."""
-    rig = make_rig()
-    robot = dataclasses.replace(robot_of(rig.cell), taught=None)
-    rig.calibration = dataclasses.replace(rig.calibration, robot=robot)
-    rig.performer = dataclasses.replace(rig.performer, calibration=rig.calibration)
-    asyncio.run(rig.run())
-    history = read_journal(rig.folder.journal)
-    state = fold(history)
-    assert state.started is not None
-    assert state.started.taught is None
-    assert any(isinstance(event, events.RecordTaken) and event.at.phase is Phase.AFTER for event in history)
-    assert replay(history, rig).differences == []
 
 
 def test_a_check_is_reproduced(make_rig, replay) -> None:

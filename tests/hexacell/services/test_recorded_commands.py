@@ -68,7 +68,7 @@ def started(controller: Geometry, paper) -> events.RunStarted:
         branch=paper.branch,
         devices=(),
         taught=controller.document(),
-        joint_ranges=(),
+        joint_ranges=((-800.0, 800.0),) * 6,
         limits=ControllerLimits(),
     )
 

@@ -67,12 +67,16 @@ def in_joint_unit(section: type[SectionType], unit: JointUnit) -> type[SectionTy
     return made
 
 
-@cache
-def cell_model(mechanism: str, encoder_scales: bool = False) -> type[CellSettings]:
+def cell_model(mechanism: str, *, encoder_scales: bool = False) -> type[CellSettings]:
     """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed.
 
-    Each has one model only: settings of two would never be equal.
+    Each has one model only, however it is asked for: settings of two would never be equal.
     """
+    return _cell_model(mechanism, encoder_scales)
+
+
+@cache
+def _cell_model(mechanism: str, encoder_scales: bool) -> type[CellSettings]:
     found = mechanism_of(mechanism, encoder_scales=encoder_scales)
     parameters = found.parameters
     geometry, tolerances = geometry_settings(parameters), tolerance_settings(parameters)

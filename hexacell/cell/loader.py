@@ -104,7 +104,7 @@ def checked_cell(path: Path, text: str) -> Cell:
     document = TomlDocument.parse(text, path)
     robot = document.data.get("robot")  # decides about keys of other sections too
     scales = isinstance(robot, dict) and robot.get("encoder_scales") is True
-    settings = validated(document, cell_model(_mechanism(document), scales), path)
+    settings = validated(document, cell_model(_mechanism(document), encoder_scales=scales), path)
     _log.info("read the cell file %s: %s", path, settings.name)
     return Cell(path, settings, document)
 

@@ -22,7 +22,7 @@ ROBOTS = 5
 TURNS = 11
 TRIES = 200
 LEAST_MARGIN = 0.02
-"""Of the singularity margin: next to a singularity no derivative can be compared."""
+"""Least singularity margin: next to a singularity no derivative can be compared."""
 
 
 @dataclass(frozen=True, eq=False)

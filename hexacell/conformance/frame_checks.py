@@ -23,13 +23,13 @@ from hexacell.measurements.records import MeasurementSet, Record, deviation_of, 
 
 ROUNDING = 1e-8
 LEAST_DETERMINED = 1e-7
-"""Of the largest singular value: what is smaller is not determined at all."""
+"""Share of the largest singular value: what is smaller is not determined at all."""
 
 NOISE = Noise(1e-5, 1e-5)
-"""Stated, mm; the records have none."""
+"""Stated noise, mm; the records are exact."""
 
 LARGEST_ERROR = 1e-6
-"""Of any parameter, mm or rad."""
+"""Largest error of a parameter, mm or rad."""
 
 
 class FrameTests:
@@ -69,7 +69,7 @@ class FrameTests:
                 np.testing.assert_allclose(found.vector, normal.vector, atol=ROUNDING, err_msg=str(other))
 
     def test_changes_of_frames_change_no_machine(self) -> None:
-        """The same machine in other frames has the same joint variables at the same poses."""
+        """A machine in other frames has the same joint variables at the same poses."""
         example = self.example
         mechanism = example.mechanism
         for geometry in example.robots():
@@ -115,7 +115,7 @@ class FrameTests:
             noise=NOISE,
         ).problem(records_without_noise(example, truth))
         found = identify(problem)
-        # How large a machine is, records without noise seem to tell, and sigma says that they do not.
+        # How large a machine is, records without noise seem to show, and sigma says that they do not.
         if found.undetermined and not example.mechanism.frame_freedom.size:
             raise AssertionError(f"not determined: {', '.join(found.undetermined)}")
         unseen, error = _error(found, example.mechanism.convention.free_parameters(normal))

@@ -123,8 +123,8 @@ class KinematicsTests:
         for row, geometry in enumerate(robots):
             at = [row]
             alone = mechanism.residual_and_jacobian(geometry, poses[at], joints[at])
-            for told, expected in zip(together, alone, strict=True):
-                np.testing.assert_allclose(told[row], expected[0], atol=ROUNDING)
+            for found, expected in zip(together, alone, strict=True):
+                np.testing.assert_allclose(found[row], expected[0], atol=ROUNDING)
             own = mechanism.legs(geometry, poses[at], joints[at])
             np.testing.assert_allclose(legs.base_joints[row], own.base_joints[0], atol=ROUNDING)
             np.testing.assert_allclose(legs.platform_joints[row], own.platform_joints[0], atol=ROUNDING)
@@ -179,10 +179,10 @@ def _by_all_parameters(example: MechanismExample, found: ConstraintDerivatives) 
     return by_leg[..., example.mechanism.parameters.leg_order]
 
 
-def _compare(told: Array, residual: Callable[[Array], Array], steps: Array, names: Sequence[str]) -> None:
+def _compare(found: Array, residual: Callable[[Array], Array], steps: Array, names: Sequence[str]) -> None:
     """Derivatives (n, 6, k) with central differences by each of k numbers."""
     for column, (step, name) in enumerate(zip(np.diag(steps), names, strict=True)):
         differences = (residual(step) - residual(-step)) / (2.0 * steps[column])
         limit = DIFFERENCES * max(1.0, float(np.abs(differences).max()))
         words = f"derivatives by {name}"
-        np.testing.assert_allclose(told[..., column], differences, rtol=0.0, atol=limit, err_msg=words)
+        np.testing.assert_allclose(found[..., column], differences, rtol=0.0, atol=limit, err_msg=words)

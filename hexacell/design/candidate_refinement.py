@@ -56,7 +56,7 @@ QUICK = (
     Round(4, 12, float(np.radians(3.5))),
     Round(3, 12, float(np.radians(1.5))),
 )
-"""Of the rounds that were compared with sixteen random robots, these need fewest poses for their gain."""
+"""The rounds that need fewest poses for their gain, of those compared with sixteen random robots."""
 
 THOROUGH = (
     Round(16, 16, float(np.radians(10.0))),
@@ -113,7 +113,7 @@ class CandidateSpace:
     gain: GainOfRecords
 
     def rated(self, orientations: Array) -> RatedRecords | None:
-        """The possible records of some orientations (n, 3, 3); none where the robot can take none."""
+        """The possible records of some orientations (n, 3, 3); None if the robot can take none of them."""
         belief, zero = self.belief, self.zero
         poses = PoseBatch.at(zero.reference, orientations)
         targets = targets_within_limits(belief, poses)

@@ -21,7 +21,7 @@ TWIST_PER_TILT = 2.0
 limit twists, and they are as informative as tilts."""
 
 SMALLEST_SHARE = 0.004
-"""Of the largest amplitude. Under the drawing's tolerances some robots allow no more."""
+"""Share of the largest amplitude. Under the drawing's tolerances some robots allow no more."""
 
 WORKSPACE_ANGLE = np.radians(15.0)
 """Small enough for a robot that is not calibrated yet, large enough to show errors of orientation."""
@@ -113,14 +113,14 @@ def rows_apart(rotations: Array, ranking: NDArray[np.intp], most: int, apart: fl
 
 
 def targets_within_limits(belief: RobotBelief, poses: PoseBatch) -> ReachableTargets:
-    """Those of the poses that the estimated robot takes within its limits, next to a singularity too."""
+    """The poses that the estimated robot takes within its limits, next to a singularity too."""
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
     rows = np.flatnonzero(belief.keeps_limits(poses, joints))
     return ReachableTargets(poses[rows], joints[rows])
 
 
 def reachable_targets(belief: RobotBelief, poses: PoseBatch, mode: Array | None = None) -> ReachableTargets:
-    """Those of the poses that the estimated robot takes within its limits.
+    """The poses that the estimated robot takes within its limits, clear of singularities.
 
     With an assembly ``mode`` (1,), only poses on that mode: no path leads to another one.
     """
@@ -159,7 +159,7 @@ def outcomes_of(belief: RobotBelief, commands: PoseBatch) -> tuple[ReachableTarg
 
 
 def reachable(belief: RobotBelief, poses: PoseBatch) -> tuple[ReachableTargets, PoseBatch]:
-    """Those of the poses that the estimated robot can be commanded to within its limits, and how."""
+    """The poses that the estimated robot can be commanded to within its limits, and how."""
     targets = reachable_targets(belief, poses)
     commands, found = commands_for(belief, targets)
     return targets[found], commands[found]

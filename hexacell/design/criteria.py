@@ -25,7 +25,7 @@ class Criterion:
     """An optimality criterion.
 
     Attributes:
-        weight: of the free parameters' covariance (p, p), dimensionless; none for D.
+        weight: of the free parameters' covariance (p, p), dimensionless; None for D.
     """
 
     weight: Array | None = None

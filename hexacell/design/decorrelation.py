@@ -53,7 +53,7 @@ class DecorrelatingPose:
 def decorrelating_poses(
     belief: RobotBelief, found: Identification, pairs: Sequence[CorrelatedPair]
 ) -> tuple[DecorrelatingPose | None, ...]:
-    """For each pair the record that lowers its correlation most; none where no record does.
+    """For each pair the record that lowers its correlation most; None where no record does.
 
     Records keep the limits and are almost surely inside the gauges' travel.
     """

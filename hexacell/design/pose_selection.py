@@ -76,8 +76,8 @@ def select_pose(
         zero: of the point's gauges.
         orientations: candidates.
         criterion: what is best.
-        known_then: covariance of the free parameters (p, p), mm^2, beside which a record has to gain; none
-            for that of now.
+        known_then: covariance of the free parameters (p, p), mm^2, beside which a record has to gain; None
+            for the current one.
         rounds: of refinement.
 
     Raises:

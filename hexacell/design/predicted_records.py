@@ -101,7 +101,7 @@ def gauge_zero_at(belief: RobotBelief, found: Identification, point: int) -> Gau
 
 
 def position_derivatives(belief: RobotBelief, targets: ReachableTargets) -> tuple[Array, Array]:
-    """Of the ball's position at n targets: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
+    """Derivatives of the ball's position: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
     at = belief.mechanism, belief.estimate, targets.poses, targets.joints
     sensitivity = free_sensitivity(*at, POSITION)
     return sensitivity.free, sensitivity.joints
@@ -166,7 +166,7 @@ def predict_records(belief: RobotBelief, zero: GaugeZero, targets: ReachableTarg
 def predict_clear_records(
     belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets, mode: Array
 ) -> tuple[PredictedRecords, Mask]:
-    """The same, and at which targets (n,) the robot has its singularity margin, on an assembly mode (1,).
+    """The records, and at which targets (n,) the robot has its singularity margin on an assembly ``mode``.
 
     At the others the records mean nothing.
     """

@@ -169,7 +169,7 @@ class _SampledRobots:
         return len(self.found)
 
     def at(self, targets: Mask) -> _SampledRobots:
-        """The same robots at some of the targets."""
+        """The robots at some of the targets."""
         return _SampledRobots(
             self.found[:, targets], self.deviations[:, targets], self.leg_margins[:, targets]
         )

@@ -25,7 +25,7 @@ SAFETY_SIGMAS = 3.0
 smaller tilts would validate too little."""
 
 SHARES = (0.0, 1.0 / 3.0, 2.0 / 3.0)
-"""Of the way to the middle, by which a point is moved that the robot has too few poses at."""
+"""Shares of the way to the middle, by which a point is moved that the robot has too few poses at."""
 
 
 def select_near(

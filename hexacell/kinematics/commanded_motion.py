@@ -133,7 +133,7 @@ class CommandedRobot:
     frames: FrameTransform | None = None
 
     def joints(self, commands: PoseBatch) -> Array:
-        """Joint variables (n, 6), mm, that the controller computes; NaN if out of reach or refused."""
+        """Joint variables (n, 6) that the controller computes; NaN if out of reach or refused."""
         joints = self.mechanism.inverse(self.commanding, self.branch, commands)
         if self.refused.commands:
             joints[~self.refused.allow(commands, self.frames)] = np.nan
@@ -142,22 +142,31 @@ class CommandedRobot:
     def actual_poses(self, commands: PoseBatch) -> ActualPoses:
         """The actual poses of n commands."""
         joints = self.joints(commands)
-        reachable = np.asarray(np.isfinite(joints).all(axis=-1))
-        if reachable.all():
-            result = self._actual(commands, joints)
-            return ActualPoses(result.poses, joints, result.found)
-        result = self._actual(commands[reachable], joints[reachable])
-        found = reachable.copy()
+        found = np.asarray(np.isfinite(joints).all(axis=-1))
+        reachable = found.copy()
+        result = continue_solution(
+            self.mechanism,
+            self.actual,
+            joints[reachable],
+            start=commands[reachable],
+            start_geometry=self.commanding,
+        )
         found[reachable] = result.found
         return ActualPoses(commands.with_rows(reachable, result.poses), joints, found)
 
     def commands_for(
         self, poses: PoseBatch, joints: Array, *, stages: Sequence[int] = COMMAND_STAGES
     ) -> ForwardResult:
-        """Commands (n) of actual poses at which the robot has the joint variables ``joints`` (n, 6), mm.
+        """The commands that bring the robot to actual poses.
 
-        A command is not found if the controller's geometry has no pose at these joint variables, or has
-        one only on another assembly mode or branch.
+        Args:
+            poses: n actual poses.
+            joints: joint variables (n, 6) there, in their unit.
+            stages: of the continuation.
+
+        Returns:
+            Commands (n). One is not found if the controller's geometry has no pose at these joint
+            variables, or has one only on another assembly mode or branch.
         """
         result = continue_solution(
             self.mechanism,
@@ -169,8 +178,3 @@ class CommandedRobot:
         )
         agrees = np.abs(self.joints(result.poses) - joints) < JOINT_TOLERANCE_MM  # not where it is NaN
         return ForwardResult(result.poses, result.found & agrees.all(axis=-1))
-
-    def _actual(self, commands: PoseBatch, joints: Array) -> ForwardResult:
-        return continue_solution(
-            self.mechanism, self.actual, joints, start=commands, start_geometry=self.commanding
-        )

@@ -5,7 +5,7 @@ have their zeros needs no further numbers: every mechanism has its own
 (:meth:`~hexacell.kinematics.mechanism.Mechanism.encoder_zeros`).
 
 Encoders of lengths that are all wrong alike make a machine that is larger by that share, and no record
-tells. How large it is, the tolerances alone determine (``size`` of
+shows it. How large it is, the tolerances alone determine (``size`` of
 :class:`~hexacell.kinematics.mechanism.FrameFreedom`).
 """
 

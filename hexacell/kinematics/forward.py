@@ -52,7 +52,7 @@ CONTINUATION_STAGES = (2, 8, 32)
 """Numbers of stages, tried in this order."""
 
 LARGEST_CONTRACTION = 0.25
-"""Of the first two Newton steps, where one stage is enough."""
+"""Largest ratio of the first two Newton steps where one stage is enough."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,11 +182,20 @@ def forward_kinematics(
     max_steps: int = MAX_STEPS,
     largest_contraction: float = np.inf,
 ) -> ForwardResult:
-    """Poses of n joint vectors (n, 6), mm, by damped Newton's method from nearby poses ``start``.
+    """Poses of n joint vectors by damped Newton's method; a pose that has converged is not changed further.
 
-    A pose that has converged is not changed further. ``mode`` (n,) is the required assembly mode, by
-    default that of ``start``; ``tolerance_mm`` is the largest constraint of a solution. Poses whose second
-    step is more than ``largest_contraction`` of the first one are not found.
+    Args:
+        mechanism: of the robot.
+        geometry: one for all poses, or one for each.
+        joints: joint variables (n, 6), in their unit.
+        start: n nearby poses.
+        mode: required assembly mode (n,); by default that of ``start``.
+        tolerance_mm: largest constraint of a solution, mm.
+        max_steps: number of Newton steps.
+        largest_contraction: poses whose second step is more than this share of the first are not found.
+
+    Returns:
+        The poses (n), and which of them were found.
     """
     iteration = _NewtonIteration(mechanism, geometry, joints, start, mode, largest_contraction)
     for _ in range(max_steps):
@@ -211,15 +220,33 @@ def continue_solution(
     start_joints: Array | None = None,
     stage_counts: Sequence[int] = CONTINUATION_STAGES,
 ) -> ForwardResult:
-    """Poses of n joint vectors (n, 6), mm, by continuation from n known poses.
+    """Poses of n joint vectors by continuation from n known poses.
 
-    ``start`` closes ``start_geometry`` at ``start_joints`` (n, 6), mm; by default these are ``joints``, and
-    only the geometry changes. ``geometry`` is one for all poses, or one for each. Of ``stage_counts`` the
-    next one is tried for the poses where one fails.
+    Args:
+        mechanism: of the robot.
+        geometry: one for all poses, or one for each.
+        joints: joint variables (n, 6), in their unit.
+        start: n poses that close ``start_geometry`` at ``start_joints``.
+        start_geometry: one for all poses.
+        start_joints: (n, 6); by default ``joints``, so that only the geometry changes.
+        stage_counts: numbers of stages; the next one is tried for the poses where one fails.
+
+    Returns:
+        The poses (n), and which of them were found.
     """
     if start_joints is None:
         start_joints = joints
-    poses, found = _continue_at_once(mechanism, (start_geometry, geometry), (start_joints, joints), start)
+    at_once = forward_kinematics(
+        mechanism,
+        geometry,
+        joints,
+        start,
+        mode=modes_of(mechanism, start_geometry, start, start_joints),
+        max_steps=MAX_STAGE_STEPS,
+        largest_contraction=LARGEST_CONTRACTION,
+    )
+    found = at_once.found.copy()
+    poses = start.with_rows(found, at_once.poses[found])
     for stages in stage_counts:
         rows = np.flatnonzero(~found)
         if not len(rows):
@@ -230,25 +257,6 @@ def continue_solution(
         poses = poses.with_rows(rows, result.poses)
         found[rows] = result.found
     return ForwardResult(poses, found)
-
-
-def _continue_at_once(
-    mechanism: Mechanism,
-    geometries: tuple[Geometry, Geometry | GeometryBatch],
-    joints: tuple[Array, Array],
-    start: PoseBatch,
-) -> tuple[PoseBatch, Mask]:
-    """The poses where Newton's method contracts from the start, and which these are (n,)."""
-    result = forward_kinematics(
-        mechanism,
-        geometries[1],
-        joints[1],
-        start,
-        mode=modes_of(mechanism, geometries[0], start, joints[0]),
-        max_steps=MAX_STAGE_STEPS,
-        largest_contraction=LARGEST_CONTRACTION,
-    )
-    return start.with_rows(result.found, result.poses[result.found]), result.found.copy()
 
 
 def _continue_in_stages(

@@ -16,7 +16,7 @@ from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 PAIRS = np.array(list(combinations(range(6), 2)))
-"""Of legs, counted from 0."""
+"""Pairs of legs, counted from 0."""
 
 PARALLEL = 1e-12
 """Squared sine of the angle between two legs below which they are parallel."""
@@ -33,7 +33,7 @@ class Legs:
         base_joints: (n, 6, 3) passive joints at the base's end: those on the sliders or cranks, mm.
         platform_joints: (n, 6, 3), mm.
         rotations: (n, 3, 3) platform frame to base frame.
-        carriers: (n, 6, 3, 3) to the base frame from what carries each leg's joint at the base's end; none
+        carriers: (n, 6, 3, 3) to the base frame from what carries each leg's joint at the base's end; None
             where that does not turn.
     """
 
@@ -55,7 +55,7 @@ class Legs:
 
     @property
     def directions_in_carriers(self) -> Array:
-        """The same unit vectors in the frames of what carries the joints at the base's end."""
+        """Unit vectors (n, 6, 3) along the legs in the frames of what carries their joints on the base."""
         return self.in_carriers(self.directions)
 
     def in_carriers(self, directions: Array) -> Array:
@@ -67,7 +67,7 @@ class Legs:
 
     @property
     def directions_in_platform(self) -> Array:
-        """The same unit vectors in the platform frame."""
+        """Unit vectors (n, 6, 3) along the legs in the platform frame."""
         return self.directions @ self.rotations
 
     def smallest_distance(self) -> Array:

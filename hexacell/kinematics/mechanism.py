@@ -163,7 +163,7 @@ class FrameTransform:
         return FrameTransform(further.base @ self.base, origin, further.platform @ self.platform)
 
     def poses(self, poses: PoseBatch) -> PoseBatch:
-        """The same poses in the new frames."""
+        """Poses in the new frames."""
         return PoseBatch(
             (poses.positions - self.origin) @ self.base.T,
             # Products of small matrices are twice as fast in one layout.
@@ -176,7 +176,7 @@ class FrameTransform:
         return np.array_equal(self.base, np.eye(3)) and np.array_equal(self.platform, np.eye(3))
 
     def deviations(self, deviations: Array) -> Array:
-        """The same differences of positions (n, 3), mm, in the new base frame."""
+        """Differences of positions (n, 3), mm, in the new base frame."""
         return deviations @ self.base.T
 
     def inverse(self) -> FrameTransform:
@@ -211,7 +211,7 @@ class MechanismWords:
     Attributes:
         machine: the kind of machine.
         joint: what each joint variable is the position of; text adds the leg, as in "slider 3".
-        guide: what the joints move along, with errors of its own; none where there is no such thing.
+        guide: what the joints move along, with errors of its own; None where there is no such thing.
         joint_unit: of the joint variables, which are places of what slides or angles of what turns.
     """
 
@@ -222,7 +222,11 @@ class MechanismWords:
 
 
 class Mechanism(Protocol):
-    """A six-legged parallel mechanism; all methods are batched over n poses, and none raises."""
+    """A six-legged parallel mechanism; all methods are batched over n poses, and do not raise.
+
+    A ``geometry`` is one for all poses, or one for each where a batch is allowed; ``poses`` are n poses,
+    and ``joints`` (n, 6) joint variables in the unit of the mechanism.
+    """
 
     name: str
     words: MechanismWords
@@ -233,35 +237,42 @@ class Mechanism(Protocol):
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
-        """The constraints (n, 6), mm, and their derivatives by the pose (n, 6, 6), for Newton's method.
+        """The constraints of the legs and their derivatives by the pose, for Newton's method.
 
-        A constraint is the length error of a leg, zero where it closes. ``geometry`` is one for all
-        poses, or one for each.
+        Returns:
+            The length errors of the legs (n, 6), mm, zero where they close, and their derivatives
+            (n, 6, 6) by the ball's position, mm, and the rotation vector, rad.
         """
         ...
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
-        """All derivatives of the constraints."""
+        """All derivatives of the constraints, off closed poses as well."""
         ...
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """Joint variables (n, 6), in their unit, in closed form; NaN where a pose is out of a leg's reach.
+        """The inverse kinematics in closed form.
 
-        ``branch`` is empty for a mechanism without (:attr:`ParameterSet.has_branch
-        <hexacell.kinematics.parameters.ParameterSet.has_branch>`).
+        Args:
+            geometry: of the robot.
+            branch: of each leg; empty for a mechanism without (:attr:`ParameterSet.has_branch
+                <hexacell.kinematics.parameters.ParameterSet.has_branch>`).
+            poses: n poses.
+
+        Returns:
+            Joint variables (n, 6), in their unit; NaN where a pose is out of a leg's reach.
         """
         ...
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """Which of the two inverse solutions each leg is on (n, 6): -1 or 1; 1 where it has only one."""
+        """The inverse solution that each leg is on (n, 6): -1 or 1; 1 where it has only one."""
         ...
 
     def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
-        """The same machine in the frames of :attr:`convention`, and the change of frames."""
+        """The machine in the frames of :attr:`convention`, and the change of frames."""
         ...
 
     def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
-        """The same machine in other frames."""
+        """The machine in other frames."""
         ...
 
     def encoder_zeros(self, geometry: Geometry) -> Array:
@@ -273,11 +284,11 @@ class Mechanism(Protocol):
         ...
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
-        """The guides on which sliders move; none for a mechanism whose words have no guide."""
+        """The guides on which sliders move; None for a mechanism whose words have no guide."""
         ...
 
     def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
-        """The legs at n poses; ``geometry`` is one for all of them, or one for each."""
+        """The legs in space at n poses."""
         ...
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
@@ -286,17 +297,29 @@ class Mechanism(Protocol):
 
 
 def joint_zeros(mechanism: Mechanism, geometry: Geometry) -> Array:
-    """Where a geometry has the encoders' zeros (6,), in the unit of the joint variables.
+    """The encoders' zeros that a geometry contains.
 
     A joint variable and the zero together are what does not depend on the encoder: the whole length of a
     Gough-Stewart platform's leg, the place of a slider in the base frame.
+
+    Returns:
+        The zeros (6,), in the unit of the joint variables.
     """
     zeros: Array = mechanism.encoder_zeros(geometry).T @ geometry.vector
     return zeros
 
 
 def inverse_kinematics(mechanism: Mechanism, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-    """Joint variables (n, 6), in their unit, of n poses.
+    """The inverse kinematics of poses that are all within reach.
+
+    Args:
+        mechanism: of the robot.
+        geometry: of the robot.
+        branch: of each leg; empty for a mechanism without.
+        poses: n poses.
+
+    Returns:
+        Joint variables (n, 6), in their unit.
 
     Raises:
         ReachError: a pose is out of a leg's reach; the message names both.
@@ -309,9 +332,12 @@ def inverse_kinematics(mechanism: Mechanism, geometry: Geometry, branch: Branch,
 
 
 def free_parameter_derivatives(mechanism: Mechanism, geometry: Geometry) -> Array:
-    """Derivatives (P, p) of the free parameters by all parameters of a geometry, in frames of its own.
+    """Derivatives of the free parameters by all parameters of a geometry in frames of its own.
 
     A parameter that the frame convention fixes moves the frames, and with them the others.
+
+    Returns:
+        Derivatives (P, p), in the units of both.
     """
     convention, vector = mechanism.convention, geometry.vector
 

@@ -55,7 +55,7 @@ class JointUnit(StrEnum):
 
     @property
     def thousandth(self) -> str:
-        """The name of its thousandth part, in which noise and repeatability are told."""
+        """The name of its thousandth part, in which noise and repeatability are shown."""
         return "um" if self is JointUnit.MM else "mdeg"
 
 
@@ -81,7 +81,7 @@ class ParameterKind:
         is_positive: only values above zero are physical.
         default_tolerance: where the cell file states none; without one it must.
         default: its value where a drawing states none; without one it must.
-        part: the part that expands with the temperature, and this kind with it; none if it does not.
+        part: the part that expands with the temperature, and this kind with it; None if it does not.
 
     Raises:
         ValueError: the ball's offset needs the components x, y and z, a default none.

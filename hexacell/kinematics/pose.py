@@ -15,7 +15,7 @@ Index = slice | NDArray[np.intp] | Mask | list[int]
 """Which poses of a batch. With two axes a pair: which poses of a line, and which lines."""
 
 AXES = "xyzabc"
-"""Of a controller, in the order of a pose's six numbers."""
+"""Axes of a controller, in the order of a pose's six numbers."""
 
 SAME_MM = 1e-6
 SAME_ANGLE = float(np.radians(1e-6))
@@ -55,7 +55,7 @@ class Pose:
 
     @property
     def level(self) -> Pose:
-        """The same position without tilt and turn."""
+        """The position without tilt and turn."""
         return Pose(self.x, self.y, self.z)
 
     def angle_to(self, other: Pose) -> float:
@@ -116,7 +116,7 @@ class PoseBatch:
         return PoseBatch(self.positions[rows], self.rotations[rows])
 
     def reshape(self, *shape: int) -> PoseBatch:
-        """The same poses in their order: ``-1`` for one axis, ``-1, n`` for n lines."""
+        """The poses in their order, in another shape: ``-1`` for one axis, ``-1, n`` for n lines."""
         return PoseBatch(self.positions.reshape(*shape, 3), self.rotations.reshape(*shape, 3, 3))
 
     def pose(self, row: int) -> Pose:

@@ -29,7 +29,7 @@ from hexacell.kinematics.rotations import Array
 
 
 class PositionSource(StrEnum):
-    """What tells where the robot is."""
+    """A report of where the robot is."""
 
     POSE = "pose"
     JOINTS = "joints"
@@ -42,7 +42,7 @@ class PositionReports:
 
     Attributes:
         pose: by the controller's forward kinematics.
-        joints: the controller's joint variables (6,), mm; none where it reports none.
+        joints: the controller's joint variables (6,), mm; None where it reports none.
         encoders: joint variables (6,), mm, by the encoders.
     """
 
@@ -69,9 +69,9 @@ class PositionMismatch:
     """Reports that do not agree.
 
     Attributes:
-        odd: the one that the two others contradict; none where no two agree.
+        odd: the one that the two others contradict; None where no two agree.
         leg: the leg, counted from 1, with the largest difference.
-        by_pose: its joint variable by the reported pose; none where a leg cannot reach that.
+        by_pose: its joint variable by the reported pose; None where a leg cannot reach that.
         joint: its joint variable by the controller, and ``encoder`` by its encoder.
         is_pose_near: whether the encoders agree with the reported pose.
     """
@@ -91,19 +91,42 @@ def position_mismatch(
     reports: PositionReports,
     tolerances: AgreementTolerances,
 ) -> PositionMismatch | None:
-    """How the reports disagree under the controller's geometry; none where they agree."""
+    """How the reports of where the robot is disagree under the controller's geometry.
+
+    Args:
+        mechanism: of the robot.
+        geometry: of the controller.
+        branch: of each leg.
+        reports: at one standstill.
+        tolerances: differences up to which reports agree.
+
+    Returns:
+        The mismatch at the leg with the largest one; None where the reports agree.
+    """
     by_pose, rounding = _joints_of(mechanism, geometry, branch, reports.pose, tolerances.position_mm)
     from_encoders = _excess(by_pose - reports.encoders, rounding + tolerances.encoders)
-    if reports.joints is None:
-        return _mismatch(None, from_encoders, by_pose, reports, from_encoders)
-    from_joints = _excess(by_pose - reports.joints, rounding)
-    between = _excess(reports.joints - reports.encoders, np.full(6, tolerances.encoders))
-    if _agree(from_joints):
-        return _mismatch(PositionSource.ENCODERS, between, by_pose, reports, from_encoders)
-    if _agree(between):
-        return _mismatch(PositionSource.POSE, from_joints, by_pose, reports, from_encoders)
-    odd = PositionSource.JOINTS if _agree(from_encoders) else None
-    return _mismatch(odd, between, by_pose, reports, from_encoders)
+    odd: PositionSource | None = None
+    excess = from_encoders
+    if reports.joints is not None:
+        from_joints = _excess(by_pose - reports.joints, rounding)
+        between = _excess(reports.joints - reports.encoders, np.full(6, tolerances.encoders))
+        if _agree(from_joints):
+            odd, excess = PositionSource.ENCODERS, between
+        elif _agree(between):
+            odd, excess = PositionSource.POSE, from_joints
+        else:
+            odd, excess = PositionSource.JOINTS if _agree(from_encoders) else None, between
+    if _agree(excess):
+        return None
+    leg = int(np.argmax(excess))
+    return PositionMismatch(
+        odd=odd,
+        leg=leg + 1,
+        by_pose=float(by_pose[leg]) if np.isfinite(by_pose[leg]) else None,
+        joint=None if reports.joints is None else float(reports.joints[leg]),
+        encoder=float(reports.encoders[leg]),
+        is_pose_near=_agree(from_encoders),
+    )
 
 
 def _joints_of(
@@ -125,20 +148,3 @@ def _excess(differences: Array, tolerances: Array) -> Array:
 
 def _agree(excess: Array) -> bool:
     return bool(excess.max() <= 1.0)
-
-
-def _mismatch(
-    odd: PositionSource | None, excess: Array, by_pose: Array, reports: PositionReports, near: Array
-) -> PositionMismatch | None:
-    """The mismatch at the leg with the largest excess (6,); none where all are within tolerance."""
-    if _agree(excess):
-        return None
-    leg = int(np.argmax(excess))
-    return PositionMismatch(
-        odd=odd,
-        leg=leg + 1,
-        by_pose=float(by_pose[leg]) if np.isfinite(by_pose[leg]) else None,
-        joint=None if reports.joints is None else float(reports.joints[leg]),
-        encoder=float(reports.encoders[leg]),
-        is_pose_near=_agree(near),
-    )

@@ -15,9 +15,9 @@ import numpy as np
 from hexacell.kinematics.rotations import Array
 
 SMALL = 1e-6
-"""Of a sine: smaller angles are their sines."""
+"""Largest sine that is taken for its angle."""
 SERIES = 1e-3
-"""Of an angle, rad: below it the first terms of the series of k's derivative are exact to rounding."""
+"""Angle, rad, below which the first terms of the series of k's derivative are exact to rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +37,7 @@ class TurnedAxes:
 
     @classmethod
     def by(cls, turns: Array) -> TurnedAxes:
-        """Of turns (..., 2), rad."""
+        """The axes by their turns (..., 2), rad."""
         a, b = turns[..., 0], turns[..., 1]
         angle = np.hypot(a, b)
         s, k = np.sinc(angle / np.pi), 0.5 * np.sinc(0.5 * angle / np.pi) ** 2

@@ -2,7 +2,7 @@
 
 A plunger has the same travel to both sides of its middle. Where it stood when the gauges were zeroed says
 how much of that is left on each side. Three gauges mounted together have the ball in the middle of their
-plates when all plungers are in the middle of their travels, so the same place tells how far the ball may go
+plates when all plungers are in the middle of their travels, so the same place says how far the ball may go
 on the plates. Lengths are in mm, along base x, y, z.
 """
 
@@ -27,7 +27,7 @@ class GaugeRoom:
 
     @classmethod
     def symmetric(cls, distance_mm: float) -> GaugeRoom:
-        """The same distance on all sides."""
+        """Room of one distance on all sides."""
         return cls((-distance_mm,) * 3, (distance_mm,) * 3)
 
     def __str__(self) -> str:
@@ -50,7 +50,7 @@ class GaugeRoom:
         return within
 
     def widened(self, margin_mm: float) -> GaugeRoom:
-        """The same with a margin on all sides."""
+        """This room with a margin on all sides."""
         x, y, z = (one - margin_mm for one in self.lower)
         u, v, w = (one + margin_mm for one in self.upper)
         return GaugeRoom((x, y, z), (u, v, w))
@@ -63,8 +63,8 @@ class GaugeTravel:
     Attributes:
         plate_mm: how far the ball may go from the middle of the plates, and from the gauges' zero.
         half_mm: of each gauge half of its measuring range.
-        middle_mm: what each shows in the middle of its travel, along its base axis; none where its display
-            does not tell.
+        middle_mm: what each shows in the middle of its travel, along its base axis; None where its display
+            does not say.
         mounting_mm: how far from the middle a plunger may stand when the gauges are zeroed.
     """
 
@@ -74,7 +74,7 @@ class GaugeTravel:
     mounting_mm: float
 
     def places(self, shown_mm: Three) -> tuple[float | None, ...]:
-        """How far each plunger stands from the middle of its travel; none where nobody knows.
+        """How far each plunger stands from the middle of its travel; None where that is not known.
 
         ``shown_mm`` is what the gauges show along their base axes.
         """
@@ -85,7 +85,7 @@ class GaugeTravel:
     def room(self, zero_mm: Three | None = None) -> GaugeRoom:
         """The room of gauges that showed ``zero_mm`` when they were zeroed.
 
-        Before they are, gauges whose display tells their place are expected in the middle. The others may
+        Before they are, gauges whose display shows their place are expected in the middle. The others may
         be as far from it as ``mounting_mm``, wherever they are.
         """
         places = self.places((0.0, 0.0, 0.0) if zero_mm is None else zero_mm)

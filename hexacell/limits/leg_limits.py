@@ -14,7 +14,7 @@ from hexacell.kinematics.legs import Legs, angles_between
 from hexacell.kinematics.rotations import Array, Mask
 
 ROUNDING = 1e-9
-"""Of an angle, rad, or a length, mm: a pose at a limit is within it."""
+"""Rounding of an angle, rad, or a length, mm: a pose at a limit is within it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -47,19 +47,19 @@ class ZeroedRanges:
 
     Attributes:
         lowest, highest: joint variable of each leg.
-        lowest_told, highest_told: joint variable plus zero, which a calibration changes.
+        lowest_shown, highest_shown: joint variable plus zero, which a calibration changes.
     """
 
     lowest: Array
     highest: Array
-    lowest_told: Array
-    highest_told: Array
+    lowest_shown: Array
+    highest_shown: Array
 
     def at(self, zeros: Array) -> tuple[Array, Array]:
         """Lowest and highest joint variables that both allow, where a controller has these zeros (6,)."""
         return (
-            np.maximum(self.lowest, self.lowest_told - zeros),
-            np.minimum(self.highest, self.highest_told - zeros),
+            np.maximum(self.lowest, self.lowest_shown - zeros),
+            np.minimum(self.highest, self.highest_shown - zeros),
         )
 
 
@@ -75,10 +75,10 @@ class Limits:
         frames: from the frames of the commands, in which a level platform is level, to the convention's.
         turn: largest turn of the platform about its normal.
         axes: what the controller's axes may be commanded to.
-        legs: what passive joints and legs allow; none where that is not known.
+        legs: what passive joints and legs allow; None where that is not known.
         gauges: travels and plungers; without them the ball may go as far to all sides.
-        zeroed: the room of the gauges as they were zeroed; none where that is not known yet.
-        told_joints: what joint_min and joint_max follow from, where they depend on the encoders' zeros.
+        zeroed: the room of the gauges as they were zeroed; None where that is not known yet.
+        shown_joints: what joint_min and joint_max follow from, where they depend on the encoders' zeros.
         stands_at: tilt and turn of a robot that stands beyond those limits, which commands still keep.
     """
 
@@ -93,14 +93,14 @@ class Limits:
     legs: LegLimits | None = None
     gauges: GaugeTravel | None = None
     zeroed: GaugeRoom | None = None
-    told_joints: ZeroedRanges | None = None
+    shown_joints: ZeroedRanges | None = None
     stands_at: tuple[float, float] = (0.0, 0.0)
 
     def with_zeros(self, zeros: Array) -> Limits:
-        """The same where the controller's geometry has these zeros (6,) of the encoders."""
-        if self.told_joints is None:
+        """These limits where the controller's geometry has some zeros (6,) of the encoders."""
+        if self.shown_joints is None:
             return self
-        lowest, highest = self.told_joints.at(zeros)
+        lowest, highest = self.shown_joints.at(zeros)
         return replace(self, joint_min=lowest, joint_max=highest)
 
     @property
@@ -112,7 +112,7 @@ class Limits:
 
     @property
     def sure_room(self) -> GaugeRoom:
-        """The same of any station that is mounted well enough."""
+        """How far the ball may go at any station that is mounted well enough."""
         return self.room if self.gauges is None else self.gauges.sure_room
 
     def within_travel(
@@ -133,7 +133,7 @@ class Limits:
         return sigma
 
     def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> Limits:
-        """The same once the gauges were zeroed where they show ``shown_mm`` along base x, y, z."""
+        """These limits once the gauges were zeroed where they show ``shown_mm`` along base x, y, z."""
         if self.gauges is None or shown_mm is None:
             return self
         return replace(self, zeroed=self.gauges.room(shown_mm))

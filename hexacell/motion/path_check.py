@@ -25,14 +25,14 @@ from hexacell.kinematics.sensitivity import has_singularity_margin, margin_and_m
 from hexacell.motion.trajectory import interpolate_lines, trace_path
 
 MARGIN_SHARE = 0.7
-"""Of the singularity margin, to be kept between the ends. At the ends all of it is kept."""
+"""Share of the singularity margin that is kept between the ends. At the ends all of it is kept."""
 
 JOINT_REFINEMENT = 4
 """How many times finer joint ranges are sampled, which costs little."""
 
 
 def ball_position(belief: RobotBelief, command: PoseBatch) -> Array | None:
-    """The estimated position (3,), mm, of the ball at a command (1); none if it cannot be taken."""
+    """The estimated position (3,), mm, of the ball at a command (1); None if it cannot be taken."""
     actual = belief.commanded.actual_poses(command)
     return np.asarray(actual.poses.positions[0]) if actual.found[0] else None
 
@@ -153,7 +153,7 @@ class LinesFrom:
 
     @cached_property
     def _wanted_margins(self) -> Array:
-        """Of passive joints and legs. With gauges at the ball whoever chooses a record checks more."""
+        """Margins of passive joints and legs. With gauges at the ball the choice of records checks more."""
         if self.reference is not None or not self._actual_start.found[0]:
             return self.belief.least_margins
         return np.asarray(self.belief.margins_at(self._actual_start)[0])

@@ -68,7 +68,7 @@ class PathPlanner:
 
     Attributes:
         start: the command (1) that paths start from.
-        reference_command: the command (1) of the reference; none if paths start there.
+        reference_command: the command (1) of the reference; None if paths start there.
         reference: where the ball was when the gauges were zeroed (3,), mm.
     """
 
@@ -78,7 +78,7 @@ class PathPlanner:
     reference: Array
 
     def plan(self, ends: PoseBatch) -> list[Path | None]:
-        """A path to each of n commands, straight or else over waypoints; none where there is neither."""
+        """A path to each of n commands, straight or else over waypoints; None where there is neither."""
         options = self.options(ends)
         paths = options.straight(np.arange(len(ends)))
         blocked = np.array([row for row, path in enumerate(paths) if path is None], dtype=np.intp)
@@ -101,20 +101,20 @@ class PathPlanner:
 
     @cached_property
     def from_reference(self) -> PathPlanner | None:
-        """The planner of paths from the reference; none if this one starts there."""
+        """The planner of paths from the reference; None if this one starts there."""
         if self.reference_command is None:
             return None
         return PathPlanner(self.belief, self.reference_command, None, self.reference)
 
     @cached_property
     def to_reference(self) -> Path | None:
-        """The path to the reference; none if there is none, or this planner starts there."""
+        """The path to the reference; None if there is no path, or this planner starts there."""
         return None if self.reference_command is None else self.plan(self.reference_command)[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathOptions:
-    """Three kinds of path to n commands, each for some ``rows`` of them; none where there is no path.
+    """Three kinds of path to n commands, each for some ``rows`` of them; None where there is no path.
 
     Attributes:
         lines: the straight lines.
@@ -158,7 +158,7 @@ class PathOptions:
 
 
 def _path(lines: CheckedLines, waypoints: tuple[PoseBatch, ...], row: int) -> Path | None:
-    """One of the lines as a path, with one of n poses of each waypoint; none if it is not clear."""
+    """One of the lines as a path, with one of n poses of each waypoint; None if it is not clear."""
     if not lines.is_clear[row]:
         return None
     return Path(tuple(waypoint.pose(row) for waypoint in waypoints), *lines.traced(row))
@@ -173,7 +173,7 @@ def find_route(
 ) -> list[int] | None:
     """The fewest straight lines from ``start`` to ``end``: the rows of ``via`` between them, in order.
 
-    An empty list where the straight line itself is clear; none where there is no route. With gauges
+    An empty list where the straight line itself is clear; None where there is no route. With gauges
     zeroed where the ball was at ``reference`` (3,), mm, the ball stays inside their travel.
     """
     queue: deque[list[int]] = deque([[]])

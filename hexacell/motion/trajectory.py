@@ -35,7 +35,7 @@ PIECES_BETWEEN_WAYPOINTS = 4
 """Pieces that a line is divided into."""
 
 TOLERANCE_MM = 1e-4
-"""Of the constraints at the poses of a line; gauge travel is checked in tenths of a millimetre."""
+"""Largest constraint at the poses of a line; gauge travel is checked in tenths of a millimetre."""
 
 JUMP_MM = 20.0
 JUMP_ANGLE = np.radians(10.0)

@@ -39,7 +39,7 @@ def stated_limits(settings: CellSettings, controller: ControllerGeometry, frames
         _axis_limits(limits, controller.limits),
         _leg_limits(settings, controller),
         gauge_travel_of(settings),
-        told_joints=zeroed,
+        shown_joints=zeroed,
     )
 
 

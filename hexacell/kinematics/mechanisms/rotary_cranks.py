@@ -230,7 +230,7 @@ class RotaryCranks:
 
 
 def _cosine_and_sine(geometry: Geometry | GeometryBatch, joints: Array) -> tuple[Array, Array]:
-    """Of the cranks' angles, (n, 6, 1) each."""
+    """Cosine and sine of the cranks' angles, (n, 6, 1) each."""
     angles = np.radians(geometry["zero"] + joints)[..., None]
     return np.cos(angles), np.sin(angles)
 
@@ -267,7 +267,7 @@ def _in_plane(geometry: Geometry, poses: PoseBatch) -> tuple[Array, Array]:
 
 
 def _wrapped(degrees: Array) -> Array:
-    """The same angles within half a turn of 0, deg."""
+    """Angles less whole turns, within half a turn of 0, deg."""
     wrapped: Array = (degrees + 180.0) % 360.0 - 180.0
     return wrapped
 

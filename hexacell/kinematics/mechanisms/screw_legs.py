@@ -112,7 +112,7 @@ class ScrewLegs(GoughStewart):
 
 
 def _corrected(vectors: Array, a: Array, w: Array, radius_mm: float) -> _Corrections:
-    """Of legs' vectors (n, 6, 3) and the axes (..., 6, 3) on the base and on the platform."""
+    """Corrections by the legs' vectors (n, 6, 3) and the axes (..., 6, 3) on base and platform."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     u = vectors / length
     along = _dot(a, u)

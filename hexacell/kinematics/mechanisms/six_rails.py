@@ -93,7 +93,7 @@ OWN_RAILS = tuple((leg,) for leg in range(6))
 """Each slider has a rail of its own."""
 
 SMALL = 1e-6
-"""Of an angle, rad: smaller ones are their sines."""
+"""Largest angle, rad, that is taken for its sine."""
 
 OPPOSITE_RAD = 3.0
 """Rails that are farther apart than this count the opposite way."""

@@ -196,7 +196,7 @@ class PlannedInformation:
     """The records of a set of poses at each point, linearized.
 
     Attributes:
-        jacobian: of all sets' records (n, 3, p) by the free parameters.
+        jacobian: derivatives (n, 3, p) of all sets' records by the free parameters.
         weights: inverse covariances of the records (n, 3, 3), 1/mm^2.
         bounds: (m + 1,) rows at which the sets begin, and the last one ends.
     """

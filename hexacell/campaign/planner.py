@@ -57,7 +57,7 @@ class Plan:
 
     Attributes:
         pose_list: poses to visit; None where they are to be selected.
-        effort: of the search for poses.
+        effort: how hard poses are searched for.
         with_forecast: whether to forecast for every record what it gains at the task poses.
         estimator: estimates the robot from the records; None for the usual one.
         goal: what the records are for; None to identify the geometry as well as the settings ask for.

@@ -44,13 +44,13 @@ class Check:
 
     Attributes:
         before: the last accepted result, and its drift since; None without such a result.
-        limits: at the worst task pose.
-        budget: most records, references included.
+        limits: largest errors at the worst task pose.
+        budget: largest number of records, references included.
         listed: poses to measure; None if they are chosen.
         effects: the systematic ones. A check shares the constant ones with the result before it, so that
             its records do not reduce them.
         earlier: what these did to that result, as errors (p, k) of its free parameters by effect.
-        effort: of the search for poses.
+        effort: how hard poses are searched for.
     """
 
     settings: CellSettings

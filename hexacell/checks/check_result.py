@@ -44,7 +44,7 @@ class CheckResult(Frozen):
         further_records: about how many more would decide; None where no number would, or nothing is open.
         earlier_run, earlier_at: the accepted result that it started from; None where that is the drawing.
         drift_scale: how many times as large as stated the drift since then is.
-        changes: of the free parameters, in the mechanism's frame convention.
+        changes: changes of the free parameters, in the mechanism's frame convention.
         left_out: records that the others prove false.
         alarm: the test of a change by the first records; None where the robot was not identified before, or
             where there were fewer.

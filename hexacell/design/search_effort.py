@@ -25,8 +25,8 @@ class SearchEffort:
         checked_robots: robots, drawn within the tolerances, of which preflight asks whether they reach
             the points.
         dry_run_robots: robots that a plan is carried out on to say what it gives.
-        rounds: in which the best candidates are refined.
-        late_rounds: of the decisions with most records to fit, so that these take no longer.
+        rounds: rounds in which the best candidates are refined.
+        late_rounds: rounds of the decisions with most records to fit, so that these take no longer.
         late_records: number of records from which the refinement is that of ``late_rounds``.
     """
 

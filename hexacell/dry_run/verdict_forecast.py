@@ -137,7 +137,7 @@ def stated_errors(
         found: the identification.
         updated: the identification by the held-out records as well.
         first: the budget of ``found``.
-        second: that of ``updated``.
+        second: the budget of ``updated``.
         zeros: what is written of ``found``, where that is not all of it.
     """
     held = np.zeros_like(found.free_covariance)

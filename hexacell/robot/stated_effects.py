@@ -36,7 +36,7 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
     Only a mechanism with rails has those of rails.
 
     Args:
-        settings: of the cell.
+        settings: the cell's.
         measured_range_k: range of the temperatures read while measuring; None without thermometers.
     """
     stated = settings.uncertainty

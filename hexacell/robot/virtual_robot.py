@@ -206,7 +206,7 @@ def exact_records(robot: Robot, point: int, poses: PoseBatch) -> Iterator[Record
     Args:
         robot: what its controller has.
         point: counted from 1.
-        poses: of the point, in the convention's frames, the reference first.
+        poses: poses of the point, in the convention's frames, the reference first.
     """
     joints = robot.mechanism.inverse(robot.commanding, robot.branch, poses)
     shown = (poses.positions - poses.positions[:1]) @ robot.frames.base

@@ -48,11 +48,11 @@ class DesignTrial:
     """One robot, and how it is calibrated.
 
     Attributes:
-        number: of the robot.
-        choice: of orientations.
-        travel_mm: of the gauges, to either side.
+        number: number of the robot.
+        choice: how its orientations are chosen.
+        travel_mm: travel of the gauges, to either side.
         tilt_deg: largest tilt.
-        noise_mm: of encoders and gauges.
+        noise_mm: noise of encoders and gauges.
         points: among which the records are divided.
     """
 
@@ -235,7 +235,7 @@ class DesignStudy:
 
     Attributes:
         choices: curves by the way to choose orientations.
-        sweeps: of adaptive campaigns, by the name and the value of what is varied.
+        sweeps: spreads of adaptive campaigns, by the name and the value of what is varied.
         noise_ratio: by how much the noise on the parameters is smaller than with other orientations, at the
             median of the robots that both identify.
     """

@@ -94,10 +94,10 @@ class Errors:
     """Largest errors of a parameter, mm, by both estimators from the same records.
 
     Attributes:
-        steps: by the paper's estimator after each step of Gauss-Newton, as far as it came.
+        steps: errors of the paper's estimator after each step of Gauss-Newton, as far as it came.
         is_settled: whether it came to an end.
-        paper: by kinds of parameters, of the paper's estimator where it came to its end; else empty.
-        ours: by kinds of parameters, of this program's; empty where it refuses the records.
+        paper: errors of the paper's estimator by kinds of parameters; empty where it came to no end.
+        ours: errors of this program's by kinds of parameters; empty where it refuses the records.
     """
 
     steps: tuple[float, ...]
@@ -191,10 +191,10 @@ class MedianErrors:
         trials: number of draws.
         settled: in how many the paper's estimator came to its end.
         refused: in how many this program's refused to identify.
-        paper_mm: by the paper's estimator, of those that settled; NaN if no draw did.
-        ours_there_mm: by this program's estimator, of the same; NaN where it refuses all of them.
-        ours_mm: by this program's estimator, of all that it identified.
-        after_steps_mm: by the paper's after 3, 5 and 10 steps, of all that came so far.
+        paper_mm: error of the paper's estimator in draws that settled; NaN if no draw did.
+        ours_there_mm: error of this program's estimator in these draws; NaN where it refuses all.
+        ours_mm: error of this program's estimator in all draws that it identified.
+        after_steps_mm: errors of the paper's after 3, 5 and 10 steps, in all draws that came so far.
     """
 
     trials: int
@@ -238,7 +238,7 @@ class PaperStudy:
     """The whole study.
 
     Attributes:
-        figures: for 4 and 5, the sets with one to five points.
+        figures: the sets with one to five points of figures 4 and 5.
         sweep: five points, eleven orientations; angles of other sizes and meanings.
         table_2: largest errors with five points and eleven orientations by kinds, medians, mm: by the
             paper's estimator, and by this program's.

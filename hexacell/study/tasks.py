@@ -26,12 +26,12 @@ class Study(Generic[TaskType, ResultType, SummaryType]):
     """Independent tasks, and what their results say together.
 
     Attributes:
-        name: of its command and its files.
-        unit: what a task is, in the plural.
+        name: name of its command and its files.
+        unit: word for its tasks, in the plural.
         tasks_of: all tasks by their keys, for a number of draws. Each has its own seed.
         carry_out: a task's result; a function of a module, since other processes import it.
-        result_type: of that, a dataclass, which is kept as JSON.
-        summary: of all tasks and their results, by the same keys.
+        result_type: class of the results, a dataclass, which is kept as JSON.
+        summary: gives the summary of all tasks and their results, by the same keys.
     """
 
     name: str

@@ -92,8 +92,8 @@ class ClusterExecutor(Executor):
     """One connection to a cluster, broken when that is.
 
     Args:
-        address: of the scheduler.
-        patience_s: for its answer and its workers, s.
+        address: address of the scheduler.
+        patience_s: how long to wait for its answer and its workers, s.
 
     Raises:
         ClusterError: it does not answer, has no workers, or another version of this program.

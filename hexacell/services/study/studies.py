@@ -44,7 +44,7 @@ def run_study(
         folder: gets a line for each task, in a file ``.jsonl`` named after the study.
         draws: as many as the study is to make.
         new_executor: what carries out the tasks, such as :func:`processes`; another one where it breaks.
-        on_progress: is called after every task.
+        on_progress: called after every task.
 
     Raises:
         FileError: the folder cannot be written, or has another file of that name.

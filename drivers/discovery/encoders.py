@@ -17,17 +17,10 @@ from typing import Any
 import can
 
 from drivers.discovery import USUAL, SearchTimeouts
+from drivers.encoders import object_dictionary as od
 from drivers.encoders.can_bus import EncoderBus, is_canopen
 from drivers.encoders.canopen_node import EncoderNode, Leg
-from drivers.encoders.object_dictionary import (
-    DEVICE_TYPE,
-    ENCODER_PROFILE,
-    MEASURING_STEP,
-    MEASURING_STEP_SETTING,
-    SERIAL_NUMBER,
-    UNITS_PER_TURN,
-    DeviceType,
-)
+from drivers.encoders.object_dictionary import DeviceType
 from drivers.errors import BusError
 from drivers.serial.port import SerialPort
 from drivers.serial.request_port import NoAnswer
@@ -191,12 +184,12 @@ def responding_nodes(bus: EncoderBus, timeouts: SearchTimeouts = USUAL) -> list[
 
 def _described(bus: EncoderBus, number: int, timeout_s: float) -> FoundNode:
     node = EncoderNode(Leg(0, number), bus, timeout_s)
-    kind = node.read_optional(DEVICE_TYPE)
+    kind = node.read_optional(od.DEVICE_TYPE)
     if kind not in set(DeviceType):
-        profile = "" if kind is None else f", profile {kind & 0xFFFF}; encoders are {ENCODER_PROFILE}"
+        profile = "" if kind is None else f", profile {kind & 0xFFFF}; encoders are {od.ENCODER_PROFILE}"
         return FoundNode(number, f"no encoder that is known{profile}")
     device = DeviceType(kind)
-    entries = [UNITS_PER_TURN] if device.unit is JointUnit.DEG else [MEASURING_STEP_SETTING]
-    steps = (node.read_optional(entry) for entry in (*entries, MEASURING_STEP))
+    entries = [od.UNITS_PER_TURN] if device.unit is JointUnit.DEG else [od.MEASURING_STEP_SETTING]
+    steps = (node.read_optional(entry) for entry in (*entries, od.MEASURING_STEP))
     step = next((value for value in steps if value is not None), None)
-    return FoundNode(number, device.description, node.read_optional(SERIAL_NUMBER), step, device.unit)
+    return FoundNode(number, device.description, node.read_optional(od.SERIAL_NUMBER), step, device.unit)

@@ -16,26 +16,18 @@ from pathlib import Path
 from canopen.objectdictionary import ObjectDictionary, ODVariable
 from canopen.objectdictionary.eds import import_eds
 
+from drivers.encoders import object_dictionary as od
 from drivers.encoders.canopen_node import EncoderNode
-from drivers.encoders.object_dictionary import (
-    DEVICE_TYPE,
-    MEASURING_STEP_SETTING,
-    OPERATING_PARAMETERS,
-    PRESET,
-    PRODUCT,
-    UNITS_PER_TURN,
-    VENDOR,
-    ObjectEntry,
-)
+from drivers.encoders.object_dictionary import ObjectEntry
 from hexacell.errors import DeviceError, FileError
 
-WHAT_IT_IS = {"device type": DEVICE_TYPE, "vendor": VENDOR, "product": PRODUCT}
+WHAT_IT_IS = {"device type": od.DEVICE_TYPE, "vendor": od.VENDOR, "product": od.PRODUCT}
 ABOUT = "DeviceInfo"
 HOW_IT_IS_SET = {
-    "operating parameters": OPERATING_PARAMETERS,
-    "preset": PRESET,
-    "measuring step": MEASURING_STEP_SETTING,
-    "counts a turn": UNITS_PER_TURN,
+    "operating parameters": od.OPERATING_PARAMETERS,
+    "preset": od.PRESET,
+    "measuring step": od.MEASURING_STEP_SETTING,
+    "counts a turn": od.UNITS_PER_TURN,
 }
 
 
@@ -92,8 +84,8 @@ def read_data_sheet(path: Path) -> DataSheet:
         raise _no_data_sheet(path, str(error) or type(error).__name__) from error
     entries = (*WHAT_IT_IS.values(), *HOW_IT_IS_SET.values())
     values = {entry: value for entry in entries if (value := _default(dictionary, entry)) is not None}
-    if DEVICE_TYPE not in values:
-        raise _no_data_sheet(path, f"it has no {DEVICE_TYPE}")
+    if od.DEVICE_TYPE not in values:
+        raise _no_data_sheet(path, f"it has no {od.DEVICE_TYPE}")
     return DataSheet(path, values)
 
 
@@ -122,7 +114,7 @@ def _default(dictionary: ObjectDictionary, entry: ObjectEntry) -> int | None:
     elif found is not None:
         found = found.get(entry.subindex)
     value = None if found is None else found.default
-    if value is None and entry in (VENDOR, PRODUCT):
+    if value is None and entry in (od.VENDOR, od.PRODUCT):
         about = dictionary.device_information
-        value = about.vendor_number if entry is VENDOR else about.product_number
+        value = about.vendor_number if entry is od.VENDOR else about.product_number
     return int(value) % (1 << 8 * entry.size) if isinstance(value, int) else None

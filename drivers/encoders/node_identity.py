@@ -8,32 +8,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from drivers.encoders import object_dictionary as od
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, subject_of
-from drivers.encoders.object_dictionary import (
-    DEVICE_TYPE,
-    ENCODER_PROFILE,
-    MEASURING_STEP,
-    MEASURING_STEP_SETTING,
-    OFFSET,
-    OPERATING_PARAMETERS,
-    PRESET,
-    PRODUCT,
-    RESOLUTION,
-    REVISION,
-    SERIAL_NUMBER,
-    UNITS_PER_TURN,
-    VENDOR,
-    WARNINGS,
-    DeviceType,
-)
+from drivers.encoders.object_dictionary import DeviceType
 from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.parameters import JointUnit
 
-STEP_OBJECTS = {"6005h": MEASURING_STEP_SETTING, "6501h": MEASURING_STEP}
+STEP_OBJECTS = {"6005h": od.MEASURING_STEP_SETTING, "6501h": od.MEASURING_STEP}
 """Objects that a device may have its measuring step in."""
 
 REVERSED = 1 << 3
@@ -69,7 +54,7 @@ def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float
 
 def read_device_type(node: EncoderNode, unit: JointUnit = JointUnit.MM) -> DeviceType:
     """The device type of a node, which must be an absolute encoder of joint variables in a unit."""
-    value = node.read(DEVICE_TYPE)
+    value = node.read(od.DEVICE_TYPE)
     if value not in {kind.value for kind in DeviceType if kind.unit is unit}:
         wanted = "linear" if unit is JointUnit.MM else "rotary"
         raise DeviceError(
@@ -89,9 +74,9 @@ def check_step(node: EncoderNode, settings: EncoderSettings) -> None:
 
 
 def _check_counts_per_turn(node: EncoderNode, counts: int) -> None:
-    found = node.read_optional(UNITS_PER_TURN)
+    found = node.read_optional(od.UNITS_PER_TURN)
     if found is None:
-        found = node.read(RESOLUTION)
+        found = node.read(od.RESOLUTION)
     if found != counts:
         raise DeviceError(
             f"has {found} counts a turn, the cell file says {counts}",
@@ -114,13 +99,13 @@ def _measuring_step(node: EncoderNode, stated: str) -> int:
     """The measuring step, nm, from the object that the cell file names, or the one that it has."""
     if stated in STEP_OBJECTS:
         return node.read(STEP_OBJECTS[stated])
-    setting, step = node.read_optional(MEASURING_STEP_SETTING), node.read_optional(MEASURING_STEP)
+    setting, step = node.read_optional(od.MEASURING_STEP_SETTING), node.read_optional(od.MEASURING_STEP)
     if setting is None:
-        return node.read(MEASURING_STEP)
+        return node.read(od.MEASURING_STEP)
     if step is not None and step != setting:
         raise DeviceError(
-            f"has two measuring steps: {setting} nm in {MEASURING_STEP_SETTING}, {step} nm in "
-            f"{MEASURING_STEP}",
+            f"has two measuring steps: {setting} nm in {od.MEASURING_STEP_SETTING}, {step} nm in "
+            f"{od.MEASURING_STEP}",
             subject=node.leg.subject,
             action="Move the joint by a known length to see which holds, and name it: "
             '`step_object = "6005h"` or "6501h" under [encoders]',
@@ -130,19 +115,19 @@ def _measuring_step(node: EncoderNode, stated: str) -> int:
 
 def read_identity(node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
     """The identity object of the device (1018h), without the entries that it does not have."""
-    words = [f"CiA {ENCODER_PROFILE} {kind.description}"]
-    for name, entry in (("vendor", VENDOR), ("product", PRODUCT), ("revision", REVISION)):
+    words = [f"CiA {od.ENCODER_PROFILE} {kind.description}"]
+    for name, entry in (("vendor", od.VENDOR), ("product", od.PRODUCT), ("revision", od.REVISION)):
         value = node.read_optional(entry)
         words += [] if value is None else [f"{name} 0x{value:08X}"]
-    serial_number = node.read_optional(SERIAL_NUMBER)
-    settings, warnings = read_settings(node), node.read_optional(WARNINGS)
+    serial_number = node.read_optional(od.SERIAL_NUMBER)
+    settings, warnings = read_settings(node), node.read_optional(od.WARNINGS)
     return DeviceIdentity(
         name=node.leg.subject,
         protocol="cia406",
         description=", ".join(words),
         serial_number="" if serial_number is None else str(serial_number),
         settings=settings,
-        remark=f"it reports a warning: {WARNINGS} is {warnings:#06x}" if warnings else "",
+        remark=f"it reports a warning: {od.WARNINGS} is {warnings:#06x}" if warnings else "",
     )
 
 
@@ -153,11 +138,11 @@ def read_settings(node: EncoderNode) -> str:
     the joint. They are part of the identity, which every run records and compares.
     """
     words = []
-    parameters = node.read_optional(OPERATING_PARAMETERS)
+    parameters = node.read_optional(od.OPERATING_PARAMETERS)
     if parameters is not None:
         direction = "reversed, " if parameters & REVERSED else ""
         words.append(f"operating parameters {direction}{parameters:#06x}")
-    for name, entry in (("preset", PRESET), ("offset", OFFSET)):
+    for name, entry in (("preset", od.PRESET), ("offset", od.OFFSET)):
         if (value := node.read_optional(entry)) is not None:
             words.append(f"{name} {value if value < _HALF else value - 2 * _HALF}")
     return ", ".join(words)
@@ -179,6 +164,6 @@ def check_serial_number(node: EncoderNode, identity: DeviceIdentity, settings: E
 
 def _device_type_text(value: int) -> str:
     profile, kind = value & 0xFFFF, value >> 16
-    if profile == ENCODER_PROFILE:
+    if profile == od.ENCODER_PROFILE:
         return f"0x{value:08X} (an encoder, but of class {kind}; linear ones are 8 and 10)"
-    return f"0x{value:08X} (profile {profile}; encoders are {ENCODER_PROFILE})"
+    return f"0x{value:08X} (profile {profile}; encoders are {od.ENCODER_PROFILE})"

@@ -10,21 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from drivers.encoders import object_dictionary as od
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, duplicated_node, setting_refused, silent_nodes
 from drivers.encoders.node_identity import SECOND_RESPONSE_S
-from drivers.encoders.object_dictionary import (
-    POSITION,
-    POSITION_OF_MAGNET_1,
-    PRODUCER_HEARTBEAT,
-    TPDO_COUNT,
-    DeviceType,
-    ObjectEntry,
-    tpdo_cob_id,
-    tpdo_event_timer,
-    tpdo_mapping,
-    tpdo_transmission_type,
-)
+from drivers.encoders.object_dictionary import DeviceType, ObjectEntry
 from drivers.errors import BusError, SilentNodeError
 from hexacell.errors import DeviceError
 
@@ -54,7 +44,7 @@ class Tpdo:
     @property
     def position_offset(self) -> int | None:
         """The offset of the position in its data, bits; None if it is not mapped."""
-        positions = (_mapping_parameter(POSITION), _mapping_parameter(POSITION_OF_MAGNET_1))
+        positions = (_mapping_parameter(od.POSITION), _mapping_parameter(od.POSITION_OF_MAGNET_1))
         bits = 0
         for parameter in self.mapping:
             if parameter in positions:
@@ -82,7 +72,7 @@ class PositionChannel:
 
 def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: int) -> PositionChannel:
     """Set one TPDO to the position with every SYNC, switch the others off, start the heartbeat."""
-    tpdos = [tpdo for number in range(1, TPDO_COUNT + 1) if (tpdo := _read(node, number)) is not None]
+    tpdos = [tpdo for number in range(1, od.TPDO_COUNT + 1) if (tpdo := _read(node, number)) is not None]
     if not tpdos:
         raise setting_refused("has no transmit PDO", node.leg)
     # The TPDO that needs the fewest changes: position mapped, synchronous, lowest number.
@@ -90,45 +80,45 @@ def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: i
         tpdos, key=lambda one: (one.position_offset is None, one.transmission_type > 240, one.number)
     )
     for tpdo in tpdos:
-        node.write(tpdo_cob_id(tpdo.number), tpdo.cob_id | _OFF)
+        node.write(od.tpdo_cob_id(tpdo.number), tpdo.cob_id | _OFF)
     channel = _set_up(node, selected, kind)
-    if heartbeat_ms or node.read_optional(PRODUCER_HEARTBEAT):
-        node.write(PRODUCER_HEARTBEAT, heartbeat_ms)
+    if heartbeat_ms or node.read_optional(od.PRODUCER_HEARTBEAT):
+        node.write(od.PRODUCER_HEARTBEAT, heartbeat_ms)
     return channel
 
 
 def _read(node: EncoderNode, number: int) -> Tpdo | None:
-    cob_id = node.read_optional(tpdo_cob_id(number))
+    cob_id = node.read_optional(od.tpdo_cob_id(number))
     if cob_id is None:
         return None
-    slots = range(1, node.read(tpdo_mapping(number, 0)) + 1)
+    slots = range(1, node.read(od.tpdo_mapping(number, 0)) + 1)
     return Tpdo(
         number,
         cob_id,
-        node.read(tpdo_transmission_type(number)),
-        tuple(node.read(tpdo_mapping(number, slot)) for slot in slots),
+        node.read(od.tpdo_transmission_type(number)),
+        tuple(node.read(od.tpdo_mapping(number, slot)) for slot in slots),
     )
 
 
 def _set_up(node: EncoderNode, tpdo: Tpdo, kind: DeviceType) -> PositionChannel:
     offset = tpdo.position_offset
     if offset is None:
-        node.write(tpdo_mapping(tpdo.number, 0), 0)
-        node.write(tpdo_mapping(tpdo.number, 1), _mapping_parameter(kind.position))
-        node.write(tpdo_mapping(tpdo.number, 0), 1)
+        node.write(od.tpdo_mapping(tpdo.number, 0), 0)
+        node.write(od.tpdo_mapping(tpdo.number, 1), _mapping_parameter(kind.position))
+        node.write(od.tpdo_mapping(tpdo.number, 0), 1)
         offset = 0
     if offset % 8:
         raise setting_refused(f"has its position {offset} bits into TPDO {tpdo.number}", node.leg)
-    node.write(tpdo_transmission_type(tpdo.number), WITH_EVERY_SYNC)
-    if node.read_optional(tpdo_event_timer(tpdo.number)):
-        node.write(tpdo_event_timer(tpdo.number), 0)
+    node.write(od.tpdo_transmission_type(tpdo.number), WITH_EVERY_SYNC)
+    if node.read_optional(od.tpdo_event_timer(tpdo.number)):
+        node.write(od.tpdo_event_timer(tpdo.number), 0)
     cob_id = 0x80 + 0x100 * tpdo.number + node.leg.node
-    node.write(tpdo_cob_id(tpdo.number), cob_id | tpdo.cob_id & _NO_RTR)
+    node.write(od.tpdo_cob_id(tpdo.number), cob_id | tpdo.cob_id & _NO_RTR)
     # Read back: some devices acknowledge a write without effect.
-    if node.read(tpdo_transmission_type(tpdo.number)) != WITH_EVERY_SYNC:
+    if node.read(od.tpdo_transmission_type(tpdo.number)) != WITH_EVERY_SYNC:
         what = f"acknowledges, but does not keep, TPDO {tpdo.number} with every SYNC"
         raise setting_refused(what, node.leg)
-    if node.read(tpdo_cob_id(tpdo.number)) & _OFF:
+    if node.read(od.tpdo_cob_id(tpdo.number)) & _OFF:
         raise setting_refused(f"acknowledges, but does not do, switching TPDO {tpdo.number} on", node.leg)
     return PositionChannel(cob_id, offset // 8)
 

@@ -67,7 +67,11 @@ class _Translated:
             except Exception as error:
                 if not is_about_a_device(error):
                     raise
-                raise _device_error(error, self._subject) from error
+                raise DeviceError(
+                    f"its driver failed: {type(error).__name__}: {error}",
+                    subject=self._subject,
+                    action="Check the device and its cable; if they are sound, inform the driver's maker",
+                ) from error
 
         return wrapped
 
@@ -76,11 +80,3 @@ def is_about_a_device(error: Exception) -> bool:
     """Whether the system or a library for devices raised it."""
     module = type(error).__module__.partition(".")[0]
     return isinstance(error, OSError | EOFError) or module in LIBRARIES
-
-
-def _device_error(error: Exception, subject: str) -> DeviceError:
-    return DeviceError(
-        f"its driver failed: {type(error).__name__}: {error}",
-        subject=subject,
-        action="Check the device and its cable; if they are sound, tell the driver's maker",
-    )

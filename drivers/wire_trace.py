@@ -43,9 +43,8 @@ class TraceEntry:
 
     def __str__(self) -> str:
         """One line of text: time, line, direction, the bytes in hexadecimal and as characters."""
-        return (
-            f"{self.time_s:.6f} {self.line} {self.direction} {self.data.hex(' ')}  {_readable(self.data)}"
-        )
+        readable = "".join(chr(byte) if 0x20 <= byte < 0x7F else "." for byte in self.data)
+        return f"{self.time_s:.6f} {self.line} {self.direction} {self.data.hex(' ')}  {readable}"
 
 
 TraceRecorder = Callable[[TraceEntry], None]
@@ -157,7 +156,3 @@ def read_trace(text: str) -> tuple[TraceEntry, ...]:
 
 def _size(entry: TraceEntry) -> int:
     return ENTRY_BYTES + len(entry.data)
-
-
-def _readable(data: bytes) -> str:
-    return "".join(chr(byte) if 0x20 <= byte < 0x7F else "." for byte in data)

@@ -48,7 +48,8 @@ class EncoderBus:
         trace: TraceRecorder | None = None,
         accepts: Callable[[can.Message], bool] | None = None,
     ) -> None:
-        self.name = _name_of(settings)
+        words = (settings.get("interface"), settings.get("channel"))
+        self.name = " ".join(["encoder bus", *(str(word) for word in words if word is not None)])
         self.condition = threading.Condition()
         self.health_check: Callable[[], None] = lambda: None
         self._interrupted = interrupted
@@ -113,7 +114,9 @@ class EncoderBus:
                 if message.is_error_frame:
                     self._count_error_frame()
                 elif self._accepts(message):
-                    self._deliver(message)
+                    with self.condition:
+                        self._record(TrafficDirection.RECEIVED, message)
+                        self.network.notify(message.arbitration_id, message.data, message.timestamp)
         except Exception as error:  # any error must reach the waiting thread
             with self.condition:
                 self._failure = error
@@ -125,11 +128,6 @@ class EncoderBus:
         is_many = len(self._error_frames) == ERROR_FRAMES
         if is_many and self._error_frames[-1] - self._error_frames[0] <= ERROR_FRAMES_S:
             raise can.CanError(f"{ERROR_FRAMES} error frames within {ERROR_FRAMES_S:g} s")
-
-    def _deliver(self, message: can.Message) -> None:
-        with self.condition:
-            self._record(TrafficDirection.RECEIVED, message)
-            self.network.notify(message.arbitration_id, message.data, message.timestamp)
 
     def _send(self, message: can.Message) -> None:
         self._record(TrafficDirection.SENT, message)
@@ -173,11 +171,6 @@ class _Network(canopen.Network):
 def is_canopen(message: can.Message) -> bool:
     """Whether it is a data frame with an 11-bit id, sent by another participant."""
     return message.is_rx and not (message.is_remote_frame or message.is_extended_id)
-
-
-def _name_of(settings: Mapping[str, Any]) -> str:
-    words = (settings.get("interface"), settings.get("channel"))
-    return " ".join(["encoder bus", *(str(word) for word in words if word is not None)])
 
 
 def _text(error: Exception) -> str:

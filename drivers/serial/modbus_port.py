@@ -103,7 +103,12 @@ class ModbusPort(RequestPort):
             self._drop_surplus()
             answer = read(address, count=count, device_id=device)
         if answer.isError():
-            raise self._refused(device, answer.exception_code)
+            code = answer.exception_code
+            raise RefusedRequest(
+                f"device {device} answers exception {code} ({EXCEPTIONS.get(code, 'of its maker')})",
+                subject=self.subject,
+                action="Correct device, kind and register of modbus in the cell file",
+            )
         frame_bytes = FRAME_BYTES + REGISTER_BYTES * count
         if len(answer.registers) != count or not self._is_alone(frame_bytes):
             self._must_clear = True  # one of several frames, of which nobody knows which is the answer
@@ -170,10 +175,3 @@ class ModbusPort(RequestPort):
         except (OSError, termios.error, self._modbus.exceptions.ModbusException) as error:
             self.close()
             raise lost_port(self.subject, self.url, str(error)) from error
-
-    def _refused(self, device: int, code: int) -> DeviceError:
-        return RefusedRequest(
-            f"device {device} answers exception {code} ({EXCEPTIONS.get(code, 'of its maker')})",
-            subject=self.subject,
-            action="Correct device, kind and register of modbus in the cell file",
-        )

@@ -121,13 +121,18 @@ class LinuxcncrshController:
             DeviceError: The connection broke.
         """
         stops = self._session.stop_count
-        block = self._timed_move(pose, duration_s)
+        try:
+            block = timed_move(pose, duration_s)
+        except ValueError as error:
+            raise MoveRefused(f"to move to {pose}", str(error), subject=self._name) from error
         limit_s = 2.0 * duration_s + self._timeouts.beyond_move
         async with self._order:
             commands = await self._session.synchronized()
             if self._was_stopped_since(stops):
                 raise self._stopped_before_moving()
-            self._require_ready(pose)
+            if self._is_unready:
+                reason, action = "its last preparation failed", "Prepare it again"
+                raise MoveRefused(f"to move to {pose}", reason, subject=self._name, action=action)
             await self._execute(commands, block, pose, stops, limit_s)
             await self._verify_arrival(commands, pose, stops, limit_s)
             await self._restore_modes_unless_stopped(commands, stops)
@@ -207,11 +212,6 @@ class LinuxcncrshController:
         yield
         self._is_unready = False
 
-    def _require_ready(self, pose: Pose) -> None:
-        if self._is_unready:
-            reason, action = "its last preparation failed", "Prepare it again"
-            raise MoveRefused(f"to move to {pose}", reason, subject=self._name, action=action)
-
     async def _restore_modes(self, commands: ControllerCommands) -> None:
         await startup.restore_modes(commands, self._restoring, self._timeouts)
         self._has_changed_modes = False
@@ -259,12 +259,6 @@ class LinuxcncrshController:
                 await startup.home_joints(commands, limit_s, poll_s, lambda: self._was_stopped_since(stops))
             case _:
                 await startup.leave_emergency_stop(commands, self._timeouts)
-
-    def _timed_move(self, pose: Pose, duration_s: float) -> str:
-        try:
-            return timed_move(pose, duration_s)
-        except ValueError as error:
-            raise MoveRefused(f"to move to {pose}", str(error), subject=self._name) from error
 
     async def _execute(
         self, commands: ControllerCommands, block: str, pose: Pose, stops: int, limit_s: float

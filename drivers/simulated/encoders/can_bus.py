@@ -14,7 +14,7 @@ import canopen
 _log = logging.getLogger(__name__)
 
 SLICE_S = 0.02
-"""Longest wait for a frame; a timer set by another thread may be so late."""
+"""Longest wait for a frame, s; a timer set by another thread may be so late."""
 
 
 class SimulatedCanBus(canopen.Network):

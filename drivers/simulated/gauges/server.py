@@ -72,7 +72,9 @@ class LineFaults:
         unchanged, before = answer, self._latest
         changes: dict[LineFault, Callable[[bytes], bytes]] = {
             LineFault.DAMAGED: self._damaged,
-            LineFault.CUT_SHORT: self._cut,
+            LineFault.CUT_SHORT: lambda sent: (
+                sent if self._answers % DAMAGED_EVERY else sent[: len(sent) // 2]
+            ),
             LineFault.REPEATED: lambda sent: sent + unchanged,
             LineFault.UNASKED: lambda sent: before + sent,
             LineFault.ECHOING: lambda sent: command + b"\r" + sent,
@@ -92,10 +94,6 @@ class LineFaults:
         place = int(self._random.integers(len(answer)))
         changed = answer[place] ^ 1 << int(self._random.integers(7))
         return answer[:place] + bytes((changed,)) + answer[place + 1 :]
-
-    def _cut(self, answer: bytes) -> bytes:
-        """Each fifth answer ends too early."""
-        return answer if self._answers % DAMAGED_EVERY else answer[: len(answer) // 2]
 
 
 class GaugeLineServer(Closeable):
@@ -180,9 +178,14 @@ class GaugeLineServer(Closeable):
                 os.read(self._wake_read, COMMAND_LIMIT)
                 self._do_jobs()
             else:
-                self._receive(self._line.receive(ready))
+                data = self._received + self._line.receive(ready)
+                commands, rest = self.instrument.split(data)
+                self._received = rest[-COMMAND_LIMIT:]
+                for command in commands:
+                    self._answer(command)
             self._prepare_unasked()
-            self._send_due()
+            while self._answers and self._answers[0][0] <= self._clock.now():
+                self._line.send(self._answers.popleft()[1])
 
     def _do_jobs(self) -> None:
         while not self._jobs.empty():
@@ -193,12 +196,6 @@ class GaugeLineServer(Closeable):
                 done.set_exception(error)
             else:
                 done.set_result(None)
-
-    def _receive(self, data: bytes) -> None:
-        commands, self._received = self.instrument.split(self._received + data)
-        self._received = self._received[-COMMAND_LIMIT:]
-        for command in commands:
-            self._answer(command)
 
     def _answer(self, command: bytes) -> None:
         answer = self.instrument.answer(command)
@@ -230,10 +227,6 @@ class GaugeLineServer(Closeable):
         for frame in () if self._silent else self.instrument.unasked():
             sent = self.faults.sent(b"", frame)
             self._answers.append((now + len(sent) * self._byte_s, sent))
-
-    def _send_due(self) -> None:
-        while self._answers and self._answers[0][0] <= self._clock.now():
-            self._line.send(self._answers.popleft()[1])
 
     def _switch_on(self, channel: int) -> None:
         self.instrument.indicators[channel].switch_on()

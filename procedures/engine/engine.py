@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from hexacell.errors import ExitCode, HexacellError, Interruption, OutOfTime, SeveralErrors
+from hexacell.errors import ExitCode, HexacellError, Interruption, OutOfTime
 from hexacell.verdict.decision import Verdict
 from procedures.engine.command_loop import CommandLoop, Status, StepCancelled
 from procedures.engine.commands import Command, CommandQueue, QuestionBroker, UnattendedOperator
@@ -187,58 +187,48 @@ class Engine:
         try:
             self.record(event)
         except HexacellError as error:
-            if reversal := revert_unrecorded(event, self.state):
-                await self._revert(reversal, error)
-            raise
+            reversal = revert_unrecorded(event, self.state)
+            raised = error if reversal is None else await self._revert(reversal, error)
+            if raised is error:
+                raise
+            raise raised from error
 
-    async def _revert(self, reversal: Reversal, cause: BaseException) -> bool:
-        """Revert a transaction, whatever is cancelled meanwhile; whether it is reverted.
+    async def _unwind(self, error: BaseException) -> BaseException:
+        """End a run early; gives the error to raise.
 
-        Raises:
-            SeveralErrors: the cause, and why it cannot be reverted, where that must be reported.
+        The robot is stopped first, whatever happened. Then a change of the config that may not stay is
+        reverted. The journal gets an ``Interrupted`` last, as far as it can be written.
         """
+        raised = error
         try:
-            self._executor.guards.supervisor.clear()  # a guard whose reason persists trips again
+            stop_failure = await self._halt()
+            if isinstance(error, GuardTripped):
+                self._record_if_possible(events.Tripped.of(error.trip))
+            if reversal := revert_at_end(self.state, error):
+                raised = await self._revert(reversal, error)
+            if stop_failure and isinstance(raised, HexacellError) and not may_still_move(raised):
+                raised = RobotNotStopped(stop_failure, raised)
+        finally:
+            reason, code = str(raised) or type(raised).__name__, int(_exit_code(raised))
+            self._record_if_possible(events.Interrupted(reason=reason, exit_code=code))
+        return raised
+
+    async def _revert(self, reversal: Reversal, cause: BaseException) -> BaseException:
+        """Revert a change of the config, whatever is cancelled meanwhile; gives the error to report."""
+        self._executor.guards.supervisor.clear()  # a guard whose reason persists trips again
+        try:
             if reversal.is_recorded:
                 self.record(events.StepBegun(step=reversal.step))
             event = await shielded(self._executor.perform(reversal.step, self.state))
             if reversal.is_recorded:
                 self.record(event)
         except HexacellError as error:
-            if reversal.failure and isinstance(cause, HexacellError):
-                raise SeveralErrors(reversal.failure, [cause, error]) from cause
-            return False
-        return True
+            return reversal.failed(cause, error)
+        return reversal.undone(cause)
 
-    async def _unwind(self, error: BaseException) -> BaseException:
-        """End a run early: stop the robot, revert what may not stay, journal the interruption.
-
-        Gives the error to raise.
-        """
-        raised = error
-        try:
-            stop_failure = await self._halt()
-            if isinstance(error, GuardTripped):
-                with suppress(HexacellError):
-                    self.record(events.Tripped.of(error.trip))
-            raised = await self._reverted(error)
-            if stop_failure and isinstance(raised, HexacellError) and not may_still_move(raised):
-                raised = RobotNotStopped(stop_failure, raised)
-        finally:
-            reason = str(raised) or type(raised).__name__
-            with suppress(HexacellError):
-                self.record(events.Interrupted(reason=reason, exit_code=int(_exit_code(raised))))
-        return raised
-
-    async def _reverted(self, error: BaseException) -> BaseException:
-        """Revert what may not stay after an error; gives the error to raise."""
-        if (reversal := revert_at_end(self.state, error)) is None:
-            return error
-        try:
-            is_reverted = await self._revert(reversal, error)
-        except SeveralErrors as both:
-            return both
-        return reversal.undone(error) if is_reverted else error
+    def _record_if_possible(self, event: events.Event) -> None:
+        with suppress(HexacellError):
+            self.record(event)
 
     async def _obey_commands(self) -> None:
         """Between two steps: obey the commands that waited for the end of a step."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hexacell.errors import HexacellError, Interruption, WriteBackUndone
+from hexacell.errors import HexacellError, Interruption, SeveralErrors, WriteBackUndone
 from procedures.run.state import RunState
 from procedures.run.trips import may_still_move
 from procedures.steps.base import BaseEvent, BaseStep
@@ -33,15 +33,18 @@ class Reversal:
 
     def undone(self, error: BaseException) -> BaseException:
         """The error to report once it is reverted: of a written result, that it was undone, and why."""
-        if (
-            not isinstance(self.step, RollBack)
-            or not isinstance(error, HexacellError)
-            or may_still_move(error)
-        ):
+        is_result = isinstance(self.step, RollBack) and self.is_recorded
+        if not is_result or not isinstance(error, HexacellError) or may_still_move(error):
             return error
         return WriteBackUndone(
             f"the new geometry was written and could not be verified; the old config is back. {error}"
         )
+
+    def failed(self, cause: BaseException, error: HexacellError) -> BaseException:
+        """The error to report if it cannot be reverted: the cause, and why, unless a resumption may."""
+        if not self.failure or not isinstance(cause, HexacellError):
+            return cause
+        return SeveralErrors(self.failure, [cause, error])
 
 
 def revert_unrecorded(event: BaseEvent, state: RunState) -> Reversal | None:

@@ -351,7 +351,7 @@ def _left_points(state: RunState) -> frozenset[int]:
 def _present_pose(state: RunState, key: SetKey | None) -> Pose | None:
     """The pose that the robot was commanded to last, that of a rejected record included.
 
-    Between points none where it was brought by somebody: it can be brought elsewhere, too.
+    None between points where somebody brought it there: it can be brought elsewhere, too.
     """
     if state.target is not None and (key is not None or state.at_pose is not None):
         return Pose(*state.target)

@@ -29,7 +29,7 @@ CONFIRMING_SEED = 1_000_003
 """Added to the seed of the held-out orientations for those that confirm a failure."""
 
 PosesByPoint = tuple[tuple[SixNumbers, ...], ...]
-"""Poses at each held-out point, its reference first; none at a point that is left."""
+"""Poses at each held-out point, its reference first; empty at a point that is left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class HeldOutPoses:
     candidate_count: int
 
     def before(self, identified: Identification) -> PosesByPoint:
-        """Those that are measured before the write-back as well.
+        """Poses that are measured before the write-back as well.
 
         Where a point has too few, because the ball would leave the travel or the robot its limits, they are
         at one nearer to the middle of the points that the geometry is identified at. Where these are too
@@ -84,7 +84,7 @@ class HeldOutPoses:
     def _at(
         self, chosen: Sequence[SixNumbers], belief: RobotBelief, turns: Array, used: Array
     ) -> tuple[SixNumbers, ...]:
-        """Poses at the point of some; none where these are none, or the robot has too few others."""
+        """Poses at the point of some; empty where these are, or the robot has too few others."""
         if not chosen:
             return ()
         position = self._positions(chosen[:1])[0]
@@ -105,7 +105,7 @@ class HeldOutPoses:
         return turns
 
     def _positions(self, commands: Sequence[Sequence[float]]) -> Array:
-        """Of the ball (n, 3), mm, in the convention's frames."""
+        """Positions of the ball (n, 3), mm, in the convention's frames."""
         return self.robot.from_commands(Pose(*command) for command in commands).positions
 
     def _commands(self, poses: PoseBatch) -> tuple[SixNumbers, ...]:

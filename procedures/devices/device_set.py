@@ -1,12 +1,14 @@
-"""The devices of one cell, together."""
+"""The devices of one cell, together: open, read, kept fresh for screens, closed."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TypeVar
+from functools import partial
+from typing import Any, TypeVar
 
 from drivers.interfaces import (
     Controller,
@@ -22,7 +24,7 @@ from drivers.interfaces import (
 from drivers.stop_input import CombinedStopInput
 from hexacell.cell.devices import GaugeAxis
 from hexacell.errors import HexacellError, joined
-from procedures.devices.live_values import LiveValues
+from procedures.devices.live_values import SAMPLE_PERIOD_S, LiveValue, LiveValues
 from procedures.run.readings import Temperature
 
 Result = TypeVar("Result")
@@ -73,15 +75,15 @@ class Devices:
         return await gather_errors("gauges cannot be read", [read(one.gauge) for one in self.gauges])
 
     async def read_gauge_once(self, gauge: Gauge) -> GaugeReading:
-        """See :meth:`Gauge.read_once`."""
+        """One reading of a gauge, without repetition."""
         return await self.live.gauge(gauge.name).of(gauge.read_once)
 
     async def read_encoders(self) -> EncoderSample:
-        """See :meth:`EncoderBank.read`."""
+        """One sample of the encoders."""
         return await self.live.encoders.of(self.encoders.read)
 
     async def controller_status(self) -> ControllerStatus:
-        """See :meth:`Controller.status`."""
+        """The status of the controller."""
         return await self.live.controller.of(self.controller.status)
 
     async def stop_reason(self) -> str:
@@ -167,3 +169,34 @@ class Thermometers:
 
 def _words(error: Exception) -> str:
     return str(error) if isinstance(error, HexacellError) else repr(error)
+
+
+OTHERS_PERIOD_S = 1.0
+"""Encoders and controller may be guarded meanwhile, which reads them more often."""
+
+
+async def poll_for_screens(devices: Devices, period_s: float = SAMPLE_PERIOD_S) -> None:
+    """Read each device whenever its live value has become older than ``period_s``, until cancelled.
+
+    Only reads that move nothing and change no setting. A device that fails is asked again.
+    """
+    live = devices.live
+    gauges = [
+        _poll(live.gauge(one.gauge.name), partial(devices.read_gauge_once, one.gauge), period_s)
+        for one in devices.gauges
+    ]
+    others_s = max(period_s, OTHERS_PERIOD_S)
+    await asyncio.gather(
+        *gauges,
+        _poll(live.encoders, devices.read_encoders, others_s),
+        _poll(live.controller, devices.controller_status, others_s),
+        _poll(live.stop_reason, devices.stop_reason, others_s),
+    )
+
+
+async def _poll(shown: LiveValue[Any], read: Callable[[], Awaitable[Any]], period_s: float) -> None:
+    while True:
+        if shown.age_s >= period_s:
+            with suppress(HexacellError):  # the live value says why
+                await read()
+        await asyncio.sleep(period_s)

@@ -19,7 +19,7 @@ from hexacell.errors import HexacellError
 T = TypeVar("T")
 
 SAMPLE_PERIOD_S = 0.1
-"""The shortest time between two changes that one subscriber is told of, s."""
+"""The shortest time between two changes that one subscriber is notified of, s."""
 
 
 class LiveValue(Generic[T]):

@@ -68,9 +68,9 @@ def require_known(found: Iterable[DeviceIdentity], known: Sequence[DeviceIdentit
 
 
 def _differs(then: DeviceIdentity, now: DeviceIdentity) -> bool:
-    """Whether it is another device; journals of before do not tell settings and port."""
-    told = {name: getattr(now, name) for name in ("settings", "port") if not getattr(then, name)}
-    return replace(then, **told) != now
+    """Whether it is another device; settings and port count where both are known."""
+    unknown = {name: getattr(now, name) for name in ("settings", "port") if not getattr(then, name)}
+    return replace(then, **unknown) != now
 
 
 def _concerns(mounted: MountedGauge, errors: Sequence[HexacellError]) -> bool:

@@ -25,7 +25,7 @@ class NeverSettled(DeviceError):
 
 FEWEST_TO_TRIM = 3
 TRIMMED = 8
-"""Of so many readings one is left out at each end; at least one, where there are three."""
+"""One reading in so many is left out at each end; at least one, where there are three."""
 
 
 @dataclass(frozen=True, slots=True)

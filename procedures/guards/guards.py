@@ -24,12 +24,11 @@ from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
 from hexacell.kinematics.pose import Pose
-from hexacell.kinematics.position_agreement import PositionReports, PositionSource
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.stated_limits import gauge_travel_of
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
-from procedures.guards.position_check import PositionCheck
+from procedures.guards.position_check import PositionCheck, PositionReports, PositionSource
 from procedures.guards.rules.after_a_move import following_error, stuck_gauge
 from procedures.guards.rules.base import GuardLimits
 from procedures.guards.rules.controller_frozen import WatchedController

@@ -39,7 +39,7 @@ class DevicePoller(Generic[T_co]):
 
     Attributes:
         line: the line on which the device answers.
-        value: the latest value; none before the first answer.
+        value: the latest value; None before the first answer.
         first: the first value.
         error: the error of the latest poll, if it gave no value.
         garbled_count: how many answers in a row were garbled.

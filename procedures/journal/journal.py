@@ -46,7 +46,7 @@ def read_journal(path: Path) -> tuple[Event, ...]:
 
 
 def read_entries(path: Path) -> tuple[Entry, ...]:
-    """The same with number and time of each; raises ``FileError``."""
+    """All events of a journal with number and time of each; raises ``FileError``."""
     try:
         with open(path, "rb", opener=_open_without_waiting) as stream:
             return _parse(path, stream)[0]

@@ -24,13 +24,13 @@ from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
 from hexacell.errors import AnswerNeeded, DeviceError
 from hexacell.kinematics.pose import Pose
-from hexacell.kinematics.position_agreement import PositionReports
 from hexacell.kinematics.rotations import Array
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.calibration import Calibration
 from procedures.devices.device_set import Devices
 from procedures.engine.step_executor import StepExecutor
 from procedures.guards.guards import Guards
+from procedures.guards.position_check import PositionReports
 from procedures.guards.supervision import Supervised
 from procedures.replay.comparison import TOLERANCE
 from procedures.run.questions import Question

@@ -16,7 +16,6 @@ from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.position_agreement import PositionReports
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of, joints_of
 from hexacell.motion.trajectory import LineDurations
@@ -26,6 +25,7 @@ from procedures.calibration.calibration import Calibration
 from procedures.devices.device_set import Devices, Thermometers, gather_errors
 from procedures.devices.settling import DeviceSnapshot, Settled, read_series, settle, trimmed_mean
 from procedures.guards.guards import Guards
+from procedures.guards.position_check import PositionReports
 from procedures.resources.config_changes import ConfigChanges, ConfigEdits
 from procedures.resources.startup import Startup
 from procedures.run.cancellation import in_thread

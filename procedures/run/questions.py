@@ -51,7 +51,7 @@ class GaugePlacement:
 class PendingChange:
     """A change of the controller's config: its acceptance gates, and the text change as a diff.
 
-    ``displacement`` is how far it moves taught points, ``improvement`` what it is for; none if that is not
+    ``displacement`` is how far it moves taught points, ``improvement`` what it is for; None if that is not
     known.
     """
 
@@ -72,7 +72,7 @@ class StepFailure:
 class WrittenResult:
     """A result in the controller's config that did not pass: the outcome in one line, and all of it.
 
-    ``displacement`` is how far it moves taught points; none if that is not known.
+    ``displacement`` is how far it moves taught points; None if that is not known.
     """
 
     line: str
@@ -84,7 +84,7 @@ class WrittenResult:
 class UnreadyController:
     """Why the controller cannot move, and what a person is to permit, or to do at the controller.
 
-    ``word`` is what the cell file may state in ``controller.startup`` to permit it; none if it cannot.
+    ``word`` is what the cell file may state in ``controller.startup`` to permit it; None if it cannot.
     """
 
     problem: str

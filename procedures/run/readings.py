@@ -1,10 +1,15 @@
-"""What the instruments read, raw: nothing here depends on a geometry."""
+"""What the instruments read, raw, and the temperatures of the legs by it; nothing depends on a geometry."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
+import numpy as np
+
+from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.fields import Frozen
+from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.rotations import Array
 from procedures.run.keys import SixNumbers, ThreeNumbers
 
 
@@ -55,3 +60,52 @@ class ReadingSeries(RawReadings):
 def in_words(deviation_mm: Iterable[float]) -> str:
     """Three numbers along x, y and z, mm."""
     return ", ".join(f"{axis} {value:+.3f}" for axis, value in zip("xyz", deviation_mm, strict=True))
+
+
+def legs_warmer(
+    thermometers: Iterable[ThermometerSettings],
+    readings: Sequence[Reading],
+    before: Sequence[float | None],
+) -> Array:
+    """By how much each leg (n, 6), K, was warmer at n records than ``before``, deg C a leg.
+
+    0 of a leg without a thermometer. NaN of one whose thermometer never answered, or that has no
+    reference temperature. Where a thermometer once did not answer, the mean of what it showed counts.
+    """
+    warmer = np.zeros((len(readings), LEGS))
+    reference = [*before, *[None] * LEGS][:LEGS]
+    for thermometer in thermometers:
+        shown = _shown(thermometer.name, readings)
+        for leg in thermometer.legs:
+            at_first = reference[leg - 1]
+            warmer[:, leg - 1] = shown - (np.nan if at_first is None else at_first)
+    return warmer
+
+
+def mean_leg_temperatures(
+    thermometers: Iterable[ThermometerSettings], readings: Sequence[Reading]
+) -> tuple[float | None, ...]:
+    """The mean temperature of each leg, deg C; None of a leg that has no thermometer, or a silent one."""
+    means: list[float | None] = [None] * LEGS
+    for thermometer in thermometers:
+        shown = _shown(thermometer.name, readings)
+        for leg in thermometer.legs:
+            means[leg - 1] = None if np.isnan(shown).any() or not len(shown) else float(shown.mean())
+    return tuple(means)
+
+
+def mean_temperature(readings: Iterable[Reading]) -> float | None:
+    """The mean, deg C, of all that thermometers showed at some records; None if there was nothing."""
+    every = [one.celsius for reading in readings for one in reading.temperatures]
+    shown = [celsius for celsius in every if celsius is not None]
+    return float(np.mean(shown)) if shown else None
+
+
+def _shown(name: str, readings: Sequence[Reading]) -> Array:
+    """What a thermometer showed at n records, gaps filled with the mean; NaN if it never answered."""
+    by_record = [{one.name: one.celsius for one in reading.temperatures}.get(name) for reading in readings]
+    shown = np.array([np.nan if celsius is None else celsius for celsius in by_record])
+    if np.isnan(shown).all():
+        return shown
+    filled: Array = np.where(np.isnan(shown), np.nanmean(shown), shown)
+    return filled

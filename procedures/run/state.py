@@ -83,7 +83,7 @@ class SetState:
         return found[0] if found else dict(self.again).get(orientation)
 
     def unverified(self) -> SetState:
-        """The same after the gauges were unwatched; a closed set is not affected."""
+        """The set after the gauges were unwatched; a closed set is not affected."""
         if self.closed or not self.samples:
             return self
         return replace(self, reference_unverified=True, probes=(), tried=False)
@@ -120,7 +120,7 @@ class RunState:
 
     Attributes:
         sets: by key, invalidated ones left out.
-        noise: what was measured of it; none before that, or where the cell file does not ask for it.
+        noise: what was measured of it; None before that, or where the cell file does not ask for it.
         at_pose: the set and orientation of the pose that the robot is at; None if it is at none.
         target: the pose that it was last commanded to or located at.
         off_plan: it is at a pose of no set: it was located there, or is at a waypoint.
@@ -129,8 +129,8 @@ class RunState:
         position_unknown: the controller must be asked for the pose before the robot moves.
         excluded: poses that the controller refused, in the order of the refusals.
         failures: how many, by kind and place, since the run was begun or resumed.
-        confirmation: the records that are to tell whether a test of the model failed by chance.
-        rolling_back: the old geometry is being put back.
+        confirmation: the records that show whether a test of the model failed by chance.
+        rolling_back: the old geometry is being restored.
         provisional: the provisional geometry that the controller was given last.
         provisional_active: the controller has it now.
         is_in_estop: the controller came into emergency stop, and has not moved since.
@@ -221,7 +221,7 @@ class RunState:
         return [*self.open_sets, *([first] if is_checking and first not in self.open_sets else [])]
 
     def zero(self, key: SetKey) -> Reading | None:
-        """The reading that the deviations of a set are measured from; none before it is taken."""
+        """The reading that the deviations of a set are measured from; None before it is taken."""
         of_zero = SetKey(phase=Phase.LENGTH, point=1) if key.phase is Phase.LENGTH else key
         samples = self.set(of_zero).samples
         return samples[0].reading if samples else None
@@ -239,7 +239,7 @@ class RunState:
         return is_refused and not self.set(key).samples
 
     def zero_shown(self, key: SetKey) -> ThreeNumbers | None:
-        """What a set's gauges showed, mm along base x, y, z, when they were zeroed; none before that."""
+        """What a set's gauges showed, mm along base x, y, z, when they were zeroed; None before that."""
         zero = self.zero(key)
         return None if zero is None else zero.gauges_mm
 
@@ -265,7 +265,7 @@ class RunState:
 
     @property
     def temperature_range_k(self) -> float | None:
-        """The largest range that a thermometer showed with these records; none without readings."""
+        """The largest range that a thermometer showed with these records; None without readings."""
         shown: dict[str, list[float]] = {}
         for sample in self.samples(Phase.IDENTIFY):
             for temperature in sample.reading.temperatures:

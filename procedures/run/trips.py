@@ -57,7 +57,7 @@ class Trip:
         return (DriftTripped if self.guard is Guard.DRIFT else GuardTripped)(self)
 
     def unstopped(self, reason: str) -> Trip:
-        """The same where the robot could not be stopped: then that comes first."""
+        """The trip of a robot that could not be stopped: then that comes first."""
         return replace(self, stop_failure=reason)
 
 

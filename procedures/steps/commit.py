@@ -23,7 +23,7 @@ class Committed(BaseEvent):
     approved_by: str
 
     def applied_to(self, state: RunState) -> RunState:
-        """The same joint variables are another pose under another geometry."""
+        """Equal joint variables are another pose under another geometry."""
         return replace(state, committed=self).without_position()
 
     def text(self, state: RunState) -> str:

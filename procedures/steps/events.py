@@ -88,5 +88,5 @@ EVENTS: tuple[type[BaseEvent], ...] = tuple(
 
 if TYPE_CHECKING:
     Event = BaseEvent
-else:  # what a file may have: exactly one of these, told apart by its kind
+else:  # what a file may have: exactly one of these, distinguished by its kind
     Event = Annotated[Union[EVENTS], Field(discriminator="kind")]  # noqa: UP007

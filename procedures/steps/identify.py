@@ -71,7 +71,7 @@ class Identify(Computation):
 
 
 def _held_out_poses(known: Knowledge, assessed: Assessment) -> PosesByPoint:
-    """Those of an identification; the error states its verdict, as a wrong geometry may be the cause."""
+    """Choose held-out poses; the error states the verdict, as a wrong geometry may be the cause."""
     try:
         return known.held_out_poses.before(assessed.found)
     except LimitError as error:

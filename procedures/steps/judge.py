@@ -17,7 +17,7 @@ from hexacell.verdict.length_check import LengthMeasurements, LengthStatement, l
 from hexacell.verdict.outcome import length_line, outcome_line, reason_of
 from hexacell.verdict.verification import HeldOut, Verification, verify
 from procedures.run.keys import Phase, SixNumbers
-from procedures.run.leg_temperatures import legs_warmer
+from procedures.run.readings import legs_warmer
 from procedures.steps.base import BaseEvent, Computation
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class ConfirmationPlanned(BaseEvent):
-    """A test of the model failed, perhaps by chance: confirming held-out poses were chosen, which tell.
+    """A test of the model failed, perhaps by chance: confirming held-out poses were chosen, which decide.
 
     ``poses`` are those at each held-out point, its reference first; empty at a point that is left.
     """
@@ -40,7 +40,7 @@ class ConfirmationPlanned(BaseEvent):
         return replace(state, confirmation=self)
 
     def text(self, state: RunState) -> str:
-        return f"{self.reason}: {sum(map(len, self.poses))} new records tell whether by chance"
+        return f"{self.reason}: {sum(map(len, self.poses))} new records show whether by chance"
 
 
 class ResultValidated(BaseEvent):

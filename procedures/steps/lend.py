@@ -26,7 +26,7 @@ class ProvisionalApplied(BaseEvent):
     folder: str
 
     def applied_to(self, state: RunState) -> RunState:
-        """The same joint variables are another pose now."""
+        """Equal joint variables are another pose now."""
         applied = replace(state, provisional=self, provisional_active=True, config_write_pending=False)
         return applied.without_position()
 

@@ -53,5 +53,5 @@ STEPS: tuple[type[BaseStep], ...] = (
 
 if TYPE_CHECKING:
     Step = BaseStep
-else:  # what a file may have: exactly one of these, told apart by its kind
+else:  # what a file may have: exactly one of these, distinguished by its kind
     Step = Annotated[Union[STEPS], Field(discriminator="kind")]  # noqa: UP007

@@ -123,7 +123,7 @@ async def read_inside(
 def require_room(settings: CellSettings, shown_mm: ThreeNumbers) -> None:
     """Refuse gauges whose plungers stand too far from the middle of their travel.
 
-    ``shown_mm`` is what they show along base x, y, z. A gauge whose display does not tell its place passes.
+    ``shown_mm`` is what they show along base x, y, z. A gauge whose display does not show its place passes.
 
     Raises:
         MountingError: says which gauge must be moved, which way, and how far.

@@ -20,7 +20,7 @@ class ProvisionalReverted(BaseEvent):
     kind: Literal["taken back"] = "taken back"
 
     def applied_to(self, state: RunState) -> RunState:
-        """The same joint variables are another pose now."""
+        """Equal joint variables are another pose now."""
         return replace(state, provisional_active=False, config_write_pending=False).without_position()
 
     def text(self, state: RunState) -> str:

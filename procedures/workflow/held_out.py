@@ -83,7 +83,7 @@ class HeldOutSteps:
         return reference_move(state, key) if is_in_order else self._to_reference(state, key)
 
     def _next_orientation(self, state: RunState, key: SetKey) -> int | None:
-        """The lowest one without a record that the controller does not refuse; none if there is none."""
+        """The lowest one without a record that the controller does not refuse; None if there is none."""
         taken = {sample.orientation for sample in state.set(key).samples}
         poses, _ = self._poses(state, key)
         waiting = (number for number in range(1, len(poses) + 1) if number not in taken)
@@ -119,7 +119,7 @@ class HeldOutSteps:
             return Judge()
 
     def _back(self, state: RunState, key: SetKey) -> Move | None:
-        """The move to the reference after the ball has left the travel; none there, or where none is found.
+        """The move to the reference after the ball has left the travel; None there, or where no path is found.
 
         The verdict is certain, and the old config is to be restored. Far from level, the joint variables
         may belong to no pose of the old geometry. One attempt is made.

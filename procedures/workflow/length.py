@@ -58,7 +58,7 @@ class LengthSteps:
 
     @property
     def _records(self) -> int:
-        """Of each mounting."""
+        """Number of records of a mounting."""
         return self.fixture.orientations + 1
 
     def _in_set(self, state: RunState, key: SetKey) -> Step:

@@ -29,7 +29,7 @@ from procedures.steps.standstill import Standstill
 from procedures.workflow.sets import Known, SetSteps, move_to_chosen, reference_pose
 
 DISTANCE_SHARE = 0.3
-"""Of the gauges' travel: how far the robot leaves the reference, level as it is."""
+"""How far the robot leaves the reference, level as it is, as a share of the gauges' travel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class NoiseSteps:
         return self._leave(state, key, known) or AssessNoise()
 
     def _away(self, state: RunState, key: SetKey) -> Step | None:
-        """What is left to do before the robot returns to the reference; none if nothing is."""
+        """What is left to do before the robot returns to the reference; None if nothing is."""
         measured = state.set(key)
         if measured.piloted == self.plan.pilots_per_departure or not measured.has_left:
             return None
@@ -72,7 +72,7 @@ class NoiseSteps:
         return self._to_pilot(state, key)
 
     def _to_pilot(self, state: RunState, key: SetKey) -> Move | None:
-        """The next move to the next pilot pose; none if there is none, or the visits do not repeat.
+        """The next move to the next pilot pose; None if there is none, or the visits do not repeat.
 
         A robot that shows other places each time it is at one is not known by what it shows.
         """
@@ -83,7 +83,7 @@ class NoiseSteps:
         return None if pilot is None else move_to_chosen(state, pilot)
 
     def _leave(self, state: RunState, key: SetKey, known: Known | None) -> Move | None:
-        """The move away from the reference before its next visit; none after the last one."""
+        """The move away from the reference before its next visit; None after the last one."""
         done = len(state.set(key).visits)
         if done >= self.settings.revisits:
             return None

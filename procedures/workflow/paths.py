@@ -24,7 +24,7 @@ from procedures.run.state import RunState
 from procedures.steps.move import Move
 
 ELSEWHERE = 3.0
-"""Of the gauges' room: at a ball that is farther from their zero they surely are not."""
+"""The gauges are surely not at a ball that is farther from their zero than so many times their room."""
 
 
 class NoSafePath(LimitError):

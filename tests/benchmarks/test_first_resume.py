@@ -141,6 +141,6 @@ def test_a_first_resume_ends_every_killed_run_with_a_pass(say, tmp_path) -> None
     steps = Counter(one.step for one in done)
     say("killed runs that the first resume ends with a pass", f"{KILLS - len(others)} of {KILLS}", "all")
     say("killed in", ", ".join(f"{step} {count}" for step, count in steps.most_common(6)), "")
-    confirmed = sum("new records tell whether by chance" in one.ended.words for one in done)
+    confirmed = sum("new records show whether by chance" in one.ended.words for one in done)
     say("of these with confirming records after a test that failed narrowly", f"{confirmed}", "")
     assert not others, "\n".join(others)

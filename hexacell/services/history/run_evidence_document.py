@@ -18,7 +18,7 @@ from hexacell.services.recorded.journal_soundness import read_sound
 from hexacell.services.recorded.recorded_robot import started_robot
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.run.keys import Phase
-from procedures.run.leg_temperatures import legs_warmer, mean_temperature
+from procedures.run.readings import legs_warmer, mean_temperature
 from procedures.run.state import RunState
 
 REFERENCE_C = 20.0

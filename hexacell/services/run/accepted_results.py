@@ -22,7 +22,7 @@ from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import with_measured_scale
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.run.keys import Phase
-from procedures.run.leg_temperatures import mean_leg_temperatures
+from procedures.run.readings import mean_leg_temperatures
 from procedures.run.state import RunState
 from procedures.steps import events
 

@@ -89,7 +89,7 @@ def _improvement(change: PendingChange) -> str:
     if expected is None:
         return ""
     return (
-        f"Largest position error at the task poses: {expected.now_mm:.3g} mm with the config of now, "
+        f"Largest position error at the task poses: {expected.now_mm:.3g} mm with the current config, "
         f"0 +- {expected.expanded_mm:.2g} mm with this one."
     )
 
@@ -117,9 +117,9 @@ def _consenting(
 
 def _keeping(question: Question, result: WrittenResult) -> QuestionView:
     taught = "" if result.displacement is None else teaching_sentence(result.displacement)
-    stands = "The new geometry is in the controller's config. Without your word the old one is put back."
+    stands = "The new geometry is in the controller's config. Without your word the old one is restored."
     title = "The result did not pass. Keep it all the same?"
-    view = _consenting(question, "keep it", title, "put the old config back")
+    view = _consenting(question, "keep it", title, "restore the old config")
     shown = tuple(text for text in (f"{result.line}.", taught, stands) if text)
     return replace(view, paragraphs=shown, urgency=Urgency.ALARM)
 

@@ -182,7 +182,7 @@ def test_who_watches_is_told_who_is_in_control() -> None:
 def test_who_does_not_keep_a_result_knows_that_the_old_config_comes_back() -> None:
     verification = Verification(verdict=Verdict.CONDITIONAL_PASS, before_mm=3.0, after_mm=0.1)
     view = question_view(ask_acceptance("0.1 mm", verification), None)
-    assert [choice.label for choice in view.choices] == ["yes, keep it", "no, put the old config back"]
+    assert [choice.label for choice in view.choices] == ["yes, keep it", "no, restore the old config"]
 
 
 def test_a_record_has_its_largest_residual_and_how_many_sigma_that_is() -> None:

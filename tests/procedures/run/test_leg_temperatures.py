@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.cell.devices import ThermometerSettings
-from procedures.run.leg_temperatures import legs_warmer, mean_leg_temperatures, mean_temperature
-from procedures.run.readings import Reading, Temperature
+from procedures.run.readings import (
+    Reading,
+    Temperature,
+    legs_warmer,
+    mean_leg_temperatures,
+    mean_temperature,
+)
 
 ROOM = ThermometerSettings(name="room", path="/room")
 PAIR = ThermometerSettings(name="pair", path="/pair", legs=(1, 2))

@@ -137,5 +137,5 @@ def orientations_taken(rig: Any) -> list[int]:
 def test_why_more_is_measured_is_said() -> None:
     pose = (0.0,) * 6
     planned = events.ConfirmationPlanned(reason="The residuals are odd", poses=((pose, pose), ()))
-    said = "The residuals are odd: 2 new records tell whether by chance"
+    said = "The residuals are odd: 2 new records show whether by chance"
     assert event_text(planned, RunState()) == said

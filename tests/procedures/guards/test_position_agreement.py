@@ -14,15 +14,15 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.position_agreement import (
+from hexacell.kinematics.rotations import Array
+from hexacell.robot.model import robot_of
+from procedures.guards.position_check import (
     AgreementTolerances,
     PositionMismatch,
     PositionReports,
     PositionSource,
     position_mismatch,
 )
-from hexacell.kinematics.rotations import Array
-from hexacell.robot.model import robot_of
 
 ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))
 TOLERANCES = AgreementTolerances(position_mm=0.01, encoders=1.0)

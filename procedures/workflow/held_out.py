@@ -119,7 +119,7 @@ class HeldOutSteps:
             return Judge()
 
     def _back(self, state: RunState, key: SetKey) -> Move | None:
-        """The move to the reference after the ball has left the travel; None there, or where no path is found.
+        """The move to the reference after the ball has left the travel; None there, or without a safe path.
 
         The verdict is certain, and the old config is to be restored. Far from level, the joint variables
         may belong to no pose of the old geometry. One attempt is made.

@@ -82,6 +82,8 @@ def decode(line: bytes, path: Path, due: int) -> Entry | None:
     if int(number) != due:
         problem = f"the journal is damaged: record {int(number)} is in the place of record {due}"
         raise FileError(problem, subject=path, line=due, action=RESTORE)
+    if due == 1 and not _FIRST.match(line):
+        raise _foreign("it states no version", path, due)
     try:
         found = _EVENTS.validate_json(event)
         when = datetime.fromisoformat(at.decode())
@@ -112,9 +114,7 @@ def _checksum(body: bytes) -> int:
 
 def _require_known_version(line: bytes, path: Path) -> None:
     stated = _FIRST.match(line)
-    if stated is None:
-        raise _foreign("it states no version", path, 1)
-    if (version := int(stated[1])) > VERSION:
+    if stated is not None and (version := int(stated[1])) > VERSION:
         raise FileError(
             f"a newer hexacell wrote this journal: its format has version {version}, known is {VERSION}",
             subject=path,

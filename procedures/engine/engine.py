@@ -21,7 +21,6 @@ from procedures.run.state import RunState, apply, fold
 from procedures.run.trips import GuardTripped, RobotNotStopped, may_still_move
 from procedures.steps import events
 from procedures.steps.registry import Step
-from procedures.workflow.next_step import next_step
 
 Listener = Callable[[events.Event, RunState], None]
 
@@ -177,7 +176,7 @@ class Engine:
 
     async def _decide(self) -> Step | None:
         """The next step; raises ``OutOfTime`` where the run was recalled and the robot is back."""
-        step = await asyncio.to_thread(next_step, self._executor.calibration, self.state)
+        step = await asyncio.to_thread(self._executor.next_step, self.state)
         if step is None and (reason := self.state.recalled) is not None:
             raise OutOfTime(f"the run was ended: {reason}", action="Resume it; what was measured is kept")
         return step

@@ -33,7 +33,6 @@ from procedures.run.state import RunState, apply
 from procedures.steps import events
 from procedures.steps.events import Event
 from procedures.steps.registry import Step
-from procedures.workflow.next_step import next_step
 
 Outcome = TypeVar("Outcome")
 
@@ -114,7 +113,7 @@ class Replayer:
         self._compare_with(Aspect.DECISION, event.step.key, event.step, decided)
 
     async def _decided(self) -> Step | Exception | None:
-        deciding = asyncio.to_thread(next_step, self._executor.calibration, self._state)
+        deciding = asyncio.to_thread(self._executor.next_step, self._state)
         return await _result_or_error(deciding)
 
     async def _outcome(self, step: Step, event: events.Event) -> None:

@@ -40,7 +40,6 @@ class Script:
 
     def __init__(self, devices: Any) -> None:
         self.devices = devices
-        self.calibration = self
         self.hold: str | None = None
         self.held = asyncio.Event()
         self.let_go = asyncio.Event()

@@ -43,7 +43,6 @@ class Script:
 
     def __init__(self, devices: Any, steps: list[Step]) -> None:
         self.devices = devices
-        self.calibration = self
         self.steps = steps
         self.done: list[str] = []
         self.failure: BaseException | None = None

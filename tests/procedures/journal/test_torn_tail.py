@@ -37,7 +37,7 @@ def test_a_last_line_of_garbage_is_a_torn_tail(path: Path, written: bytes) -> No
 
 
 def test_a_valid_last_line_of_an_unknown_kind_is_refused(path: Path, written: bytes) -> None:
-    body = b'{"n":%d,"at":"2026-11-20T10:30:00.000Z","s":1.0,"event":{"kind":"teleported"}}' % (len(TOLD) + 1)
+    body = b'{"n":%d,"at":"2026-11-20T10:30:00Z","s":1.0,"event":{"kind":"teleported"}}' % (len(TOLD) + 1)
     path.write_bytes(written + checked(body))
     with pytest.raises(FileError, match=r":5: .*not understood .*'teleported'") as refusal:
         Journal(path)

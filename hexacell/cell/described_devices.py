@@ -150,9 +150,9 @@ SixRegisters = tuple[Register, Register, Register, Register, Register, Register]
 class LatchSettings(Section):
     """What is written to all devices at once for each of them to keep its position of that instant."""
 
-    register_: Register = Field(alias="register", description="the register, counted from 0")
-    value: int = Field(1, ge=0, le=65535, description="what is written to it")
-    delay_s: NotNegative = Field(0.005, description="how long they take, before they are asked")
+    register_: Register = Field(alias="register", description="register that is written, counted from 0")
+    value: int = Field(1, ge=0, le=65535, description="value that is written")
+    delay_s: NotNegative = Field(0.005, description="wait before the devices are asked, s")
 
 
 class ModbusEncoderSettings(Section):
@@ -160,19 +160,24 @@ class ModbusEncoderSettings(Section):
 
     port: Text | None = Field(None, description="device path or pyserial URL of the line with all of them")
     serial: dict[str, Any] = Field(
-        default_factory=dict, description="passed to pyserial; by default 19200 baud and even parity"
+        default_factory=dict, description="settings for pyserial; by default 19200 baud and even parity"
     )
     devices: SixDevices = Field(
-        (1, 1, 1, 1, 1, 1), description="addresses of the devices with legs 1 to 6; one may have several"
+        (1, 1, 1, 1, 1, 1),
+        description="addresses of the devices with legs 1 to 6; one device may have several legs",
     )
     registers: SixRegisters = Field(
         description="first register of the position of legs 1 to 6, counted from 0"
     )
-    kind: Literal["input", "holding"] = Field("input", description="function 4 or 3")
-    bits: Literal[16, 32] = Field(32, description="of a position, in one or two registers")
-    word_order: Literal["big", "little"] = Field("big", description="which of two registers comes first")
+    kind: Literal["input", "holding"] = Field(
+        "input", description="kind of the registers: input (function 4) or holding (function 3)"
+    )
+    bits: Literal[16, 32] = Field(32, description="bits of a position, in one or two registers")
+    word_order: Literal["big", "little"] = Field(
+        "big", description="order of two registers: big if the first one has the upper half"
+    )
     latch: LatchSettings | None = Field(
-        None, description="samples several devices at one instant, where they can do that"
+        None, description="register that samples several devices at one instant, where they have one"
     )
     invalid: tuple[int, ...] = Field((), max_length=8, description="counts that mean no valid position")
 

@@ -182,10 +182,13 @@ class EncoderSettings(Section, ABC):
     largest_speed: Positive | None = Field(
         None,
         alias="largest_speed_mm_s",
-        description="a joint that goes faster between two samples jumped; by default from [speed]",
+        description="largest speed of a joint; a faster one between two samples is a jump; by default "
+        "from [speed]",
     )
     dbc: DbcSettings | None = Field(None, description="messages of encoders of protocol dbc")
-    modbus: ModbusEncoderSettings | None = Field(None, description="of protocol modbus: where they are")
+    modbus: ModbusEncoderSettings | None = Field(
+        None, description="registers of encoders of protocol modbus"
+    )
     certificate: CertificateSettings | None = Field(
         None, description="certificate of the calibration of all six encoders"
     )
@@ -223,9 +226,9 @@ class EncoderSettings(Section, ABC):
 class LinearEncoderSettings(EncoderSettings):
     """The bank of six encoders of joints that slide, or of legs."""
 
-    measuring_step_nm: Positive = Field(1000, description="one count, nm; must be what the device reports")
+    measuring_step_nm: Positive = Field(1000, description="one count, nm, as the device must report it")
     step_object: Literal["any", "6005h", "6501h"] = Field(
-        "any", description="the object with the measuring step, where a device has both and they differ"
+        "any", description="object with the measuring step, where a device has both and they differ"
     )
 
     @property
@@ -243,7 +246,10 @@ class RotaryEncoderSettings(EncoderSettings):
     """The bank of six encoders of joints that turn."""
 
     counts_per_turn: int = Field(
-        1 << 20, ge=1, le=0xFFFF_FFFF, description="of the joint; must be what the device reports"
+        1 << 20,
+        ge=1,
+        le=0xFFFF_FFFF,
+        description="counts in a turn of the joint, as the device must report them",
     )
 
     @property

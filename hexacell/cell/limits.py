@@ -51,12 +51,12 @@ SixJointAxes = tuple[JointAxis, JointAxis, JointAxis, JointAxis, JointAxis, Join
 class AxisLimitSettings(Section):
     """Smallest and largest command of each of the controller's axes; None: any."""
 
-    x: MinMax | None = Field(None, description="mm")
-    y: MinMax | None = Field(None, description="mm")
-    z: MinMax | None = Field(None, description="mm")
-    a: MinMax | None = Field(None, description="deg")
-    b: MinMax | None = Field(None, description="deg")
-    c: MinMax | None = Field(None, description="deg")
+    x: MinMax | None = Field(None, description="smallest and largest command, mm")
+    y: MinMax | None = Field(None, description="smallest and largest command, mm")
+    z: MinMax | None = Field(None, description="smallest and largest command, mm")
+    a: MinMax | None = Field(None, description="smallest and largest command, deg")
+    b: MinMax | None = Field(None, description="smallest and largest command, deg")
+    c: MinMax | None = Field(None, description="smallest and largest command, deg")
 
     @property
     def ranges(self) -> tuple[MinMax | None, ...]:
@@ -67,12 +67,22 @@ class AxisLimitSettings(Section):
 class PassiveJointSettings(Section):
     """How far each leg may turn in its two passive joints, from the joint's axis."""
 
-    base_cone_deg: Cone = Field(180.0, description="at the base's end; 180: any")
-    platform_cone_deg: Cone = Field(180.0, description="at the platform; 180: any")
-    base_cones_deg: SixCones | None = Field(
-        None, description="of each leg, where they differ; takes the place of base_cone_deg"
+    base_cone_deg: Cone = Field(
+        180.0, description="half angle of the cone at the base's end of each leg, deg; 180: any"
     )
-    platform_cones_deg: SixCones | None = Field(None, description="likewise, of platform_cone_deg")
+    platform_cone_deg: Cone = Field(
+        180.0, description="half angle of the cone at the platform, deg; 180: any"
+    )
+    base_cones_deg: SixCones | None = Field(
+        None,
+        description="cones at the base's end of each leg, deg, where they differ; takes the place of "
+        "base_cone_deg",
+    )
+    platform_cones_deg: SixCones | None = Field(
+        None,
+        description="cones of each leg at the platform, deg, where they differ; takes the place of "
+        "platform_cone_deg",
+    )
     base_axes: SixJointAxes | None = Field(
         None,
         description="axes of the cones in the base frame of the drawing, from the platform to the base; by "
@@ -80,7 +90,9 @@ class PassiveJointSettings(Section):
         "x along the crank and z along its axis",
     )
     platform_axes: SixJointAxes | None = Field(
-        None, description="those at the platform, in the platform frame of the drawing, likewise"
+        None,
+        description="axes of the cones at the platform, in the platform frame of the drawing; by default "
+        "as base_axes",
     )
 
     @property
@@ -104,9 +116,15 @@ class ExclusionSettings(Section):
         None, description="x, y, z, a, b, c in the controller's frames, mm and deg, that is never commanded"
     )
     within_mm: NotNegative = Field(
-        NEAR_MM, description="nor is any command that is as near to the pose as this and as within_deg"
+        NEAR_MM,
+        description="distance from the pose, mm, within which no command goes if its angle is within "
+        "within_deg, too",
     )
-    within_deg: NotNegative = Field(NEAR_DEG, description="deg; 0: this pose alone is excluded")
+    within_deg: NotNegative = Field(
+        NEAR_DEG,
+        description="angle from the pose, deg, within which no command goes; 0: this pose alone is "
+        "excluded",
+    )
 
     @model_validator(mode="after")
     def _names_a_point_or_a_pose(self) -> Self:

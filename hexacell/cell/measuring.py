@@ -247,8 +247,8 @@ class NoiseSettings(Section):
         6,
         ge=0,
         le=MOST_REVISITS,
-        description="of the first reference, from different directions; while little is known of the robot "
-        "it leaves for poses at which the gauges are read, to choose the others by; 0: none",
+        description="visits to the first reference from different directions; while little is known of the "
+        "robot, it leaves for poses at which the gauges are read, to choose the others by; 0: none",
     )
     averaged_windows: int = Field(
         1, ge=1, le=16, description="most settled windows that a record may be the mean of, where that pays"

@@ -102,12 +102,12 @@ class IdentifiedZeros:
     Attributes:
         found: the estimate of all parameters, by the same records.
         held: free parameters (p,) that the controller has.
-        columns: (p, k) changes of these by the zeros.
+        kept: what is held, with the tolerances that the records were identified with.
     """
 
     found: Identification
     held: Array
-    columns: Array
+    kept: HeldParameters
 
     @classmethod
     def of(cls, found: Identification, controller: Geometry) -> IdentifiedZeros:
@@ -115,12 +115,8 @@ class IdentifiedZeros:
         mechanism = found.problem.mechanism
         normal, _ = mechanism.normalize_frames(controller)
         held = mechanism.convention.free_parameters(normal)
-        return cls(found, held, zero_columns(mechanism, normal))
-
-    @property
-    def kept(self) -> HeldParameters:
-        """What is held, with the tolerances that the records were identified with."""
-        return HeldParameters(self.columns, self.found.problem.prior.covariance)
+        columns = zero_columns(mechanism, normal)
+        return cls(found, held, HeldParameters(columns, found.problem.prior.covariance))
 
     @cached_property
     def projector(self) -> Array:
@@ -158,7 +154,7 @@ class IdentifiedZeros:
     @property
     def names(self) -> tuple[str, ...]:
         """The parameters that the zeros change."""
-        changed = np.abs(self.found.problem.basis @ self.columns).max(axis=1) > SAME_CHANGE
+        changed = np.abs(self.found.problem.basis @ self.kept.columns).max(axis=1) > SAME_CHANGE
         names = self.found.geometry.parameters.names
         return tuple(names[row] for row in np.flatnonzero(changed))
 

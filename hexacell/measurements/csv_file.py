@@ -39,7 +39,7 @@ def read_measurements(path: Path, *, allow_partial: bool = False) -> Measurement
     header, and with one row at a point.
 
     Raises:
-        FileError: the file cannot be read, a column is missing, a cell is no number, a record occurs
+        FileError: the file cannot be read, a column is missing, a cell is not a number, a record occurs
             twice, or there are too few; with the line.
     """
     text = read_text(path, LARGEST_FILE_BYTES)
@@ -81,11 +81,19 @@ def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, t
     found: dict[RecordId, tuple[int, Record]] = {}
     for line, row in rows:
         if len(row) != len(header):
-            raise _wrong_width(path, line, row, header)
+            hint = "; is the decimal sign a comma?" if len(row) > len(header) else ""
+            problem = f"the row has {len(row)} cells, the header {len(header)}{hint}"
+            raise FileError(problem, subject=path, line=line, action="Correct this row")
         cells = (*(row[column] for column in columns), *absent)
         record = _record(path, line, cells)
         if record.id in found:
-            raise _duplicate(path, record.id, found[record.id][0], line)
+            raise FileError(
+                f"point {record.point}, orientation {record.orientation} is here and in line "
+                f"{found[record.id][0]}",
+                subject=path,
+                line=line,
+                action="Remove one of the two rows",
+            )
         found[record.id] = (line, record)
         if len(found) > MOST_RECORDS:
             raise FileError(
@@ -108,12 +116,6 @@ def _filled_rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
         raise FileError(
             f"is not valid CSV: {error}", subject=path, line=reader.line_num, action="Correct this line"
         ) from None
-
-
-def _wrong_width(path: Path, line: int, row: list[str], header: list[str]) -> FileError:
-    hint = "; is the decimal sign a comma?" if len(row) > len(header) else ""
-    problem = f"the row has {len(row)} cells, the header {len(header)}{hint}"
-    return FileError(problem, subject=path, line=line, action="Correct this row")
 
 
 def _columns(path: Path, line: int, header: list[str], wanted: tuple[str, ...]) -> list[int]:
@@ -158,16 +160,6 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
     found = f'"{shortened(cell)}"' if cell.strip() else "empty"
     problem = f"{name} is {found}, but must be {expected}"
     raise FileError(problem, subject=path, line=line, action="Correct this cell")
-
-
-def _duplicate(path: Path, record: RecordId, first: int, line: int) -> FileError:
-    point, orientation = record
-    return FileError(
-        f"point {point}, orientation {orientation} is here and in line {first}",
-        subject=path,
-        line=line,
-        action="Remove one of the two rows",
-    )
 
 
 def _require_two_rows_a_point(path: Path, lines: dict[RecordId, int]) -> None:

@@ -94,7 +94,7 @@ def _identified(assessed: Assessment) -> str:
     """Which parameters are identified, where not all are."""
     if assessed.zeros is None:
         return ""
-    zeros, free = assessed.zeros.columns.shape[1], len(assessed.found.free)
+    zeros, free = assessed.zeros.kept.columns.shape[1], len(assessed.found.free)
     return wrapped(
         f"Identified: zeros only, {zeros} of {free}. All else is as the controller has it, and its "
         "tolerances are its uncertainty."

@@ -59,7 +59,7 @@ class LengthCheck:
         noise: (n, 3, 3) covariance of each record by the noise of its readings, mm^2.
         errors: all other errors of the records.
         by_effects: (n, 3, k) errors of the places by one unit of each shared cause of an effect, by name.
-        by_scale: (n, 3, 1) the same by 1 um/m of the scale common to all encoders.
+        by_scale: (n, 3, 1) errors of the places by 1 um/m of the scale common to all encoders.
     """
 
     records: LengthRecords
@@ -79,26 +79,30 @@ class LengthCheck:
         judged: JudgedGeometry,
         effects: Iterable[Effect] = (),
     ) -> LengthCheck:
-        """The check of a judged geometry; ``effects`` without the scale common to all encoders."""
+        """The check of a geometry.
+
+        Args:
+            records: n of them, with the geometry that is judged.
+            standard: the fixture.
+            noise: of the readings, and of the gauges' alignment.
+            judged: what is known of that geometry.
+            effects: that the machine may have; the scale common to all encoders does not count.
+        """
         placement = records.placement
-        basis = placement.mechanism.convention.basis()
-        by_all, by_joints = position_sensitivity(
-            placement.mechanism, placement.geometry, placement.poses, placement.joints
-        )
-        jacobian = by_all @ basis
+        mechanism, geometry = placement.mechanism, placement.geometry
+        by_all, by_joints = position_sensitivity(mechanism, geometry, placement.poses, placement.joints)
+        jacobian = by_all @ mechanism.convention.basis()
         acting = [one for one in effects if one.occurrence.is_in_records and one.name != COMMON_SCALE]
         shared = {one.name: shared_errors(records, jacobian, judged, one) for one in acting}
-        geometry = LengthError(
-            "covariance of the geometry", jacobian @ covariance_factor(judged.covariance), is_shared=True
-        )
+        by_geometry = jacobian @ covariance_factor(judged.covariance)
         by_effect = (error for one in acting for error in errors_by_effect(records, one, shared[one.name]))
-        errors = (geometry, *errors_by_gauges(records, standard, noise), *by_effect)
-        by_scale = shared_errors(
-            records,
-            jacobian,
-            judged.with_scale(placement.mechanism, placement.geometry),
-            common_encoder_scale(1.0),
+        errors = (
+            LengthError("covariance of the geometry", by_geometry, is_shared=True),
+            *errors_by_gauges(records, standard, noise),
+            *by_effect,
         )
+        scaled = judged.with_scale(mechanism, geometry)
+        by_scale = shared_errors(records, jacobian, scaled, common_encoder_scale(1.0))
         noises = record_covariance(by_joints, noise)
         return cls(records, standard, jacobian, noises, errors, shared, by_scale)
 
@@ -114,7 +118,7 @@ class LengthCheck:
 
     @property
     def expanded_um_m(self) -> float:
-        """Its expanded uncertainty U, k = 2."""
+        """Expanded uncertainty U of the scale error, k = 2, um/m."""
         return COVERAGE_FACTOR * math.hypot(*self.lines.values())
 
     @cached_property
@@ -146,7 +150,7 @@ class LengthCheck:
 
     @property
     def closure(self) -> ChiSquareTest:
-        """Whether that is as small as its sources explain; errors of the geometry are the same in both."""
+        """Whether the closure is as small as its sources explain; the geometry errs alike in both."""
         weights = np.kron(self._closing, np.eye(3))
         covariance = weights @ self._covariance @ weights.T
         return ChiSquareTest(float(self.closure_mm @ np.linalg.solve(covariance, self.closure_mm)), 3.0)

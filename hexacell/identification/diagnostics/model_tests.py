@@ -36,7 +36,14 @@ class PointPrediction:
 
 
 def update(found: Identification, further: Problem) -> Identification:
-    """The estimate by the records of an identification and further ones, at other points.
+    """Estimate by the records of an identification and further ones.
+
+    Args:
+        found: the identification; its prior, where it was not released, counts again.
+        further: records at other points, with the same prior.
+
+    Returns:
+        The estimate by all records that have a pose under it.
 
     Raises:
         IdentifiabilityError: no geometry fits any of the further records; they would prove nothing.
@@ -54,7 +61,7 @@ def update(found: Identification, further: Problem) -> Identification:
 
 
 def prediction_test(found: Identification, rows: Mask) -> ChiSquareTest:
-    """The chi-square of some records (n,) of an identification, against what the others predict of them."""
+    """The chi-square of some ``rows`` (n,) of the records, against what the others predict of them."""
     costs = LinearCosts.at(found.problem, found.prediction)
     return _prediction_test(costs, rows)
 

@@ -53,9 +53,15 @@ class Accuracy:
 
 
 def predicted_accuracy(belief: RobotBelief, *, task: PoseBatch, workspace: PoseBatch) -> Accuracy | None:
-    """The accuracy at task poses; None if no task pose or no workspace pose is reachable.
+    """Predict the accuracy at task poses.
 
-    The frames are fitted over the ``workspace`` poses.
+    Args:
+        belief: the estimate beside the geometry that the controller commands with.
+        task: t poses, in the mechanism's frame convention.
+        workspace: poses over which base and platform frames are fitted.
+
+    Returns:
+        Errors in mm and rad; None if no task pose or no workspace pose is reachable.
     """
     reached, task_reachable = _reached(belief, task)
     reached_workspace, workspace_reachable = _reached(belief, workspace)
@@ -77,9 +83,15 @@ def predicted_accuracy(belief: RobotBelief, *, task: PoseBatch, workspace: PoseB
 
 
 def error_jacobian(belief: RobotBelief, task: PoseBatch, workspace: PoseBatch) -> Array:
-    """Derivatives (n, 6, p) of the errors at task poses by the free parameters of the estimate.
+    """Derivatives of the errors at task poses by the free parameters of the estimate.
 
-    The estimated robot reaches all poses, and the frames are fitted over the workspace.
+    Args:
+        belief: the estimate, with p free parameters.
+        task: n poses that the estimated robot reaches.
+        workspace: poses that it reaches, over which the frames are fitted.
+
+    Returns:
+        (n, 6, p), mm and rad by mm.
     """
     both = _derivatives(belief, PoseBatch.concatenate([task, workspace]))
     of_task, of_workspace = both[: len(task)], both[len(task) :]

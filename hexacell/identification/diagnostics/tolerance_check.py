@@ -224,8 +224,8 @@ class ToleranceFitter:
             best = at.solve(reach)
             if not at.distance(best) < (1.0 - LEAST_GAIN) * distance:
                 return at.result(best)
-            there = _Step(self, at.frames.then(_small_change(at.frame_change(best))), without)
-            moved = there.without_frame_change(best)
+            there = _Step(self, at.changed_frames(best), without)
+            moved = np.concatenate([np.zeros(at.frame_count), best[at.frame_count :]])
             if there.distance(moved) < (1.0 - LEAST_GAIN) * distance:
                 at, values, distance = there, moved, there.distance(moved)
             else:
@@ -331,15 +331,11 @@ class _Step:
         )
         return np.asarray(solved.x)
 
-    def frame_change(self, values: Array) -> Array:
-        """The small change of frames (9,) in some values."""
+    def changed_frames(self, values: Array) -> FrameTransform:
+        """The frames after the small change in some values."""
         change = np.zeros(9)
         change[self.fitter.frame_columns] = values[: self.frame_count] * self.fitter.frame_scales
-        return change
-
-    def without_frame_change(self, values: Array) -> Array:
-        """Some values once the frames are changed."""
-        return np.concatenate([np.zeros(self.frame_count), values[self.frame_count :]])
+        return self.frames.then(_small_change(change))
 
     def result(self, values: Array) -> ToleranceFit:
         """The fit of the best values."""

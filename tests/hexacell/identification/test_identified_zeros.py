@@ -107,7 +107,7 @@ def test_the_stated_covariance_is_that_of_the_errors() -> None:
     noise = np.linalg.cholesky(information + 1e-12 * np.eye(len(factor)) * np.trace(information))
     scores = information @ truths + noise @ random.standard_normal(truths.shape)
     errors = gain @ posterior @ scores - truths
-    stated = HeldParameters(held.columns, prior.covariance).covariance(gain, posterior)
+    stated = HeldParameters(held.kept.columns, prior.covariance).covariance(gain, posterior)
     np.testing.assert_allclose(np.var(errors, axis=1), np.diag(stated), rtol=0.12)
 
 

@@ -82,8 +82,15 @@ def fit_measurements(
 ) -> Assessment:
     """Identify the geometry of a cell's robot from records, and check it.
 
-    ``folder`` is where they are kept: if it is that of a run, what commanded them and the noise that it
-    measured come from its journal. ``identify_only`` replaces what the cell file states.
+    Args:
+        cell: the cell, as :func:`~hexacell.cell.loader.load_cell` gives it.
+        measurements: its records, of two poses or more at each point.
+        folder: where the records are kept; if it is that of a run, what commanded them and the noise that
+            it measured come from its journal.
+        identify_only: the parameters that are identified, in place of what the cell file states.
+
+    Returns:
+        The geometry with its covariance, and the checks of both; each parameter in its own unit.
 
     Raises:
         IdentifiabilityError: the records cannot determine it.
@@ -115,7 +122,13 @@ def fit_measurements(
 def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) -> NextPose:
     """The pose worth measuring after these records.
 
-    ``rejections`` counts the poses at the present point that could not be measured.
+    Args:
+        cell: the cell.
+        measurements: its records so far; there may be none.
+        rejections: number of poses at the present point that could not be measured.
+
+    Returns:
+        The next pose, mm and deg, or that measuring is done; with the predicted error at the task poses, mm.
 
     Raises:
         HexacellError: a point is out of reach, the records do not belong to this cell, or no geometry fits

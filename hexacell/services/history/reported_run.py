@@ -72,6 +72,12 @@ class ReportedRun:
 def reported_run(run: Path) -> ReportedRun:
     """Read a run folder.
 
+    Args:
+        run: the folder of a run that is over, or was interrupted.
+
+    Returns:
+        The run as its report needs it.
+
     Raises:
         UsageError: it is no run folder, or nothing happened in the run.
         FileError: one of its files cannot be read, or is damaged.

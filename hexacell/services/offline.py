@@ -128,7 +128,7 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
         rejections: number of poses at the present point that could not be measured.
 
     Returns:
-        The next pose, mm and deg, or that measuring is done; with the predicted error at the task poses, mm.
+        The next pose, mm and deg, or that measuring is done; the predicted error at the task poses, mm.
 
     Raises:
         HexacellError: a point is out of reach, the records do not belong to this cell, or no geometry fits

@@ -14,11 +14,11 @@ from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.simulation import SoftLimits
 from hexacell.errors import ExitCode, IdentifiabilityError, Interruption
 from hexacell.kinematics.pose import Pose
-from procedures.engine import step_executor
 from procedures.engine.commands import Abort
 from procedures.run.keys import Phase
 from procedures.run.state import fold
 from procedures.steps import events
+from procedures.steps import move as move_step
 from tests.procedures.fakes import refused
 from tests.procedures.runs.listening import happened, on
 
@@ -175,7 +175,7 @@ async def test_a_robot_that_moved_was_not_refused(make_rig) -> None:
 async def test_a_controller_that_refuses_one_pose_after_another_ends_the_run(
     make_rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(step_executor, "MOST_REFUSALS", 3)
+    monkeypatch.setattr(move_step, "MOST_REFUSALS", 3)
     rig = make_rig()
     controller, machine = rig.controller, rig.machine
 

@@ -112,6 +112,6 @@ async def position_failures(check: PositionCheck) -> list[HexacellError]:
 
 
 def raise_all(failures: list[HexacellError]) -> None:
-    """Raise one failure as it is, several in one report, none not at all."""
+    """Raise one failure as it is, several in one report; nothing is raised without any."""
     if failures:
         raise joined(f"{len(failures)} problems prevent the run", failures)

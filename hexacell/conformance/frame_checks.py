@@ -16,7 +16,6 @@ from hexacell.identification.solver.fit import RELEASE_RATIO
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import pose_sensitivity
 from hexacell.measurements.records import MeasurementSet, Record, deviation_of, joints_of
@@ -57,12 +56,16 @@ class FrameTests:
         mechanism = example.mechanism
         for geometry in example.robots():
             normal, _ = mechanism.normalize_frames(geometry)
-            _check_rules_of(example, normal)
+            convention = mechanism.convention
+            exact = convention.geometry(convention.free_parameters(normal))
+            np.testing.assert_array_equal(normal.vector, exact.vector, "the rules hold only nearly")
             again, change = mechanism.normalize_frames(normal)
             np.testing.assert_allclose(
                 again.vector, normal.vector, atol=ROUNDING, err_msg="normalized twice"
             )
-            _check_no_change(change)
+            for turn in (change.base, change.platform):
+                np.testing.assert_allclose(turn, np.eye(3), atol=ROUNDING)
+            np.testing.assert_allclose(change.origin, 0.0, atol=ROUNDING)
             for other in example.changes_of_frames():
                 changed = mechanism.change_frames(geometry, other)
                 found, _ = mechanism.normalize_frames(changed)
@@ -123,18 +126,6 @@ class FrameTests:
             raise AssertionError(f"the records leave {unseen} directions to the tolerances")
         if not error < LARGEST_ERROR:
             raise AssertionError(f"the identified geometry is {error:.1e} off")
-
-
-def _check_rules_of(example: MechanismExample, normal: Geometry) -> None:
-    convention = example.mechanism.convention
-    exact = convention.geometry(convention.free_parameters(normal))
-    np.testing.assert_array_equal(normal.vector, exact.vector, "the rules hold only nearly")
-
-
-def _check_no_change(change: FrameTransform) -> None:
-    for turn in (change.base, change.platform):
-        np.testing.assert_allclose(turn, np.eye(3), atol=ROUNDING)
-    np.testing.assert_allclose(change.origin, 0.0, atol=ROUNDING)
 
 
 def _by_parameters(example: MechanismExample, basis: Array) -> Array:

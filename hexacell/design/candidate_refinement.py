@@ -131,29 +131,19 @@ class CandidateSpace:
             ranking = np.argsort(-gains, kind="stable")
             best = rows_apart(orientations, ranking, each.refined, apart)
             orientations, gains, apart = orientations[best], gains[best], min(APART, each.angle)
-            turned = self.rated(_turned(orientations, each))
+            turns = each.random_turns()[: len(orientations)] @ orientations[:, None]
+            turned = self.rated(turns.reshape(-1, 3, 3))
             if turned is not None:
                 parts.append(turned)
                 orientations = np.concatenate([orientations, turned.records.targets.poses.rotations])
                 gains = np.concatenate([gains, turned.gains])
-        return _spread(RatedRecords.concatenate(parts), len(candidates))
+        rated = RatedRecords.concatenate(parts)
+        ranking = np.argsort(-rated.gains, kind="stable")
+        is_kept = np.arange(len(rated)) < len(candidates)
+        is_kept[rows_apart(rated.records.targets.poses.rotations, ranking, KEPT, KEPT_APART)] = True
+        return rated[ranking[is_kept[ranking]]]
 
     @cached_property
     def _mode(self) -> Array:
         """The assembly mode (1,) that the estimated robot is on."""
         return self.zero.mode(self.belief)
-
-
-def _spread(rated: RatedRecords, first: int) -> RatedRecords:
-    """The best of some records that are not near another, and all of the ``first`` ones, ranked."""
-    ranking = np.argsort(-rated.gains, kind="stable")
-    best = rows_apart(rated.records.targets.poses.rotations, ranking, KEPT, KEPT_APART)
-    is_kept = np.arange(len(rated)) < first
-    is_kept[best] = True
-    return rated[ranking[is_kept[ranking]]]
-
-
-def _turned(orientations: Array, how: Round) -> Array:
-    """Orientations (n, 3, 3), each turned in several ways (n * turns, 3, 3)."""
-    turned: Array = how.random_turns()[: len(orientations)] @ orientations[:, None]
-    return turned.reshape(-1, 3, 3)

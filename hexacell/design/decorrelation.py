@@ -76,11 +76,13 @@ class _Trial:
 
 
 def _trials(belief: RobotBelief, found: Identification) -> Iterator[_Trial]:
-    """What could be measured at each point, or at some of very many."""
+    """Records that could be measured at each point, or at some of very many."""
     points = found.problem.labels[found.problem.first_rows, 0]
+    angles = np.concatenate([ANGLES, -ANGLES])[:, None, None] * np.eye(3)
+    tried = rotations.from_vector(angles.reshape(-1, 3))
     for point in points[:: -(-len(points) // MOST_POINTS)].tolist():
         zero = gauge_zero_at(belief, found, point)
-        targets, commands = reachable(belief, PoseBatch.at(zero.reference, _rotations()))
+        targets, commands = reachable(belief, PoseBatch.at(zero.reference, tried))
         if not len(targets):
             continue
         records = predict_records(belief, zero, targets)
@@ -89,12 +91,6 @@ def _trials(belief: RobotBelief, found: Identification) -> Iterator[_Trial]:
         factors = update_factors(belief.covariance, records.jacobian, records.covariance)
         for row in np.flatnonzero(inside).tolist():
             yield _Trial(point, targets.poses.rotations[row], commands[[row]], factors[row])
-
-
-def _rotations() -> Array:
-    """Rotations (24, 3, 3) about x, y and z in both directions."""
-    angles = np.concatenate([ANGLES, -ANGLES])
-    return rotations.from_vector((angles[:, None, None] * np.eye(3)).reshape(-1, 3))
 
 
 def _best(

@@ -84,7 +84,9 @@ class Hexaglide:
     ) -> tuple[Array, Array]:
         """Length errors of the legs (n, 6), mm, and their derivatives by the pose (n, 6, 6)."""
         b, v = _leg_vectors(geometry, poses, joints)
-        return _leg_errors(geometry, v), by_pose(b, -v / geometry["l"][..., None])
+        lengths = geometry["l"]
+        errors = (np.einsum("nij,nij->ni", v, v) - lengths**2) / (2.0 * lengths)
+        return errors, by_pose(b, -v / lengths[..., None])
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """Derivatives of the legs' length errors by pose, joint variables and parameters."""
@@ -179,12 +181,6 @@ def _leg_vectors(
     v = geometry["S"] - poses.positions[:, None, :] - b
     v[..., 0] += joints
     return b, v
-
-
-def _leg_errors(geometry: Geometry | GeometryBatch, v: Array) -> Array:
-    lengths = geometry["l"]
-    error: Array = (np.einsum("nij,nij->ni", v, v) - lengths**2) / (2.0 * lengths)
-    return error
 
 
 def _leveling_roll(vector: Array) -> Array:

@@ -36,7 +36,12 @@ class WorkerThread:
 
     def submit(self, job: Callable[[], object]) -> None:
         """Run ``job`` after the jobs before it; nobody waits for it, and its errors are dropped."""
-        self._put(partial(_without_errors, job))
+
+        def without_errors() -> None:
+            with suppress(Exception):
+                job()
+
+        self._put(without_errors)
 
     async def run(self, job: Callable[[], Result]) -> Result:
         """Run ``job`` after the jobs before it, and return its result."""
@@ -69,11 +74,6 @@ def _work(jobs: Jobs) -> None:
     for job in iter(jobs.get, None):
         job()
         del job  # what it holds may go while the next one is awaited
-
-
-def _without_errors(job: Callable[[], object]) -> None:
-    with suppress(Exception):
-        job()
 
 
 def _carry_out(job: Callable[[], Result], done: asyncio.Future[Result]) -> None:

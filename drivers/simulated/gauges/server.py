@@ -70,11 +70,10 @@ class LineFaults:
         if not answer:
             return answer
         unchanged, before = answer, self._latest
+        is_whole = self._answers % DAMAGED_EVERY != 0
         changes: dict[LineFault, Callable[[bytes], bytes]] = {
             LineFault.DAMAGED: self._damaged,
-            LineFault.CUT_SHORT: lambda sent: (
-                sent if self._answers % DAMAGED_EVERY else sent[: len(sent) // 2]
-            ),
+            LineFault.CUT_SHORT: lambda sent: sent if is_whole else sent[: len(sent) // 2],
             LineFault.REPEATED: lambda sent: sent + unchanged,
             LineFault.UNASKED: lambda sent: before + sent,
             LineFault.ECHOING: lambda sent: command + b"\r" + sent,

@@ -6,7 +6,7 @@ exchanged encoder changes what a robot is thought to do, so it is a remark of th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ COMPARED = {
 def with_changes(cell: Cell, found: Iterable[DeviceIdentity]) -> tuple[DeviceIdentity, ...]:
     """Devices as found, each with a remark on what differs from the last run that can be read."""
     run, known = _last(cell)
-    return tuple(_remarked(one, known[one.name], run) if one.name in known else one for one in found)
+    return tuple(_remarked(one, known.get(one.name), run) for one in found)
 
 
 def _last(cell: Cell) -> tuple[str, dict[str, DeviceIdentity]]:
@@ -50,17 +50,14 @@ def _started(run: RunFolder) -> events.RunStarted | None:
     return None
 
 
-def _remarked(now: DeviceIdentity, then: DeviceIdentity, run: str) -> DeviceIdentity:
-    changes = list(_changes(now, then))
+def _remarked(now: DeviceIdentity, then: DeviceIdentity | None, run: str) -> DeviceIdentity:
+    """A device with its changes in words; what the earlier run did not know is no change."""
+    changes = []
+    for field, word in COMPARED.items():
+        before, after = getattr(then, field, None), getattr(now, field)
+        if before and before != after:
+            changes.append(f"{word} {after or 'none'}, which was {before}")
     if not changes:
         return now
     remark = f"since the run {run}: {', '.join(changes)}"
     return replace(now, remark="; ".join(filter(None, (now.remark, remark))))
-
-
-def _changes(now: DeviceIdentity, then: DeviceIdentity) -> Iterator[str]:
-    """The changes in words; what the earlier run did not know is no change."""
-    for field, word in COMPARED.items():
-        before, after = getattr(then, field), getattr(now, field)
-        if before and before != after:
-            yield f"{word} {after or 'none'}, which was {before}"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from drivers.encoders.of_controller import Zeros
 from drivers.interfaces import DeviceIdentity
 from drivers.libraries import translated
 from drivers.serial.shared_port import SharedSerialPorts
@@ -20,7 +20,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
-from hexacell.kinematics.mechanism import joint_zeros
+from hexacell.kinematics.mechanism import Mechanism, joint_zeros
 from hexacell.plugins import Group, load
 from hexacell.robot.model import config_layout
 from procedures.devices.device_set import Devices, MountedGauge, Thermometers
@@ -110,7 +110,10 @@ def devices_of(
     )
     wiring: dict[str, object] = {"trace": trace}
     if settings.encoders.are_of_controller:
-        wiring = {"controller": controller} | _zeros_told(settings, folder or Path())
+        wiring = {"controller": controller}
+        if settings.controller.joints_include_zeros:
+            config = CurrentConfig(config_paths(settings, folder or Path()), config_layout(settings))
+            wiring["zeros"] = partial(_zeros, settings.mechanism, config)
     encoders = load(Group.ENCODERS, settings.encoders.protocol)(encoders_with_speed(settings), **wiring)
     return Devices(
         gauges,
@@ -120,12 +123,10 @@ def devices_of(
     )
 
 
-def _zeros_told(settings: CellSettings, folder: Path) -> dict[str, Zeros]:
-    """What joints that include zeros are more than the encoders show, by the config as it is now."""
-    if not settings.controller.joints_include_zeros:
-        return {}
-    config = CurrentConfig(config_paths(settings, folder), config_layout(settings))
-    return {"zeros": lambda: joint_zeros(settings.mechanism, config.geometry().geometry).tolist()}
+def _zeros(mechanism: Mechanism, config: CurrentConfig) -> list[float]:
+    """By how much joints that include zeros exceed what the encoders show, by the current config."""
+    zeros: list[float] = joint_zeros(mechanism, config.geometry().geometry).tolist()
+    return zeros
 
 
 def gauge_with_agreement(gauge: GaugeSettings, noise: NoiseSettings) -> GaugeSettings:

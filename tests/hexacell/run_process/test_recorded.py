@@ -191,7 +191,7 @@ async def test_nobody_commands_the_past(tmp_path) -> None:
 
 @pytest.mark.parametrize("speed", [-1.0, float("inf"), float("nan")])
 def test_no_speed_is_refused(tmp_path, speed: float) -> None:
-    with pytest.raises(UsageError, match="is no speed"):
+    with pytest.raises(UsageError, match="is not a speed"):
         RecordedRun(recorded(tmp_path)).set_speed(speed)
 
 

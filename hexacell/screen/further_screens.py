@@ -25,8 +25,8 @@ OTHER_ROWS = 5
 """Rows for guidance and spaces."""
 
 WHAT_TO_PRESS = (
-    "x excludes the chosen pose in the cell file, or the whole point on its line; on a line with OUT "
-    "it removes that exclusion. v tries the plan again, Escape goes back."
+    "x excludes the chosen pose or point in the cell file; on a line with OUT it removes that. "
+    "v tries the plan again, Escape goes back."
 )
 
 

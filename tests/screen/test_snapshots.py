@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input
 
+from hexacell.cell.limits import ExclusionSettings
 from hexacell.cell.loader import Cell
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import StatusChanged
@@ -97,9 +98,12 @@ def scene_preflight(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkpl
 
 
 def scene_plan(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
-    workplace = idle(cell)
-    workplace.plan = tried(cell)
-    return workplace, ("2", "x", "down", "down", "x")
+    workplace, plan = idle(cell), tried(cell)
+    pose = plan.poses[1][2].as_tuple()
+    exclusions = (ExclusionSettings(pose=pose, within_deg=5.0), ExclusionSettings(point=4))
+    workplace.plan = plan
+    workplace.cell = replace(cell, settings=cell.settings.model_copy(update={"exclusions": exclusions}))
+    return workplace, ("2", "x", "down", "down", "down")
 
 
 def scene_measure(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:

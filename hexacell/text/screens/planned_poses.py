@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from hexacell.cell.limits import ExclusionSettings
 from hexacell.cell.model import CellSettings
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.text.screens.live import TRYING
@@ -32,15 +31,14 @@ def exclusions_text(settings: CellSettings) -> str:
 
 
 def _exclusions(settings: CellSettings) -> Iterator[tuple[str, str]]:
+    points = settings.identification.points
     for number, one in enumerate(settings.exclusions, start=1):
-        yield f"e{number}", f"OUT  {f'e{number}':>7}  {_excluded(settings, one)}"
-
-
-def _excluded(settings: CellSettings, one: ExclusionSettings) -> str:
-    if one.pose is None:
-        return f"point {one.point}, {_place(settings.identification.points[(one.point or 1) - 1])}"
-    near = f", and within {one.within_mm:g} mm and {one.within_deg:.1f} deg" if one.within_deg else ""
-    return f"{_place(one.pose)}  {_angles(one.pose)}{near}"
+        if one.pose is None:
+            what = f"point {one.point}, {_place(points[(one.point or 1) - 1])}"
+        else:
+            what = " ".join(f"{axis} {value:.1f}" for axis, value in zip("xyzabc", one.pose, strict=True))
+            what += f", within {one.within_mm:g} mm, {one.within_deg:g} deg" if one.within_deg else ""
+        yield f"e{number}", f"OUT  e{number}  {what}"
 
 
 def _poses(settings: CellSettings, planned: Sequence[VisitedPose]) -> Iterator[tuple[str, str]]:

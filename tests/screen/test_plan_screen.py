@@ -17,7 +17,7 @@ from hexacell.screen.overlays import FaultOverlay
 from hexacell.screen.widgets import RowList
 from hexacell.screen.workplace import TriedPlan
 from hexacell.services.preflight.exclusions import toggle_exclusion
-from tests.screen.conftest import Opened
+from tests.screen.conftest import Opened, settled
 from tests.screen.test_job import press, shown, until_shown
 from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot
 from tests.waiting import until
@@ -91,8 +91,8 @@ async def test_nothing_is_excluded_while_a_run_goes_on(cell: Cell, opened: Opene
         await until(lambda: pilot.app.current_mode == "measure")
         await press(pilot, "2", "x")
         await until(lambda: bool(rows(pilot)))
-        await press(pilot, "x")
-        await until(lambda: isinstance(pilot.app.screen, FaultOverlay))
+        await press(pilot, "x", "down", "x")
+        await settled(pilot)
         assert not workplace.cell.settings.exclusions
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from hexacell.errors import ExitCode, HexacellError
-from procedures.guards import rules
+from procedures.guards import supervision
 from procedures.run.keys import Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
@@ -233,7 +233,7 @@ async def test_no_step_begins_without_free_disk_space(stage: Any, step: Any, mon
     config = scene.rig.config
     doing = await step(scene)
     orders, still_since_s = len(scene.controller.log), scene.rig.physics.motion_end_s
-    monkeypatch.setattr(rules, "_free_bytes", lambda folder: 49_900_000)
+    monkeypatch.setattr(supervision, "_free_bytes", lambda folder: 49_900_000)
     with pytest.raises(HexacellError) as refusal:
         await doing()
     assert root(refusal.value).trip.guard is Guard.DISK

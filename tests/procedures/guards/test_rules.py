@@ -15,7 +15,7 @@ from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import DeviceError, ExitCode, LimitError
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.limits.gauge_travel import GaugeRoom
-from procedures.guards import rules
+from procedures.guards import rules, supervision
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
 from procedures.guards.rules.after_a_move import following_error, stuck_gauge
 from procedures.guards.rules.base import GuardLimits
@@ -256,7 +256,7 @@ def test_drift_has_its_own_exit_code() -> None:
 
 @pytest.mark.parametrize(("free", "trips"), [(50_000_000, False), (49_999_999, True), (0, True)])
 def test_the_disk_must_have_room(monkeypatch, free: int, trips: bool) -> None:
-    monkeypatch.setattr(rules, "_free_bytes", lambda folder: free)
+    monkeypatch.setattr(supervision, "_free_bytes", lambda folder: free)
     assert (low_disk_space(Path("/runs"), 50.0) is not None) is trips
 
 

@@ -12,6 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.recovery import Action, FailureKind
+from hexacell.config.interface import ControllerLimits
 from hexacell.identification.solver.result import DataFaultKind
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.noise.approach_scatter import ScatterSource
@@ -216,6 +217,9 @@ some_event: st.SearchStrategy[Any] = st.one_of(
         devices=st.lists(
             st.builds(DeviceIdentity, name=text, protocol=text, description=text), max_size=2
         ).map(tuple),
+        taught=geometry,
+        joint_ranges=st.just(((0.0, 1.0),) * 6),
+        limits=st.just(ControllerLimits()),
     ),
     st.builds(events.StepBegun, step=some_step),
     st.builds(events.Arrived, at=set_key, orientation=count, pose=six),

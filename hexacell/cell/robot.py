@@ -6,12 +6,14 @@ from functools import cache
 from typing import Annotated, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import AfterValidator, Field, model_validator
 
 from hexacell.cell.fields import GeometrySettings, InRange, PointInRange, Section, Text, broken_rule
 from hexacell.kinematics.encoder_scales import WithEncoderScales
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
-from hexacell.kinematics.mechanisms.gough_stewart import gough_stewart_geometry
+from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS
 from hexacell.kinematics.mechanisms.screw_legs import ScrewLegs, Screws
 from hexacell.plugins import Group, load
 
@@ -108,5 +110,6 @@ def _screw_legs(
 ) -> Mechanism:
     """The mechanism with joints that are drawn on base and platform there, mm."""
     screws = Screws(settings.lead_mm, np.array(settings.base_axes), np.array(settings.platform_axes))
-    legs = ScrewLegs(screws, gough_stewart_geometry(base, platform, np.zeros(6)))
+    drawn: dict[str, ArrayLike] = {"base": base, "platform": platform, "offset": np.zeros(6)}
+    legs = ScrewLegs(screws, Geometry.of(GOUGH_STEWART_PARAMETERS, drawn))
     return _with_scales(legs, encoder_scales=encoder_scales)

@@ -12,7 +12,6 @@ from itertools import combinations
 import numpy as np
 
 from hexacell.errors import UsageError
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 PAIRS = np.array(list(combinations(range(6), 2)))
@@ -121,17 +120,6 @@ def by_pose(b: Array, n: Array) -> Array:
     jacobian[..., 4] = bz * nx - bx * nz
     jacobian[..., 5] = bx * ny - by * nx
     return jacobian
-
-
-def mean_radius(geometry: Geometry | GeometryBatch, symbol: str) -> Array:
-    """Mean distance (...,), mm, of the platform joints (..., 6, 3) of that symbol from the ball."""
-
-    def compute() -> Array:
-        joints = geometry[symbol]
-        radius: Array = np.sqrt(np.einsum("...i,...i->...", joints, joints)).mean(axis=-1)
-        return radius
-
-    return geometry.once("mean radius", compute)
 
 
 def axes_through(first: Array, second: Array, third: Array, part: str) -> Array:

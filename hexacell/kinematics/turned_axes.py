@@ -22,18 +22,14 @@ SERIES = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TurnedAxes:
-    """Where the turns put x, y and z, and how the first two change with the turns.
-
-    Attributes:
-        u, w, axis: unit vectors (..., 3).
-        u_by_turns, w_by_turns: (..., 3, 2).
-    """
+    """Where the turns put x, y and z: unit vectors (..., 3), and derivatives (..., 3, 2) by the turns."""
 
     u: Array
     w: Array
     axis: Array
     u_by_turns: Array
     w_by_turns: Array
+    axis_by_turns: Array
 
     @classmethod
     def by(cls, turns: Array) -> TurnedAxes:
@@ -41,7 +37,11 @@ class TurnedAxes:
         a, b = turns[..., 0], turns[..., 1]
         angle = np.hypot(a, b)
         s, k = np.sinc(angle / np.pi), 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
-        s_rate, k_rate = _rates(angle, s, k)
+        # ``ds/da = a s_rate`` and ``dk/da = a k_rate``, likewise by b.
+        is_small = angle < SERIES
+        squared = np.where(is_small, 1.0, angle) ** 2
+        s_rate = np.where(is_small, -1.0 / 3.0 + angle**2 / 30.0, (np.cos(angle) - s) / squared)
+        k_rate = np.where(is_small, -1.0 / 12.0 + angle**2 / 180.0, (s - 2.0 * k) / squared)
         return cls(
             u=np.stack([1.0 - b * b * k, a * b * k, -b * s], axis=-1),
             w=np.stack([a * b * k, 1.0 - a * a * k, a * s], axis=-1),
@@ -56,6 +56,11 @@ class TurnedAxes:
                 (-2.0 * a * k - a**3 * k_rate, -a * a * b * k_rate),
                 (s + a * a * s_rate, a * b * s_rate),
             ),
+            axis_by_turns=_rows(
+                (a * b * s_rate, s + b * b * s_rate),
+                (-s - a * a * s_rate, -a * b * s_rate),
+                (-a * s, -b * s),
+            ),
         )
 
 
@@ -67,15 +72,6 @@ def turns_of(axes: Array) -> Array:
     factor = np.where(is_vertical, 1.0, np.arctan2(across, z) / np.where(is_vertical, 1.0, across))
     a = np.where(is_vertical & (z < 0.0), np.pi, -y * factor)
     return np.stack([a, x * factor], axis=-1)
-
-
-def _rates(angle: Array, s: Array, k: Array) -> tuple[Array, Array]:
-    """``ds/da = a s_rate`` and ``dk/da = a k_rate``, likewise by b."""
-    is_small = angle < SERIES
-    squared = np.where(is_small, 1.0, angle) ** 2
-    s_rate = np.where(is_small, -1.0 / 3.0 + angle**2 / 30.0, (np.cos(angle) - s) / squared)
-    k_rate = np.where(is_small, -1.0 / 12.0 + angle**2 / 180.0, (s - 2.0 * k) / squared)
-    return s_rate, k_rate
 
 
 def _rows(*rows: tuple[Array, Array]) -> Array:

@@ -14,9 +14,9 @@ import pytest
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot, robot_of
+from tests.geometries import hexaglide_geometry
 
 Say = Callable[[str, str, str], None]
 

@@ -23,11 +23,11 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot, robot_of
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
+from tests.geometries import hexaglide_geometry
 from tests.simulated_campaign import SimulatedCampaign
 
 Say = Callable[[str, str, str], None]

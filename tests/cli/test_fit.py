@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from hexacell.kinematics.mechanism import inverse_kinematics
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.csv_file import HEADER
+from tests.geometries import hexaglide_geometry
 
 SHAPES = {"S": (6, 3), "B": (6, 3), "l": (6,)}
 

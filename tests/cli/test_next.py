@@ -16,9 +16,10 @@ from hexacell.design.search_effort import SearchEffort
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.services import search_effort
+from tests.geometries import hexaglide_geometry
 
 HEADER = ["point", "orientation", *"xyzabc", *(f"q{leg}" for leg in range(1, 7)), "dx", "dy", "dz"]
 NOISE_MM = 0.01

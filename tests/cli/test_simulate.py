@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from tests.geometries import hexaglide_geometry
 
 CELL = "simulated-hexaglide.toml"
 CONTROLLER = "simulated-hexaglide.controller.toml"

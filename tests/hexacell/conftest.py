@@ -26,9 +26,10 @@ from hexacell.identification.problem.problem import Assumptions, Problem
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
+from tests.geometries import hexaglide_geometry
 
 Array = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.config.interface import ControllerGeometry
-from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.robot.model import make_robot, robot_of
 from hexacell.robot.pose_limits import broken_limits
+from tests.geometries import hexaglide_geometry
 
 CELL = Path(__file__).parents[2] / "configs" / "simulated-hexaglide.toml"
 

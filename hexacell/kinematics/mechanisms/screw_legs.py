@@ -77,13 +77,11 @@ class ScrewLegs(GoughStewart):
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
-        """Length errors of the legs (n, 6), mm, and their derivatives by the pose (n, 6, 6)."""
         residual, jacobian = super().residual_and_jacobian(geometry, poses, joints)
         b, found = self._corrections(geometry, poses)
         return residual + found.added, jacobian + _by_pose(b, found)
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
-        """Derivatives of the legs' length errors by pose, joint variables and parameters."""
         without = super().derivatives(geometry, poses, joints)
         b, found = self._corrections(geometry, poses)
         by_joints = [-found.by_vector, found.by_vector @ poses.rotations, np.zeros((*joints.shape, 1))]
@@ -94,7 +92,6 @@ class ScrewLegs(GoughStewart):
         )
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """Joint variables (n, 6) at n poses; every pose has a solution."""
         without = super().inverse(geometry, branch, poses)
         joints: Array = without + self._corrections(geometry, poses)[1].added
         return joints

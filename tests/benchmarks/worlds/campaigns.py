@@ -13,12 +13,12 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.design.candidates import orientations, reachable
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot, robot_of
 from hexacell.robot.virtual_robot import random_robot
 from tests.benchmarks.worlds.world import Commands
+from tests.geometries import hexaglide_geometry
 
 TILT_DEG = 45.0
 RECORDS = 11

@@ -21,9 +21,10 @@ from hexacell.clock import CellClock
 from hexacell.config.toml_format import NativeToml
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
+from tests.geometries import hexaglide_geometry
 from tests.native_config import NATIVE
 
 HOME = Pose(0.0, 0.0, 550.0)

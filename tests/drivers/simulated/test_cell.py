@@ -24,8 +24,9 @@ from drivers.simulated.cell import SimulatedCell
 from hexacell.cell.model import CellSettings
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, ReachError
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose
+from tests.geometries import hexaglide_geometry
 from tests.native_config import NATIVE
 from tests.waiting import until
 

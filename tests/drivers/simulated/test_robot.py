@@ -13,8 +13,9 @@ from drivers.simulated.robot import LINE_STEPS
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose
+from tests.geometries import hexaglide_geometry
 
 TILTED = Pose(5.0, -3.0, 548.0, 6.0, -4.0, 2.0)
 

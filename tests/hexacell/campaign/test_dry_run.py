@@ -12,10 +12,10 @@ from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.dry_run.campaign import dry_run
 from hexacell.identification.solver.result import GeometryEstimate, Termination
-from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.robot.model import make_robot
 from hexacell.robot.stated_effects import stated_effects
 from hexacell.robot.virtual_robot import robots_within_tolerances
+from tests.geometries import hexaglide_geometry
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 SMALL = {

@@ -14,9 +14,9 @@ from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.cell.limits import PassiveJointSettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import IdentifiabilityError
-from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import make_robot
+from tests.geometries import hexaglide_geometry
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 

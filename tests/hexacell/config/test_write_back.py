@@ -13,8 +13,9 @@ from hexacell.config.toml_format import NativeToml
 from hexacell.config.write_back import commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.storage import atomic_files
+from tests.geometries import hexaglide_geometry
 from tests.native_config import NATIVE
 
 

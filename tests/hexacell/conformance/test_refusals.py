@@ -16,9 +16,9 @@ from hexacell.kinematics.mechanisms.gough_stewart import (
     GOUGH_STEWART_PARAMETERS,
     THREE_LEGS_FRAME,
     GoughStewart,
-    gough_stewart_geometry,
 )
 from hexacell.kinematics.pose import PoseBatch
+from tests.geometries import gough_stewart_geometry
 
 
 def ring(radius: float, degrees: tuple[float, ...], height: float) -> np.ndarray:

@@ -13,9 +13,9 @@ from hexacell.design.candidates import orientations
 from hexacell.design.validation_poses import select_validation_poses
 from hexacell.errors import LimitError
 from hexacell.kinematics.mechanism import FrameTransform
-from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.path_check import is_clear
+from tests.geometries import hexaglide_geometry
 
 TRAVEL_MM = 5.0
 COUNT = 6

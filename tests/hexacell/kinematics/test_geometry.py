@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
+from tests.geometries import hexaglide_geometry
 
 COUNTING = np.arange(42.0)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hexacell.errors import ExitCode, ReachError
-from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
+from tests.geometries import hexaglide_geometry
 
 
 def test_inverse_agrees_with_linuxcnc(inverse, paper):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import (
     has_singularity_margin,
@@ -18,6 +18,7 @@ from hexacell.kinematics.sensitivity import (
     position_sensitivity,
     singularity_margin,
 )
+from tests.geometries import hexaglide_geometry
 from tests.hexacell.kinematics.numeric import POSES, numeric_jacobian, turned_about
 
 

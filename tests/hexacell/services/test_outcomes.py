@@ -14,7 +14,7 @@ from hexacell.cell.simulation import SimulatedFault
 from hexacell.config.change import ConfigChange
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, FileError, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.robot.model import robot_of
 from hexacell.services.run.calibration_run import run_started
 from hexacell.verdict.acceptance_gates import AcceptanceGate
@@ -22,6 +22,7 @@ from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.run.keys import Phase
 from procedures.steps import events
+from tests.geometries import hexaglide_geometry
 from tests.small_cell import FEW_CHOICES
 
 DOUBTFUL = AcceptanceGate(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)

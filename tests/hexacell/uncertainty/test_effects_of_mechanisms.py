@@ -10,7 +10,7 @@ import pytest
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart, gough_stewart_geometry
+from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import robot_of
@@ -25,6 +25,7 @@ from hexacell.uncertainty.effect_kinds import (
     temperature_at_work,
 )
 from hexacell.uncertainty.effects import Effect, Placement
+from tests.geometries import gough_stewart_geometry
 
 STEP_MM = 1e-4
 CONFIGS = Path(__file__).parents[3] / "configs"

@@ -12,13 +12,14 @@ from hexacell.config.change import ConfigChange
 from hexacell.config.receipt import Receipt
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import ExitCode
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.measurements.csv_file import read_measurements
 from procedures.calibration.calibration import Mode
 from procedures.run.keys import Phase
 from procedures.run.state import fold
 from procedures.steps import events
 from procedures.steps.sample import Sample
+from tests.geometries import hexaglide_geometry
 from tests.procedures.runs.listening import happened
 
 

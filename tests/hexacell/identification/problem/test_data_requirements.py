@@ -11,8 +11,8 @@ from hexacell.errors import ExitCode, IdentifiabilityError
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.result import Termination
-from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.measurements.records import MeasurementSet
+from tests.geometries import hexaglide_geometry
 
 
 def test_one_point_is_refused_however_many_records_it_has(visit, make_problem):

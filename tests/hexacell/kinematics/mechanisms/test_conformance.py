@@ -9,9 +9,10 @@ import numpy as np
 
 from hexacell.cell.loader import load_cell
 from hexacell.conformance import MechanismConformance, MechanismExample
-from hexacell.kinematics.mechanisms.six_rails import SixRails, six_rails_geometry
+from hexacell.kinematics.mechanisms.six_rails import SixRails
 from hexacell.kinematics.turned_axes import turns_of
 from hexacell.robot.model import robot_of
+from tests.geometries import six_rails_geometry
 
 CONFIGS = Path(__file__).parents[4] / "configs"
 

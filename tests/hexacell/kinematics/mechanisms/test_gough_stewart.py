@@ -12,10 +12,10 @@ from hexacell.kinematics.mechanisms.gough_stewart import (
     GOUGH_STEWART_PARAMETERS,
     THREE_LEGS_FRAME,
     GoughStewart,
-    gough_stewart_geometry,
 )
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.pose import Pose, PoseBatch
+from tests.geometries import gough_stewart_geometry
 
 STEP = 1e-30  # complex steps need no compromise between rounding and truncation
 MECHANISM = GoughStewart()

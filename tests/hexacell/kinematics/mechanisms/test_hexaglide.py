@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
+from tests.geometries import hexaglide_geometry
 
 STEP = 1e-30  # complex steps need no compromise between rounding and truncation
 degrees = st.floats(-30.0, 30.0)

@@ -15,12 +15,12 @@ from hexacell.kinematics.mechanisms.rotary_cranks import (
     ROTARY_CRANKS_PARAMETERS,
     THREE_CENTRES_FRAME,
     RotaryCranks,
-    rotary_cranks_geometry,
 )
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.turned_axes import turns_of
 from hexacell.robot.model import robot_of
+from tests.geometries import rotary_cranks_geometry
 
 MECHANISM = RotaryCranks()
 CELL = Path(__file__).parents[4] / "configs" / "rotary-cranks.toml"

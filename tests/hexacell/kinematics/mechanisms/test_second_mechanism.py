@@ -27,13 +27,14 @@ from hexacell.kinematics.mechanisms.gough_stewart import (
 from hexacell.kinematics.mechanisms.gough_stewart import (
     THREE_LEGS_FRAME as CONVENTION,
 )
-from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart, gough_stewart_geometry
+from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.results.result import IdentificationResult
+from tests.geometries import gough_stewart_geometry
 
 MECHANISM: Mechanism = GoughStewart()
 BRANCH: Branch = ()

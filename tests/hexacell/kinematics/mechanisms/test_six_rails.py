@@ -15,11 +15,10 @@ from hexacell.kinematics.mechanisms.six_rails import (
     FIRST_RAIL_FRAME,
     SIX_RAILS_PARAMETERS,
     SixRails,
-    directions_of_rails,
-    six_rails_geometry,
 )
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.turned_axes import turns_of
+from hexacell.kinematics.turned_axes import TurnedAxes, turns_of
+from tests.geometries import six_rails_geometry
 
 STEP = 1e-30  # complex steps need no compromise between rounding and truncation
 MECHANISM = SixRails()
@@ -88,6 +87,11 @@ def test_derivatives_are_those_of_the_leg_equation(pose: Pose, off_mm: float) ->
         np.testing.assert_allclose(found.parameters[0, leg], expected, rtol=1e-11, atol=1e-11)
         own = by_complex_step(state, "joints", (leg,))[leg]
         assert found.joints[0, leg] == pytest.approx(own, abs=1e-12)
+
+
+def directions_of_rails(turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    axes = TurnedAxes.by(turns)
+    return axes.axis, axes.axis_by_turns
 
 
 @given(turns, turns)

@@ -167,5 +167,4 @@ def leg_expansion(geometry: Geometry, um_per_m_k: float, warmer: Array) -> Array
     of_legs = np.array([one.kind.part is MachinePart.LEGS for one in parameters.parameters])
     legs = np.array([one.leg for one in parameters.parameters])
     by_kelvin = np.where(of_legs, UM_PER_M * um_per_m_k * geometry.vector, 0.0)
-    expansion: Array = warmer[:, legs - 1] * by_kelvin
-    return expansion
+    return np.asarray(warmer[:, legs - 1] * by_kelvin)

@@ -126,21 +126,18 @@ class RobotBelief:
         moved = apply_twist(poses[rows], steps.reshape(-1, 6))
         margins = self.limits.leg_margins(self.mechanism, robots, moved, joints[rows])
         margins = margins.reshape(count, every, margins.shape[-1])
-        sigmas: Array = np.linalg.norm(margins[:, 1:] - margins[:, :1], axis=1)
-        return sigmas
+        return np.asarray(np.linalg.norm(margins[:, 1:] - margins[:, :1], axis=1))
 
     def _orientation_sigmas(self, by_free: Array) -> Array:
         """:meth:`orientation_sigma` at n poses with the derivatives (n, 6, p)."""
         rotation = by_free[:, 3:]
-        sigmas: Array = np.sqrt(((rotation @ self.covariance) * rotation).sum(axis=-1).max(axis=-1))
-        return sigmas
+        return np.asarray(np.sqrt(((rotation @ self.covariance) * rotation).sum(axis=-1).max(axis=-1)))
 
     @cached_property
     def _principal_changes(self) -> Array:
         """(p, p): one standard deviation along each principal axis of the parameters' distribution, mm."""
         variances, axes = np.linalg.eigh(self.covariance)
-        changes: Array = np.sqrt(np.maximum(variances, 0.0))[:, None] * axes.T
-        return changes
+        return np.asarray(np.sqrt(np.maximum(variances, 0.0))[:, None] * axes.T)
 
     def keeps_limits(self, poses: PoseBatch, joints: Array, wanted: Array | None = None) -> Mask:
         """Whether the estimated robot keeps its limits at n poses with joint variables (n, 6), mm.

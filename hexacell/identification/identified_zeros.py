@@ -54,8 +54,7 @@ def zero_columns(mechanism: Mechanism, geometry: Geometry) -> Array:
     normal, _ = mechanism.normalize_frames(geometry)
     by_zeros = free_parameter_derivatives(mechanism, normal).T @ mechanism.encoder_zeros(normal)
     left, sizes, _ = np.linalg.svd(by_zeros, full_matrices=False)
-    columns: Array = left[:, sizes > SAME_CHANGE * sizes[0]]
-    return columns
+    return np.asarray(left[:, sizes > SAME_CHANGE * sizes[0]])
 
 
 def zeros_by_noise(mechanism: Mechanism, geometry: Geometry, information: Array) -> Array:
@@ -79,8 +78,7 @@ class HeldParameters:
 
     def gain(self, errors: Array) -> Array:
         """G (p, p) with which some errors (m, p) by the free parameters are least."""
-        gain: Array = self.columns @ np.linalg.pinv(errors @ self.columns, rcond=UNSEEN) @ errors
-        return gain
+        return np.asarray(self.columns @ np.linalg.pinv(errors @ self.columns, rcond=UNSEEN) @ errors)
 
     def covariance(self, gain: Array, estimated: Array) -> Array:
         """Covariance of the result (p, p), by that of the estimate of all parameters."""
@@ -91,8 +89,7 @@ class HeldParameters:
         units = np.sqrt(np.diag(self.tolerances))
         scaled = 0.5 * (total + total.T) / np.outer(units, units)
         variances, axes = np.linalg.eigh(scaled)
-        result: Array = ((axes * np.maximum(variances, 0.0)) @ axes.T) * np.outer(units, units)
-        return result
+        return np.asarray(((axes * np.maximum(variances, 0.0)) @ axes.T) * np.outer(units, units))
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +123,7 @@ class IdentifiedZeros:
     @cached_property
     def free(self) -> Array:
         """The free parameters (p,) with these zeros."""
-        free: Array = self.held + self.projector @ (self.found.free - self.held)
-        return free
+        return np.asarray(self.held + self.projector @ (self.found.free - self.held))
 
     @cached_property
     def free_covariance(self) -> Array:
@@ -143,8 +139,7 @@ class IdentifiedZeros:
     def covariance(self) -> Array:
         """Covariance (P, P) of all parameters."""
         basis = self.found.problem.basis
-        covariance: Array = basis @ self.free_covariance @ basis.T
-        return covariance
+        return np.asarray(basis @ self.free_covariance @ basis.T)
 
     @property
     def sigma(self) -> Array:
@@ -178,5 +173,4 @@ def _pose_errors(found: Identification) -> Array:
     weights = np.repeat([1.0, float(mechanism.platform_radius(found.geometry))], 3)[:, None]
     columns = (weights * prediction.pose_jacobian).reshape(-1, len(found.free))
     frames, _ = np.linalg.qr((weights * frame_derivatives(prediction.poses)).reshape(-1, 9))
-    left: Array = columns - frames @ (frames.T @ columns)
-    return left
+    return np.asarray(columns - frames @ (frames.T @ columns))

@@ -137,8 +137,7 @@ class _NoiseAssessment:
             np.array([noise.of_mean(number) for noise in self.reading_noise])
             for number in (count, windows * count)
         )
-        several: Array = np.sqrt(np.maximum(one**2 - first**2, 0.0) + mean**2)
-        return several
+        return np.asarray(np.sqrt(np.maximum(one**2 - first**2, 0.0) + mean**2))
 
     def _at_least(self, sigma: Array) -> Array:
         """Noise (9,) that is no smaller than that of the readings, where these prove it larger."""

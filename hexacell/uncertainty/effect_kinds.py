@@ -119,8 +119,7 @@ def load_at_work(newton: float, um_per_n: float, source: str = "") -> Effect:
         # Virtual work: leg forces t hold a force F on the platform if J^T t = F. With A = -J^-1 the legs
         # yield by c t, and the platform by c A A^T F.
         inverse = placement.by_constraints
-        bent: Array = UM * um_per_n * inverse @ np.swapaxes(inverse[:, :3], -1, -2)
-        return bent
+        return np.asarray(UM * um_per_n * inverse @ np.swapaxes(inverse[:, :3], -1, -2))
 
     return Effect("load at work", newton, "N", Occurrence.AT_WORK, bending, source=source)
 
@@ -132,8 +131,7 @@ def _warmer(placement: Placement, um_per_m_k: Mapping[MachinePart, float]) -> Ar
     changes = parameters.by_kind(coefficients) * placement.geometry.vector
     joints = um_per_m_k[MachinePart.BASE] * placement.joints
     moved = placement.by_parameters(changes[:, None]) + placement.by_joints(joints[..., None])
-    warmer: Array = UM_PER_M * moved
-    return warmer
+    return np.asarray(UM_PER_M * moved)
 
 
 def gauge_scales(um_per_mm: float, *, is_estimated: bool, source: str = "") -> Effect:
@@ -161,8 +159,7 @@ def ball_beside_tool(mm: float, source: str = "") -> Effect:
 
 def _scales(records: RecordPlacement) -> Array:
     # Along the base axes, as the estimator has them: the gauges' own are within a degree of these.
-    shares: Array = 1e-3 * records.deviations[:, :, None] * np.eye(3)
-    return shares
+    return np.asarray(1e-3 * records.deviations[:, :, None] * np.eye(3))
 
 
 def _oval(records: RecordPlacement) -> Array:
@@ -176,8 +173,7 @@ def _oval(records: RecordPlacement) -> Array:
         [x * y, y * z, z * x, 0.5 * (x * x - y * y), (3.0 * z * z - 1.0) / np.sqrt(12.0)], axis=-1
     )
     amplitude = UM * np.sqrt(1.5)
-    errors: Array = amplitude * np.einsum("ag,ngk->nak", records.gauges, harmonics)
-    return errors
+    return np.asarray(amplitude * np.einsum("ag,ngk->nak", records.gauges, harmonics))
 
 
 def _beside(placement: Placement) -> Array:
@@ -200,8 +196,7 @@ def rail_waves(um: float, wavelength_mm: float, source: str = "") -> Effect:
 
     def waves(along: Array) -> Array:
         phase = 2.0 * np.pi * along / wavelength_mm
-        both: Array = UM / np.sqrt(2.0) * np.stack([np.sin(phase), np.cos(phase)], axis=-1)
-        return both
+        return np.asarray(UM / np.sqrt(2.0) * np.stack([np.sin(phase), np.cos(phase)], axis=-1))
 
     name = f"waves of the rails, {wavelength_mm:g} mm long"
     columns = partial(_across_rails, shapes=waves)
@@ -218,8 +213,7 @@ def common_sag(um: float, half_length_mm: float, source: str = "") -> Effect:
         if placement.guides is None:
             return np.zeros((len(placement), 6, 0))
         depth = UM * (placement.guides.along / half_length_mm) ** 2
-        moved: Array = placement.by_constraints @ (placement.guides.across[..., 1] * depth)[..., None]
-        return moved
+        return np.asarray(placement.by_constraints @ (placement.guides.across[..., 1] * depth)[..., None])
 
     return Effect("sag common to all rails", um, "um", Occurrence.CONSTANT, sagging, source=source)
 
@@ -233,5 +227,4 @@ def _across_rails(placement: Placement, shapes: Callable[[Array], Array]) -> Arr
     for rail, legs in enumerate(guides.rails):
         on_rail[list(legs), rail] = 1.0
     columns = np.einsum("nid,nim,ir->nidmr", guides.across, shapes(guides.along), on_rail)
-    moved: Array = placement.by_constraints @ columns.reshape(len(placement), 6, -1)
-    return moved
+    return np.asarray(placement.by_constraints @ columns.reshape(len(placement), 6, -1))

@@ -71,13 +71,11 @@ class Placement:
     @cached_property
     def by_constraints(self) -> Array:
         """Derivatives (n, 6, 6) of the pose, mm and rad, by errors of the constraints, mm."""
-        inverse: Array = -np.linalg.inv(self.derivatives.pose)
-        return inverse
+        return np.asarray(-np.linalg.inv(self.derivatives.pose))
 
     def by_joints(self, errors: Array) -> Array:
         """Errors of the poses (n, 6, k) by errors (n, 6, k), mm, of the joint variables."""
-        moved: Array = self.by_constraints @ (self.derivatives.joints[..., None] * errors)
-        return moved
+        return np.asarray(self.by_constraints @ (self.derivatives.joints[..., None] * errors))
 
     def by_parameters(self, changes: Array) -> Array:
         """Errors of the poses (n, 6, k) by changes (P, k) of the parameters."""
@@ -85,8 +83,9 @@ class Placement:
         of_legs = np.empty_like(changes)
         of_legs[parameters.leg_order] = changes
         by_leg = of_legs.reshape(6, parameters.numbers_per_leg, -1)
-        moved: Array = self.by_constraints @ np.einsum("nic,ick->nik", self.derivatives.parameters, by_leg)
-        return moved
+        return np.asarray(
+            self.by_constraints @ np.einsum("nic,ick->nik", self.derivatives.parameters, by_leg)
+        )
 
 
 @dataclass(frozen=True, eq=False)

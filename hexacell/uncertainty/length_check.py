@@ -139,14 +139,12 @@ class LengthCheck:
     @cached_property
     def residuals(self) -> Array:
         """(n, 3) of the records' places less that of their seat, mm."""
-        left: Array = self.records.places - self._places[self.records.seats]
-        return left
+        return np.asarray(self.records.places - self._places[self.records.seats])
 
     @property
     def closure_mm(self) -> Array:
         """(3,) how far the first seat's place is, at its last mounting, from that at the first one."""
-        closure: Array = self._closing @ self.records.places
-        return closure
+        return np.asarray(self._closing @ self.records.places)
 
     @property
     def closure(self) -> ChiSquareTest:
@@ -161,8 +159,7 @@ class LengthCheck:
         mountings = self.records.mountings
         last = mountings == mountings[self.records.seats == 0].max()
         first = mountings == 1
-        weights: Array = last / last.sum() - first / first.sum()
-        return weights
+        return np.asarray(last / last.sum() - first / first.sum())
 
     def following(self) -> Mapping[int, Array]:
         """How far each gauge (3,) followed the ball, by mounting: 1 as far as it moved, -1 the other way.
@@ -221,26 +218,22 @@ class LengthCheck:
 
     def _to_length(self, columns: Array) -> Array:
         """Errors (k,) of the length by errors (n, 3, k) of the places, mm."""
-        errors: Array = np.tensordot(self._weights, columns, axes=2)
-        return errors
+        return np.asarray(np.tensordot(self._weights, columns, axes=2))
 
     @property
     def _between(self) -> Array:
-        between: Array = self._places[1] - self._places[0]
-        return between
+        return np.asarray(self._places[1] - self._places[0])
 
     @cached_property
     def _weights(self) -> Array:
         """(n, 3) derivatives of the length by the places of the records."""
         direction = self._between / np.linalg.norm(self._between)
-        weights: Array = np.einsum("a,anb->nb", direction, self._gain[1] - self._gain[0])
-        return weights
+        return np.asarray(np.einsum("a,anb->nb", direction, self._gain[1] - self._gain[0]))
 
     @cached_property
     def _places(self) -> Array:
         """(2, 3) of the seats."""
-        places: Array = np.einsum("sanb,nb->sa", self._gain, self.records.places)
-        return places
+        return np.asarray(np.einsum("sanb,nb->sa", self._gain, self.records.places))
 
     @cached_property
     def _gain(self) -> Array:
@@ -250,8 +243,7 @@ class LengthCheck:
         rows = design.reshape(-1, 6)
         weighted = np.linalg.solve(self._covariance, rows)
         gain = np.linalg.solve(rows.T @ weighted, weighted.T)
-        by_seat: Array = gain.reshape(2, 3, -1, 3)
-        return by_seat
+        return np.asarray(gain.reshape(2, 3, -1, 3))
 
     @cached_property
     def _covariance(self) -> Array:
@@ -272,7 +264,6 @@ def _slope(moved: Array, shown: Array) -> Array:
     moved, shown = moved - moved.mean(axis=0), shown - shown.mean(axis=0)
     squares = (moved**2).sum(axis=0)
     undefined = np.full(3, np.nan)
-    slope: Array = np.divide(
-        (moved * shown).sum(axis=0), squares, out=undefined, where=squares > HARDLY_MM2
+    return np.asarray(
+        np.divide((moved * shown).sum(axis=0), squares, out=undefined, where=squares > HARDLY_MM2)
     )
-    return slope

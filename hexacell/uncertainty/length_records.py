@@ -87,8 +87,7 @@ class LengthRecords:
     @property
     def places(self) -> Array:
         """(n, 3) where the ball would be with the gauges at zero, by the robot, mm."""
-        difference: Array = self.placement.poses.positions - self.placement.deviations
-        return difference
+        return np.asarray(self.placement.poses.positions - self.placement.deviations)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

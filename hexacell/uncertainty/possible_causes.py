@@ -172,8 +172,7 @@ class ExcessTest:
         """Columns (n, 3, k) as unknowns of each point (n, 3, k m)."""
         problem = self.found.problem
         at_point = problem.per_record(np.eye(problem.points))
-        alone: Array = np.einsum("nij,nm->nijm", columns, at_point).reshape(problem.records, 3, -1)
-        return alone
+        return np.asarray(np.einsum("nij,nm->nijm", columns, at_point).reshape(problem.records, 3, -1))
 
     def _gain(self, columns: Array) -> tuple[float, int]:
         """The decrease of the chi-square, and by how many unknowns."""

@@ -118,8 +118,7 @@ class Propagation:
     def _kept_covariance(self) -> Array:
         """(p, p): the covariance of the estimate, projected where zeros alone are identified."""
         kept = np.eye(len(self.found.free)) if self.zeros is None else self.zeros.projector
-        covariance: Array = kept @ self.found.free_covariance
-        return covariance
+        return np.asarray(kept @ self.found.free_covariance)
 
     @cached_property
     def _gain(self) -> Array:
@@ -127,8 +126,7 @@ class Propagation:
         prediction = self.found.prediction
         centred = self._elimination.centred(prediction.jacobian)
         weighted = np.swapaxes(centred, -1, -2) @ prediction.weights
-        gain: Array = np.einsum("pq,nqa->pna", self._kept_covariance, weighted)
-        return gain
+        return np.asarray(np.einsum("pq,nqa->pna", self._kept_covariance, weighted))
 
     def parameter_columns(self, effect: Effect) -> Array:
         """Errors (p, k) of the free parameters by one unit of each cause of an effect."""
@@ -243,8 +241,7 @@ def errors_by_scale(
     assert effect.on_poses is not None  # noqa: S101 - it moves the sliders
     at_task, over = (effect.on_poses(placement_of(belief, poses)) for poses in (task, workspace))
     direct = teachable_frames(belief, workspace).remove_frame_motion(task, at_task, over)
-    errors: Array = (through + direct)[..., 0]
-    return errors
+    return np.asarray((through + direct)[..., 0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -90,5 +90,4 @@ def _largest(estimated: Array, effects: Array) -> LargestError:
 def covariance_factor(covariance: Array) -> Array:
     """A matrix (p, p) L with ``L L^T`` the covariance, which may be singular."""
     values, vectors = np.linalg.eigh(covariance)
-    factor: Array = vectors * np.sqrt(np.maximum(values, 0.0))
-    return factor
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))

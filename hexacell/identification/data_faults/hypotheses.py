@@ -82,8 +82,7 @@ class ZeroShiftHypothesis(FaultHypothesis):
     def rows(self, problem: Problem) -> Mask:
         """The records (n,) after the shift."""
         first = np.flatnonzero(problem.mask_of([(self.point, self.orientation)]))[0]
-        after: Mask = (problem.labels[:, 0] == self.point) & (np.arange(problem.records) >= first)
-        return after
+        return np.asarray((problem.labels[:, 0] == self.point) & (np.arange(problem.records) >= first))
 
     def corrected(self, problem: Problem) -> Problem:
         """The problem without the records after the shift."""
@@ -108,8 +107,7 @@ class GaugeFault:
 
     def in_base_frame(self, problem: Problem) -> Array:
         """The remedy (3, 3) of deviations along the axes of the base frame."""
-        turned: Array = problem.gauges @ self.remedy @ problem.gauges.T
-        return turned
+        return np.asarray(problem.gauges @ self.remedy @ problem.gauges.T)
 
 
 def _gauge_faults() -> Iterator[GaugeFault]:

@@ -169,16 +169,14 @@ class OutlierStatistics:
         rate = min(FALSE_ALARMS_PER_RECORD, FALSE_ALARMS_PER_FILE / records) * (found_before + 1) / 2.0
         along_a_gauge = self.along_gauges.max(axis=-1) / normal_limit(rate / 6.0) ** 2
         in_space = self.omnibus / chi_square_limit(3, rate)
-        threshold_ratio: Array = np.maximum(along_a_gauge, in_space) / self.scale
-        return threshold_ratio
+        return np.asarray(np.maximum(along_a_gauge, in_space) / self.scale)
 
 
 def _along_gauges(gauges: Array, scores: Array, block: Array, weights: Array) -> Array:
     score = scores @ gauges
     information = np.einsum("ia,nij,ja->na", gauges, block, gauges)
     testable = information > SMALLEST_REDUNDANCY * np.einsum("ia,nij,ja->na", gauges, weights, gauges)
-    statistics: Array = np.where(testable, score**2 / np.where(testable, information, 1.0), 0.0)
-    return statistics
+    return np.asarray(np.where(testable, score**2 / np.where(testable, information, 1.0), 0.0))
 
 
 def _omnibus(residuals: Array, covariance: Array, weights: Array) -> Array:
@@ -186,8 +184,7 @@ def _omnibus(residuals: Array, covariance: Array, weights: Array) -> Array:
     along = np.einsum("nij,ni->nj", axes, residuals)
     testable = values > SMALLEST_REDUNDANCY / np.linalg.eigvalsh(weights)[:, -1:]
     squares = np.where(testable, along**2 / np.where(testable, values, 1.0), 0.0)
-    statistics: Array = np.sum(squares, axis=-1)
-    return statistics
+    return np.asarray(np.sum(squares, axis=-1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,8 +227,7 @@ def _sums_from(problem: Problem, values: Array) -> Array:
     """Sums (n, ...) over each record and the later ones of its point."""
     before = np.cumsum(values, axis=0) - values
     in_point = before - problem.per_record(before[problem.first_rows])
-    sums: Array = problem.per_record(problem.group_sums(values)) - in_point
-    return sums
+    return np.asarray(problem.per_record(problem.group_sums(values)) - in_point)
 
 
 def known_change_gains(model: LinearizedModel, change: Array) -> tuple[Array, float]:

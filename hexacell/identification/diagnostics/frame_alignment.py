@@ -228,8 +228,7 @@ def _pseudoinverse(freedom: FrameFreedom, length: float, targets: PoseBatch, piv
     design = frame_derivatives(centred)
     design[:, 3:] *= length
     design[:, :, 3:] /= length
-    inverse: Array = np.linalg.pinv(design.reshape(-1, 9)[:, freedom.columns], rcond=UNDETERMINED)
-    return inverse
+    return np.asarray(np.linalg.pinv(design.reshape(-1, 9)[:, freedom.columns], rcond=UNDETERMINED))
 
 
 def _change(step: Array, length: float, pivot: Array) -> FrameTransform:

@@ -246,13 +246,11 @@ class ToleranceFitter:
         here, steps = self.geometry.vector, STEP * np.diag(self.drawing.parameters.like_a_mm)
         ends = np.array([[self._in(frames, here + side * step) for step in steps] for side in (1.0, -1.0)])
         turned = (ends[0] - ends[1]) / (2.0 * np.diag(steps)[:, None]) / self.widths
-        covariance: Array = turned.T @ self.covariance @ turned
-        return covariance
+        return np.asarray(turned.T @ self.covariance @ turned)
 
     def difference(self, frames: FrameTransform) -> Array:
         """(P,) from the drawing, in some frames, in units of the tolerances."""
-        difference: Array = (self._in(frames, self.geometry.vector) - self.drawing.vector) / self.widths
-        return difference
+        return np.asarray((self._in(frames, self.geometry.vector) - self.drawing.vector) / self.widths)
 
     def by_frames(self, frames: FrameTransform) -> Array:
         """Derivatives (P, k) of that by the free small changes of the frames, in units of their scales."""
@@ -263,8 +261,7 @@ class ToleranceFitter:
 
         steps = STEP * np.eye(9)[self.frame_columns]
         derivatives = np.array([changed(step) - changed(-step) for step in steps]).T / (2.0 * STEP)
-        scaled: Array = derivatives * self.frame_scales / self.widths[:, None]
-        return scaled
+        return np.asarray(derivatives * self.frame_scales / self.widths[:, None])
 
     @cached_property
     def by_ball(self) -> Array:

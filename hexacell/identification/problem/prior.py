@@ -78,8 +78,7 @@ class Noise:
     def encoder_covariance(self, position_by_joints: Array) -> Array:
         """Covariance (n, 3, 3), mm^2, of the ball's position by ``dP/dq`` (n, 3, 6)."""
         scaled = position_by_joints * self.encoders
-        covariance: Array = scaled @ np.swapaxes(scaled, -1, -2)
-        return covariance
+        return np.asarray(scaled @ np.swapaxes(scaled, -1, -2))
 
     @property
     def gauge_covariance(self) -> Array:
@@ -87,8 +86,7 @@ class Noise:
         if not self.gauge_axes:
             return np.diag(self.gauges_mm**2)
         scaled = np.array(self.gauge_axes) * self.gauges_mm
-        covariance: Array = scaled @ scaled.T
-        return covariance
+        return np.asarray(scaled @ scaled.T)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,8 +163,7 @@ class Prior:
         """What counts as unknown of each free parameter (p,): the tolerances, if there are any; mm."""
         if self.tolerance_sigma is not None:
             return self.tolerance_sigma
-        sigma: Array = np.sqrt(np.diag(self.covariance))
-        return sigma
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @cached_property
     def precision(self) -> Array:
@@ -219,8 +216,7 @@ def drift_covariance(mechanism: Mechanism, geometry: Geometry, sigma: Array) -> 
     convention fixes as well: the convention then moves the others. ``geometry`` is in that convention.
     """
     factor = sigma[:, None] * free_parameter_derivatives(mechanism, geometry)
-    covariance: Array = factor.T @ factor
-    return covariance
+    return np.asarray(factor.T @ factor)
 
 
 def drift_sigma(mechanism: Mechanism, sigma_mm: float, tolerances: Tolerances) -> Array:

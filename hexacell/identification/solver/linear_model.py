@@ -97,14 +97,12 @@ class LinearizedModel:
     @property
     def scores(self) -> Array:
         """``W r`` (n, 3), 1/mm."""
-        scores: Array = np.einsum("nij,nj->ni", self.weights, self.residuals)
-        return scores
+        return np.asarray(np.einsum("nij,nj->ni", self.weights, self.residuals))
 
     @property
     def residual_covariance(self) -> Array:
         """Covariance V (n, 3, 3), mm^2, of each residual; ``W V W`` is the record's block of M."""
-        remaining: Array = np.linalg.inv(self.weights) - self.explained
-        return remaining
+        return np.asarray(np.linalg.inv(self.weights) - self.explained)
 
     @property
     def chi2(self) -> float:

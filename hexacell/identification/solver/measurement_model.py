@@ -104,14 +104,12 @@ def evaluate_step(problem: Problem, present: Prediction, step: Array) -> Forward
 
 def is_singular(position_by_joints: Array) -> Mask:
     """Whether each record is next to a singularity, by ``dP/dq`` (n, 3, 6)."""
-    singular: Mask = np.linalg.norm(position_by_joints, axis=(-2, -1)) > LARGEST_AMPLIFICATION
-    return singular
+    return np.asarray(np.linalg.norm(position_by_joints, axis=(-2, -1)) > LARGEST_AMPLIFICATION)
 
 
 def record_covariance(position_by_joints: Array, noise: Noise) -> Array:
     """Covariance (n, 3, 3), mm^2, of records by ``dP/dq`` (n, 3, 6), from encoder and gauge noise."""
-    covariance: Array = noise.encoder_covariance(position_by_joints) + noise.gauge_covariance
-    return covariance
+    return np.asarray(noise.encoder_covariance(position_by_joints) + noise.gauge_covariance)
 
 
 def record_weights(position_by_joints: Array, noise: Noise) -> Array:

@@ -43,8 +43,7 @@ def tolerance_draws(problem: Problem) -> Array:
     """
     root = np.linalg.cholesky(problem.prior.covariance)
     normal = np.random.default_rng(0).standard_normal((2, DRAWS // 2, len(root)))
-    changes: Array = np.concatenate([normal[0] @ root.T, normal[1] * problem.prior.sigma])
-    return changes
+    return np.asarray(np.concatenate([normal[0] @ root.T, normal[1] * problem.prior.sigma]))
 
 
 def _with_poses(problem: Problem, starts: Array) -> Iterator[tuple[Array, PoseBatch]]:

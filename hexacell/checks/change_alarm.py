@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
-from hexacell.uncertainty.effects import Effect, Occurrence, RecordEffects
+from hexacell.uncertainty.effects import Effect, Occurrence, errors_by_effects
 
 FIRST_RECORDS = 8
 """Number of a check's first records that are tested, references included."""
@@ -128,10 +129,10 @@ def machine_records(
     """The records of a run at the free parameters (p,), with what differs from run to run as noise."""
     own = tuple(one for one in robot.effects if one.occurrence is Occurrence.MEASURING)
     shared = tuple(one for one in robot.effects if one.occurrence is not Occurrence.MEASURING)
-    problem = replace(robot.problem(measurements), systematic=RecordEffects(shared))
+    problem = replace(robot.problem(measurements), systematic=partial(errors_by_effects, shared))
     order = np.argsort(measurements.group, kind="stable")
     by_row = None if expansion is None else expansion[order]
-    return whiten_records(problem, free, of_this_run=RecordEffects(own), expansion=by_row)
+    return whiten_records(problem, free, of_this_run=partial(errors_by_effects, own), expansion=by_row)
 
 
 def machine_causes(robot: Robot, states: int) -> Causes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.plugins import Group, load
 from hexacell.robot.stated_effects import stated_effects
 from hexacell.robot.stated_limits import stated_limits
-from hexacell.uncertainty.effects import Effect, RecordEffects
+from hexacell.uncertainty.effects import Effect, errors_by_effects
 
 FARTHEST_DRAWING = 0.25
 """Largest difference of the drawing from a config, as a share of the largest number of the config."""
@@ -154,7 +154,7 @@ class Robot:
             self.noise,
             provisional=self.provisional,
             earlier=self.earlier,
-            systematic=RecordEffects(self.effects),
+            systematic=partial(errors_by_effects, self.effects),
             unknowns=self.unknowns,
         )
         return assumptions.problem(measurements, before)

@@ -15,9 +15,10 @@ from functools import partial
 
 import numpy as np
 
+from hexacell.identification.problem.prior import Placement, RecordPlacement
 from hexacell.kinematics.parameters import LEGS, JointUnit, MachinePart
 from hexacell.kinematics.rotations import Array
-from hexacell.uncertainty.effects import UM, Effect, Occurrence, Placement, RecordPlacement
+from hexacell.uncertainty.effects import UM, Effect, Occurrence
 
 COMMON_SCALE = "scale common to all encoders"
 """The effect that a length check measures."""
@@ -31,20 +32,35 @@ def common_encoder_scale(um_per_m: float, source: str = "") -> Effect:
 
     Nothing that the gauges measure distinguishes it from a machine that is larger by the same share.
     """
-    return Effect(COMMON_SCALE, um_per_m, "um/m", Occurrence.CONSTANT, _common_scale, source=source)
+
+    def columns(at: Placement) -> Array:
+        return at.by_joints(1e-6 * at.joints[..., None])
+
+    return Effect(COMMON_SCALE, um_per_m, "um/m", Occurrence.CONSTANT, columns, source=source)
 
 
 def encoder_scales(um_per_m: float, source: str = "") -> Effect:
     """Each encoder is wrong by a share of its own."""
-    return Effect(
-        "scale of each encoder", um_per_m, "um/m", Occurrence.CONSTANT, _each_scale, source=source
-    )
+
+    def columns(at: Placement) -> Array:
+        return at.by_joints(1e-6 * at.joints[..., None] * np.eye(LEGS))
+
+    return Effect("scale of each encoder", um_per_m, "um/m", Occurrence.CONSTANT, columns, source=source)
 
 
 def encoder_eccentricities(mdeg: float, source: str = "") -> Effect:
-    """The disc of each rotary encoder is off its axis in any direction: its error is a sine over a turn."""
+    """The disc of each rotary encoder is off its axis in any direction: its error is a sine over a turn.
+
+    These are two causes a joint: a wave whose phase is unknown has half the variance in each.
+    """
+
+    def waves(at: Placement) -> Array:
+        angles = np.radians(at.joints)[..., None]
+        both = np.concatenate([np.cos(angles) * np.eye(LEGS), np.sin(angles) * np.eye(LEGS)], axis=-1)
+        return at.by_joints(THOUSANDTH * (np.sqrt(0.5) * both))
+
     name = "eccentricity of each encoder"
-    return Effect(name, mdeg, "mdeg", Occurrence.CONSTANT, _each_eccentricity, source=source)
+    return Effect(name, mdeg, "mdeg", Occurrence.CONSTANT, waves, source=source)
 
 
 def stop_repeatability(
@@ -62,28 +78,11 @@ def stop_repeatability(
     """
     occurrence = Occurrence.STOPS_AT_WORK if is_in_noise else Occurrence.EVERY_STOP
     name = f"repeatability of a {joint}"
-    return Effect(name, size, unit.thousandth, occurrence, _each_joint, source=source)
 
+    def columns(at: Placement) -> Array:
+        return at.by_joints(np.broadcast_to(THOUSANDTH * np.eye(LEGS), (len(at), LEGS, LEGS)))
 
-def _common_scale(placement: Placement) -> Array:
-    return placement.by_joints(1e-6 * placement.joints[..., None])
-
-
-def _each_scale(placement: Placement) -> Array:
-    return placement.by_joints(1e-6 * placement.joints[..., None] * np.eye(LEGS))
-
-
-def _each_eccentricity(placement: Placement) -> Array:
-    """Two causes a joint; a wave whose phase is unknown has half the variance in each."""
-    angles = np.radians(placement.joints)[..., None]
-    waves = np.sqrt(0.5) * np.concatenate(
-        [np.cos(angles) * np.eye(LEGS), np.sin(angles) * np.eye(LEGS)], axis=-1
-    )
-    return placement.by_joints(THOUSANDTH * waves)
-
-
-def _each_joint(placement: Placement) -> Array:
-    return placement.by_joints(np.broadcast_to(THOUSANDTH * np.eye(LEGS), (len(placement), LEGS, LEGS)))
+    return Effect(name, size, unit.thousandth, occurrence, columns, source=source)
 
 
 UM_PER_M = 1e-6
@@ -136,12 +135,17 @@ def _warmer(placement: Placement, um_per_m_k: Mapping[MachinePart, float]) -> Ar
 
 def gauge_scales(um_per_mm: float, *, is_estimated: bool, source: str = "") -> Effect:
     """Each gauge is wrong by a share of its own."""
+
+    def scales(records: RecordPlacement) -> Array:
+        # Along the base axes, as the estimator has them: the gauges' own are within a degree of these.
+        return np.asarray(1e-3 * records.deviations[:, :, None] * np.eye(3))
+
     return Effect(
         "scale of each gauge",
         um_per_mm,
         "um/mm",
         Occurrence.MEASURING,
-        on_readings=_scales,
+        on_readings=scales,
         source=source,
         is_estimated=is_estimated,
     )
@@ -154,12 +158,11 @@ def ball_roundness(um: float, source: str = "") -> Effect:
 
 def ball_beside_tool(mm: float, source: str = "") -> Effect:
     """The tool that works is not centred where the ball was, in any direction of the platform."""
-    return Effect("ball beside the tool's centre", mm, "mm", Occurrence.WITH_TOOL, _beside, source=source)
 
+    def beside(at: Placement) -> Array:
+        return np.concatenate([at.poses.rotations, np.zeros_like(at.poses.rotations)], axis=1)
 
-def _scales(records: RecordPlacement) -> Array:
-    # Along the base axes, as the estimator has them: the gauges' own are within a degree of these.
-    return np.asarray(1e-3 * records.deviations[:, :, None] * np.eye(3))
+    return Effect("ball beside the tool's centre", mm, "mm", Occurrence.WITH_TOOL, beside, source=source)
 
 
 def _oval(records: RecordPlacement) -> Array:
@@ -174,11 +177,6 @@ def _oval(records: RecordPlacement) -> Array:
     )
     amplitude = UM * np.sqrt(1.5)
     return np.asarray(amplitude * np.einsum("ag,ngk->nak", records.gauges, harmonics))
-
-
-def _beside(placement: Placement) -> Array:
-    rotations = placement.poses.rotations
-    return np.concatenate([rotations, np.zeros_like(rotations)], axis=1)
 
 
 def rail_directions(mrad: float, source: str = "") -> Effect:

@@ -8,17 +8,13 @@ first order. An error ``df`` of the constraints, which is in mm of leg length, m
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
 
 import numpy as np
 
-from hexacell.identification.problem.prior import MeasuredPoses, SystematicErrors
-from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import ConstraintDerivatives, Guides, Mechanism
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.identification.problem.prior import Placement, RecordPlacement, SystematicErrors
 from hexacell.kinematics.rotations import Array
 
 UM = 1e-3
@@ -44,66 +40,6 @@ class Occurrence(Enum):
     def differs_at_stops(self) -> bool:
         """Whether it is another one at every task pose."""
         return self in {Occurrence.EVERY_STOP, Occurrence.STOPS_AT_WORK}
-
-
-@dataclass(frozen=True, eq=False)
-class Placement:
-    """A robot at n poses, with the joint variables (n, 6), mm, that close its geometry there."""
-
-    mechanism: Mechanism
-    geometry: Geometry
-    poses: PoseBatch
-    joints: Array
-
-    def __len__(self) -> int:
-        return len(self.poses)
-
-    @cached_property
-    def derivatives(self) -> ConstraintDerivatives:
-        """Derivatives of the constraints."""
-        return self.mechanism.derivatives(self.geometry, self.poses, self.joints)
-
-    @cached_property
-    def guides(self) -> Guides | None:
-        """The guides of the sliders, if there are any."""
-        return self.mechanism.guides(self.geometry, self.poses, self.joints)
-
-    @cached_property
-    def by_constraints(self) -> Array:
-        """Derivatives (n, 6, 6) of the pose, mm and rad, by errors of the constraints, mm."""
-        return np.asarray(-np.linalg.inv(self.derivatives.pose))
-
-    def by_joints(self, errors: Array) -> Array:
-        """Errors of the poses (n, 6, k) by errors (n, 6, k), mm, of the joint variables."""
-        return np.asarray(self.by_constraints @ (self.derivatives.joints[..., None] * errors))
-
-    def by_parameters(self, changes: Array) -> Array:
-        """Errors of the poses (n, 6, k) by changes (P, k) of the parameters."""
-        parameters = self.mechanism.parameters
-        of_legs = np.empty_like(changes)
-        of_legs[parameters.leg_order] = changes
-        by_leg = of_legs.reshape(6, parameters.numbers_per_leg, -1)
-        return np.asarray(
-            self.by_constraints @ np.einsum("nic,ick->nik", self.derivatives.parameters, by_leg)
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class RecordPlacement(Placement):
-    """A robot at n records, and what the gauges saw there.
-
-    Attributes:
-        deviations: (n, 3), mm, along the base axes.
-        gauges: (3, 3), columns: measuring directions of the gauges.
-    """
-
-    deviations: Array
-    gauges: Array
-
-    @classmethod
-    def of(cls, measured: MeasuredPoses) -> RecordPlacement:
-        """The robot at measured poses."""
-        return cls(**{one.name: getattr(measured, one.name) for one in fields(cls)})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,26 +79,19 @@ def errors_of_records(effect: Effect, records: RecordPlacement) -> Array:
     return np.concatenate(parts, axis=-1)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RecordEffects:
-    """The errors of records by effects, for the tests of an identification.
+def errors_by_effects(effects: Iterable[Effect], records: RecordPlacement) -> SystematicErrors:
+    """The errors of n records by effects, for the tests of an identification.
 
     Effects that the estimator has as unknowns of its own are left out.
     """
-
-    effects: tuple[Effect, ...]
-
-    def __call__(self, measured: MeasuredPoses, /) -> SystematicErrors:
-        """The errors of n records at measured poses."""
-        records = RecordPlacement.of(measured)
-        common: list[Array] = [np.zeros((len(records), 3, 0))]
-        own = np.zeros((len(records), 3, 3))
-        for effect in self.effects:
-            if not effect.size or effect.is_estimated or not effect.occurrence.is_in_records:
-                continue
-            errors = effect.size * errors_of_records(effect, records)
-            if effect.occurrence is Occurrence.EVERY_STOP:
-                own = own + errors @ np.swapaxes(errors, -1, -2)
-            else:
-                common.append(errors)
-        return SystematicErrors(np.concatenate(common, axis=-1), own)
+    common: list[Array] = [np.zeros((len(records), 3, 0))]
+    own = np.zeros((len(records), 3, 3))
+    for effect in effects:
+        if not effect.size or effect.is_estimated or not effect.occurrence.is_in_records:
+            continue
+        errors = effect.size * errors_of_records(effect, records)
+        if effect.occurrence is Occurrence.EVERY_STOP:
+            own = own + errors @ np.swapaxes(errors, -1, -2)
+        else:
+            common.append(errors)
+    return SystematicErrors(np.concatenate(common, axis=-1), own)

@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.errors import IdentifiabilityError
-from hexacell.identification.problem.prior import Noise
+from hexacell.identification.problem.prior import Noise, RecordPlacement
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE
-from hexacell.uncertainty.effects import Effect, Occurrence, RecordPlacement, errors_of_records
+from hexacell.uncertainty.effects import Effect, Occurrence, errors_of_records
 from hexacell.uncertainty.propagation import each_alone
 
 

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -43,7 +42,7 @@ from hexacell.uncertainty.effect_kinds import (
     rail_directions,
     rail_waves,
 )
-from hexacell.uncertainty.effects import Effect, RecordPlacement, errors_of_records
+from hexacell.uncertainty.effects import Effect, errors_of_records
 
 SMALLEST_SHARE = 0.1
 """Share of the excess that a cause must explain to be listed."""
@@ -131,13 +130,13 @@ class ExcessTest:
 
     def by_effects(self, *effects: Effect) -> list[Array]:
         """What one unit of each cause of some effects does to the records."""
-        return [errors_of_records(effect, self._records) for effect in effects]
+        return [errors_of_records(effect, self.found.placement) for effect in effects]
 
     def by_encoders(self) -> list[Array]:
         """Encoders whose scale changes along them."""
         joints = self.found.problem.joints
         bent = (joints - joints.mean(axis=0)) ** 2
-        return [self._records.by_joints(bent[..., None] * np.eye(LEGS))[:, :3]]
+        return [self.found.placement.by_joints(bent[..., None] * np.eye(LEGS))[:, :3]]
 
     def by_gauges(self) -> list[Array]:
         """Readings that are a linear function of the deviation, stations turned, and zeros that drift."""
@@ -153,7 +152,7 @@ class ExcessTest:
 
     def by_expansion(self) -> list[Array]:
         """Each part, and each leg, that expands evenly from the first record to the last."""
-        placement = self._records
+        placement = self.found.placement
         parameters, vector = placement.mechanism.parameters, placement.geometry.vector
         changes = [
             parameters.by_kind({kind.symbol: float(kind.part is part) for kind in parameters.kinds})
@@ -163,10 +162,6 @@ class ExcessTest:
         progress = np.linspace(-0.5, 0.5, len(placement))[:, None, None]
         by_parts = placement.by_parameters(np.stack(changes, axis=-1))
         return [progress * by_parts[:, :3], progress * placement.by_constraints[:, :3]]
-
-    @cached_property
-    def _records(self) -> RecordPlacement:
-        return RecordPlacement.of(self.found.measured)
 
     def _at_each_point(self, columns: Array) -> Array:
         """Columns (n, 3, k) as unknowns of each point (n, 3, k m)."""

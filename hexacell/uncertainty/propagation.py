@@ -35,12 +35,13 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit
 from hexacell.identification.diagnostics.pose_accuracy import error_jacobian, teachable_frames
 from hexacell.identification.identified_zeros import IdentifiedZeros
+from hexacell.identification.problem.prior import Placement
 from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
-from hexacell.uncertainty.effects import Effect, Occurrence, Placement, RecordPlacement, errors_of_records
+from hexacell.uncertainty.effects import Effect, Occurrence, errors_of_records
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,10 +108,6 @@ class Propagation:
         )
 
     @cached_property
-    def _records(self) -> RecordPlacement:
-        return RecordPlacement.of(self.found.measured)
-
-    @cached_property
     def _elimination(self) -> NuisanceElimination:
         return NuisanceElimination(self.found.problem, self.found.prediction.weights)
 
@@ -132,7 +129,7 @@ class Propagation:
         """Errors (p, k) of the free parameters by one unit of each cause of an effect."""
         if not effect.occurrence.is_in_records:
             return np.zeros((len(self._gain), 0))
-        on_records = errors_of_records(effect, self._records)
+        on_records = errors_of_records(effect, self.found.placement)
         each: Array = np.einsum("pna,nak->pnk", self._gain, on_records)
         before = None
         if effect.name in self.earlier:
@@ -155,7 +152,7 @@ class Propagation:
         """What one unit of every cause adds to the expected chi-square of the residuals."""
         if not effect.occurrence.is_in_records:
             return 0.0
-        errors = errors_of_records(effect, self._records)
+        errors = errors_of_records(effect, self.found.placement)
         if effect.occurrence is Occurrence.EVERY_STOP:
             errors = each_alone(errors)
         jacobian = self.found.prediction.jacobian

@@ -12,6 +12,7 @@ from hexacell.cell.fields import Frozen
 from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.model import CellSettings
 from hexacell.identification.belief import RobotBelief
+from hexacell.identification.problem.prior import RecordPlacement
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
@@ -19,7 +20,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.results.result import AcceptedResult, LengthResult, LengthSource
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE
-from hexacell.uncertainty.effects import Effect, RecordPlacement
+from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_records import JudgedGeometry, LengthRecords, LengthStandard
 from hexacell.uncertainty.propagation import errors_by_scale

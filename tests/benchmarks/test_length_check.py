@@ -20,6 +20,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.identification.estimator import identify
+from hexacell.identification.problem.prior import RecordPlacement
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -28,7 +29,6 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
 from hexacell.robot.stated_effects import stated_effects
 from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.uncertainty.effects import RecordPlacement
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_records import JudgedGeometry, LengthRecords, LengthStandard
 from tests.benchmarks.imperfect_machine import ImperfectMachine

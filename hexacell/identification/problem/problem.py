@@ -19,9 +19,9 @@ from hexacell.identification.problem.commanded_poses import (
     require_consistent_encoders,
 )
 from hexacell.identification.problem.prior import (
-    MeasuredPoses,
     Noise,
     Prior,
+    RecordPlacement,
     SystematicModel,
     no_systematic_errors,
 )
@@ -134,10 +134,10 @@ class Problem:
         """The geometry of free parameters (p,), mm."""
         return self.mechanism.convention.geometry(free)
 
-    def measured_at(self, free: Array, poses: PoseBatch) -> MeasuredPoses:
-        """What is known of the records under free parameters (p,), mm, that give them these poses."""
+    def measured_at(self, free: Array, poses: PoseBatch) -> RecordPlacement:
+        """The robot at the records under free parameters (p,), mm, that give them these poses."""
         geometry = self.geometry(free)
-        return MeasuredPoses(self.mechanism, geometry, poses, self.joints, self.deviations, self.gauges)
+        return RecordPlacement(self.mechanism, geometry, poses, self.joints, self.deviations, self.gauges)
 
     def solve_poses(self, free: Array) -> ForwardResult:
         """Poses that close the geometry of free parameters (p,), mm, at the records' joint variables."""

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.errors import IdentifiabilityError
-from hexacell.identification.problem.prior import MeasuredPoses
+from hexacell.identification.problem.prior import RecordPlacement
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linear_model import LinearCosts, LinearizedModel
@@ -245,9 +245,9 @@ class Identification:
         costs = LinearCosts.at(self.problem, self.prediction)
         return self.noise_test if costs.are_of_noise else costs.residual_test(self.active_prior)
 
-    @property
-    def measured(self) -> MeasuredPoses:
-        """What is known of the records under the identified geometry."""
+    @cached_property
+    def placement(self) -> RecordPlacement:
+        """The robot at the records under the identified geometry."""
         return self.problem.measured_at(self.free, self.poses)
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hexacell.cell.loader import load_cell
+from hexacell.identification.problem.prior import Placement
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart
@@ -24,7 +25,7 @@ from hexacell.uncertainty.effect_kinds import (
     stop_repeatability,
     temperature_at_work,
 )
-from hexacell.uncertainty.effects import Effect, Placement
+from hexacell.uncertainty.effects import Effect
 from tests.geometries import gough_stewart_geometry
 
 STEP_MM = 1e-4

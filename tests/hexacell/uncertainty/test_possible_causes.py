@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
+from hexacell.identification.problem.prior import Placement
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.measurements.records import MeasurementSet
 from hexacell.uncertainty.effect_kinds import load_at_work, rail_waves
-from hexacell.uncertainty.effects import Placement
 from hexacell.uncertainty.possible_causes import ExcessTest, possible_causes
 
 ENCODERS, GUIDES, LOAD, TEMPERATURE, GAUGES = (

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from hexacell.identification.problem.prior import RecordPlacement
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.uncertainty.effects import RecordPlacement
 from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
 from tests.hexacell.uncertainty.conftest import Laboratory, Machine
 

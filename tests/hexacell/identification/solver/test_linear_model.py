@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,10 +17,10 @@ from hexacell.identification.solver.linear_model import LinearCosts, systematic_
 from hexacell.kinematics.rotations import skew
 from hexacell.measurements.records import MeasurementSet
 from hexacell.uncertainty.effect_kinds import ball_roundness, encoder_scales, stop_repeatability
-from hexacell.uncertainty.effects import RecordEffects
+from hexacell.uncertainty.effects import errors_by_effects
 
 NOISE = Noise(0.01, 0.01, alignment=0.005, gauge_scale=1e-3)
-EFFECTS = RecordEffects((encoder_scales(30.0), stop_repeatability(8.0), ball_roundness(6.0)))
+EFFECTS = partial(errors_by_effects, (encoder_scales(30.0), stop_repeatability(8.0), ball_roundness(6.0)))
 MACHINES = 60
 
 

@@ -116,7 +116,9 @@ class RobotBelief:
 
         By linear propagation, from the ``sensitivity`` there.
         """
-        changes = np.vstack([np.zeros(len(self.free)), self._principal_changes])
+        variances, axes = np.linalg.eigh(self.covariance)
+        one_sigma = np.sqrt(np.maximum(variances, 0.0))[:, None] * axes.T  # along each principal axis
+        changes = np.vstack([np.zeros(len(self.free)), one_sigma])
         count, every = len(joints), len(changes)
         rows = np.arange(count).repeat(every)
         robots = GeometryBatch(
@@ -132,12 +134,6 @@ class RobotBelief:
         """:meth:`orientation_sigma` at n poses with the derivatives (n, 6, p)."""
         rotation = by_free[:, 3:]
         return np.asarray(np.sqrt(((rotation @ self.covariance) * rotation).sum(axis=-1).max(axis=-1)))
-
-    @cached_property
-    def _principal_changes(self) -> Array:
-        """(p, p): one standard deviation along each principal axis of the parameters' distribution, mm."""
-        variances, axes = np.linalg.eigh(self.covariance)
-        return np.asarray(np.sqrt(np.maximum(variances, 0.0))[:, None] * axes.T)
 
     def keeps_limits(self, poses: PoseBatch, joints: Array, wanted: Array | None = None) -> Mask:
         """Whether the estimated robot keeps its limits at n poses with joint variables (n, 6), mm.
@@ -155,7 +151,6 @@ class RobotBelief:
         self, command: PoseBatch, actual: ActualPoses, wanted: Array | None = None
     ) -> RobotBelief:
         """This belief with its limits widened where the robot is beyond them at a command (1)."""
-        at = (command, actual.poses, actual.joints)
         wanted = self.least_margins if wanted is None else wanted
-        limits = self.limits.including(self.mechanism, self.estimate, *at, wanted)
-        return replace(self, limits=limits)
+        at = command, actual.poses, actual.joints, wanted
+        return replace(self, limits=self.limits.including(self.mechanism, self.estimate, *at))

@@ -115,20 +115,19 @@ def _outlier(
 
 def _zero_shift(model: LinearizedModel, scale: float) -> Iterator[ZeroShiftHypothesis]:
     """The most significant shift of the gauges' zero."""
-    statistics = ZeroShiftStatistics.of(model)
-    if not len(statistics.rows):
+    rows, gains, shifts = zero_shift_statistics(model)
+    if not len(rows):
         return
-    best = int(np.argmax(statistics.gains))
-    critical = chi_square_limit(3, FALSE_SHIFTS_PER_FILE / len(statistics.rows))
-    gain = float(statistics.gains[best])
-    if (significance := gain / scale / critical) > 1.0:
-        point, orientation = model.problem.labels[statistics.rows[best]].tolist()
+    best = int(np.argmax(gains))
+    gain = float(gains[best])
+    if (significance := gain / scale / chi_square_limit(3, FALSE_SHIFTS_PER_FILE / len(rows))) > 1.0:
+        point, orientation = model.problem.labels[rows[best]].tolist()
         yield ZeroShiftHypothesis(
             gain=gain,
             unknowns=3,
             point=point,
             orientation=orientation,
-            shift=statistics.shifts[best],
+            shift=shifts[best],
             significance=significance,
         )
 
@@ -153,8 +152,13 @@ class OutlierStatistics:
         """The tests of all records of a model."""
         weights, gauges = model.weights, model.problem.gauges
         covariance = model.residual_covariance
-        along_gauges = _along_gauges(gauges, model.scores, weights @ covariance @ weights, weights)
-        omnibus = _omnibus(model.residuals, covariance, weights)
+        information = np.einsum("ia,nij,ja->na", gauges, weights @ covariance @ weights, gauges)
+        whole = np.einsum("ia,nij,ja->na", gauges, weights, gauges)
+        along_gauges = _squares_over(model.scores @ gauges, information, SMALLEST_REDUNDANCY * whole)
+        values, axes = np.linalg.eigh(covariance)
+        along = np.einsum("nij,ni->nj", axes, model.residuals)
+        smallest = SMALLEST_REDUNDANCY / np.linalg.eigvalsh(weights)[:, -1:]
+        omnibus = np.sum(_squares_over(along, values, smallest), axis=-1)
         noise = float(np.median(omnibus)) / MEDIAN_OF_CHI2_3
         is_larger = noise > 1.0 + 4.0 * SCATTER_OF_MEDIAN / np.sqrt(len(omnibus))
         return cls(along_gauges, omnibus, noise if is_larger else 1.0)
@@ -172,55 +176,33 @@ class OutlierStatistics:
         return np.asarray(np.maximum(along_a_gauge, in_space) / self.scale)
 
 
-def _along_gauges(gauges: Array, scores: Array, block: Array, weights: Array) -> Array:
-    score = scores @ gauges
-    information = np.einsum("ia,nij,ja->na", gauges, block, gauges)
-    testable = information > SMALLEST_REDUNDANCY * np.einsum("ia,nij,ja->na", gauges, weights, gauges)
-    return np.asarray(np.where(testable, score**2 / np.where(testable, information, 1.0), 0.0))
+def _squares_over(values: Array, variances: Array, smallest: Array) -> Array:
+    """Squares over variances; zero where these are too small for a test."""
+    testable = variances > smallest
+    return np.asarray(np.where(testable, values**2 / np.where(testable, variances, 1.0), 0.0))
 
 
-def _omnibus(residuals: Array, covariance: Array, weights: Array) -> Array:
-    values, axes = np.linalg.eigh(covariance)
-    along = np.einsum("nij,ni->nj", axes, residuals)
-    testable = values > SMALLEST_REDUNDANCY / np.linalg.eigvalsh(weights)[:, -1:]
-    squares = np.where(testable, along**2 / np.where(testable, values, 1.0), 0.0)
-    return np.asarray(np.sum(squares, axis=-1))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ZeroShiftStatistics:
+def zero_shift_statistics(model: LinearizedModel) -> tuple[NDArray[np.intp], Array, Array]:
     """Tests of a zero shift right before a record, with at least two records before and after it.
 
-    Attributes:
-        rows: (k,) the first record after each testable shift.
-        gains: (k,) decrease of the chi-square; about 3 where there is no shift.
-        shifts: (k, 3), mm, by which the gauges x, y and z then read too much.
+    A single shifted record is a gross error.
+
+    Returns:
+        The first record (k,) after each testable shift; the decrease (k,) of the chi-square, about 3 where
+        there is no shift; and by how much (k, 3), mm, the gauges x, y and z then read too much.
     """
-
-    rows: NDArray[np.intp]
-    gains: Array
-    shifts: Array
-
-    @classmethod
-    def of(cls, model: LinearizedModel) -> ZeroShiftStatistics:
-        """All shifts that the records of a model could show."""
-        problem, weights = model.problem, model.weights
-        rows = _testable_rows(problem)
-        score = _sums_from(problem, model.scores)[rows]
-        weight = _sums_from(problem, weights)[rows]
-        by_parameters = _sums_from(problem, weights @ model.jacobian)[rows]
-        station = np.linalg.inv(problem.per_record(problem.group_sums(weights))[rows])
-        taken = by_parameters @ model.covariance @ np.swapaxes(by_parameters, -1, -2)
-        information = weight - weight @ station @ weight - taken
-        shift = np.einsum("kij,kj->ki", np.linalg.pinv(information, hermitian=True), score)
-        return cls(rows, np.sum(score * shift, axis=-1), -shift @ problem.gauges)
-
-
-def _testable_rows(problem: Problem) -> NDArray[np.intp]:
-    """Rows (k,) with two records of their point before them; a single shifted record is a gross error."""
+    problem, weights = model.problem, model.weights
     later = _sums_from(problem, np.ones(problem.records))
     before = problem.per_record(later[problem.first_rows]) - later
-    return np.flatnonzero((before >= 2) & (later >= 2))
+    rows = np.flatnonzero((before >= 2) & (later >= 2))
+    score = _sums_from(problem, model.scores)[rows]
+    weight = _sums_from(problem, weights)[rows]
+    by_parameters = _sums_from(problem, weights @ model.jacobian)[rows]
+    station = np.linalg.inv(problem.per_record(problem.group_sums(weights))[rows])
+    taken = by_parameters @ model.covariance @ np.swapaxes(by_parameters, -1, -2)
+    information = weight - weight @ station @ weight - taken
+    shift = np.einsum("kij,kj->ki", np.linalg.pinv(information, hermitian=True), score)
+    return rows, np.sum(score * shift, axis=-1), -shift @ problem.gauges
 
 
 def _sums_from(problem: Problem, values: Array) -> Array:

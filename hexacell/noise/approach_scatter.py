@@ -19,13 +19,14 @@ it is ten times as likely as all joints or all encoders.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
+from hexacell.cell.fields import Frozen
 from hexacell.distributions import chi_square_exceedance, chi_square_limit
-from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.kinematics.rotations import Array
 from hexacell.noise.standstill import SIGNIFICANCE
 
@@ -69,41 +70,41 @@ TOGETHER = (ScatterSource.JOINTS, ScatterSource.ENCODERS)
 ALONE = tuple(source for source in ScatterSource if source not in TOGETHER)
 
 
-@dataclass(frozen=True, slots=True)
-class ApproachScatter:
-    """What visits of one pose show of the noise of a record.
+class RepeatedApproaches(Frozen):
+    """What visits of one pose from different directions show of the noise of a record.
 
     Attributes:
         visits: of the pose, the first one included.
-        degrees_of_freedom: of the chi-square.
         ball_mm: how far the ball is from its mean, as the gauges see it (root mean square distance).
-        chi_square: of what the encoders do not explain, under the stated noise.
-        source: what does not repeat; None where the stated noise explains everything.
+        ratio: of what the encoders do not explain to what the stated noise explains.
+        source: what does not repeat beyond that; None where the stated noise explains everything.
         excess: one standard deviation of it beside the stated noise, of each joint or encoder or of
-            the instrument.
+            the instrument, in ``unit``.
     """
 
     visits: int
     degrees_of_freedom: int
     ball_mm: float
-    chi_square: float
+    ratio: float
     source: ScatterSource | None = None
+    unit: JointUnit = JointUnit.MM
     excess: float = 0.0
 
     @property
-    def ratio(self) -> float:
-        """The scatter as a multiple of what the stated noise explains."""
-        return float(np.sqrt(self.chi_square / self.degrees_of_freedom))
-
-    @property
     def ratio_at_most(self) -> float:
-        """Upper limit of the true multiple, with 95 % confidence."""
-        return float(np.sqrt(self.chi_square / chi_square_limit(self.degrees_of_freedom, CONFIDENCE)))
+        """Upper limit of the true ratio, with 95 % confidence."""
+        freedom = self.degrees_of_freedom
+        return self.ratio * float(np.sqrt(freedom / chi_square_limit(freedom, CONFIDENCE)))
 
 
 def approach_scatter(
-    deviations: Array, joints: Array, by_joints: Array, encoders: Array, gauges_mm: Array
-) -> ApproachScatter | None:
+    deviations: Array,
+    joints: Array,
+    by_joints: Array,
+    encoders: Array,
+    gauges_mm: Array,
+    joint_unit: JointUnit = JointUnit.MM,
+) -> RepeatedApproaches | None:
     """The scatter of visits of one pose; None with fewer than ``FEWEST_VISITS``.
 
     Args:
@@ -112,6 +113,7 @@ def approach_scatter(
         by_joints: derivative G (3, 6) of the ball's position by the joint variables.
         encoders: stated noise of each encoder (6,) in a record.
         gauges_mm: likewise of the gauges (3,).
+        joint_unit: of the joint variables.
     """
     if len(deviations) < FEWEST_VISITS:
         return None
@@ -124,7 +126,12 @@ def approach_scatter(
         freedom=len(shown) - 1,
     )
     freedom, chi_square = 3 * visits.freedom, visits.unexplained()
-    found = ApproachScatter(len(deviations), freedom, visits.ball_mm, chi_square)
+    found = RepeatedApproaches(
+        visits=len(deviations),
+        degrees_of_freedom=freedom,
+        ball_mm=float(np.sqrt(np.trace(visits.products[:3, :3]) / visits.freedom)),
+        ratio=float(np.sqrt(chi_square / freedom)),
+    )
     if chi_square_exceedance(freedom, chi_square) >= SIGNIFICANCE:
         return found
     excesses = {source: visits.excess(source) for source in ScatterSource}
@@ -132,7 +139,8 @@ def approach_scatter(
     alone = max(ALONE, key=lambda one: excesses[one][0])
     is_alone = excesses[alone][0] >= excesses[together][0] + np.log(INSTRUMENT_ODDS)
     source = alone if is_alone else together
-    return replace(found, source=source, excess=excesses[source][1])
+    unit = JointUnit.MM if source.instruments[:3].any() else joint_unit
+    return found.model_copy(update={"source": source, "unit": unit, "excess": excesses[source][1]})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,10 +157,6 @@ class _Visits:
     motion: Array
     stated: Array
     freedom: int
-
-    @property
-    def ball_mm(self) -> float:
-        return float(np.sqrt(np.trace(self.products[:3, :3]) / self.freedom))
 
     def unexplained(self) -> float:
         """Chi-square of what the encoders do not explain, which no stop of the joints changes."""

@@ -7,7 +7,7 @@ from hexacell.cell.fields import Frozen, Point, SixNumbers
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import repeatability_key
 from hexacell.kinematics.parameters import JointUnit
-from hexacell.noise.approach_scatter import ScatterSource
+from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource
 
 
 class InstrumentNoise(Frozen):
@@ -33,26 +33,6 @@ class InstrumentNoise(Frozen):
     stated: float
     is_noisier: bool = False
     record: float
-
-
-class RepeatedApproaches(Frozen):
-    """What visits of the first reference from different directions showed.
-
-    Attributes:
-        visits: of the reference, the first one included.
-        ball_mm: how far the ball was from its mean (root mean square distance).
-        ratio: of what the encoders do not explain to what the noise explains.
-        source: what does not repeat beyond that, None unless significant; ``excess`` is one standard
-            deviation of it, in ``unit``.
-    """
-
-    visits: int
-    degrees_of_freedom: int
-    ball_mm: float
-    ratio: float
-    source: ScatterSource | None = None
-    unit: JointUnit = JointUnit.MM
-    excess: float = 0.0
 
 
 class AveragingForecast(Frozen):

@@ -12,7 +12,7 @@ The mean of more readings is better in the part from reading to reading, and in 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -25,12 +25,11 @@ from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import position_sensitivity
-from hexacell.noise.approach_scatter import ApproachScatter, approach_scatter
+from hexacell.noise.approach_scatter import RepeatedApproaches, approach_scatter
 from hexacell.noise.measured_noise import (
     AveragingForecast,
     InstrumentNoise,
     MeasuredNoise,
-    RepeatedApproaches,
     averaging_seconds,
 )
 from hexacell.noise.standstill import SIGNIFICANCE, ReadingNoise, reading_noise
@@ -93,7 +92,7 @@ class _NoiseAssessment:
         return MeasuredNoise(
             gauges=(x, y, z),
             encoders=tuple(encoders),
-            approaches=self._approaches(),
+            approaches=self.scatter,
             windows=windows,
             forecasts=forecasts,
             encoders_part_mm=forecaster.encoders_part(noise[1]),
@@ -108,22 +107,20 @@ class _NoiseAssessment:
     @cached_property
     def reading_noise(self) -> tuple[ReadingNoise, ...]:
         """What the series shows of each instrument; empty without a series."""
-        series, steps = self.readings.series, self.readings.steps
-        if not len(series):
-            return ()
-        return tuple(
-            reading_noise(values, float(step)) for values, step in zip(series.T, steps, strict=True)
-        )
+        series = self.readings.series
+        each = zip(series.T, self.readings.steps.tolist(), strict=True)
+        return tuple(reading_noise(*one) for one in each) if len(series) else ()
 
     @cached_property
-    def scatter(self) -> ApproachScatter | None:
+    def scatter(self) -> RepeatedApproaches | None:
         """What the visits show beyond the larger of stated noise and that of the readings."""
         robot, visits, least = self.plan.robot, self.readings.visits, self._at_least(self.stated)
         commands = robot.from_commands([self.readings.reference])
         joints = robot.mechanism.inverse(robot.commanding, robot.branch, commands)
         _, by_joints = position_sensitivity(robot.mechanism, robot.commanding, commands, joints)
         in_base = robot.frames.base.T @ by_joints[0]
-        return approach_scatter(visits[:, :3], visits[:, 3:], in_base, least[3:], least[:3])
+        unit = robot.mechanism.words.joint_unit
+        return approach_scatter(visits[:, :3], visits[:, 3:], in_base, least[3:], least[:3], unit)
 
     def _of_records(self, windows: int) -> Array:
         """The noise (9,) of records that are means of some windows, with what does not repeat."""
@@ -167,38 +164,14 @@ class _NoiseAssessment:
         units = [JointUnit.MM] * 3 + [self.plan.robot.mechanism.words.joint_unit] * 6
         larger = self._at_least(self.stated) > self.stated
         for row, (name, unit) in enumerate(zip(names, units, strict=True)):
-            stated, record = float(self.stated[row]), float(records[row])
-            if not self.reading_noise:
-                yield InstrumentNoise(name=name, unit=unit, stated=stated, record=record)
-                continue
-            found = self.reading_noise[row]
             yield InstrumentNoise(
                 name=name,
                 unit=unit,
-                reading=found.sigma,
-                degrees_of_freedom=found.degrees_of_freedom,
-                drift=found.drift,
-                outliers=found.outliers,
-                correlation=found.correlation,
-                stated=stated,
+                stated=float(self.stated[row]),
                 is_noisier=bool(larger[row]),
-                record=record,
+                record=float(records[row]),
+                **(asdict(self.reading_noise[row]) if self.reading_noise else {}),
             )
-
-    def _approaches(self) -> RepeatedApproaches | None:
-        scatter = self.scatter
-        if scatter is None:
-            return None
-        of_gauge = scatter.source is None or scatter.source.instruments[:3].any()
-        return RepeatedApproaches(
-            visits=scatter.visits,
-            degrees_of_freedom=scatter.degrees_of_freedom,
-            ball_mm=scatter.ball_mm,
-            ratio=scatter.ratio,
-            source=scatter.source,
-            unit=JointUnit.MM if of_gauge else self.plan.robot.mechanism.words.joint_unit,
-            excess=scatter.excess,
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -46,14 +46,14 @@ class ReadingNoise:
     """Noise of single readings of one instrument.
 
     Attributes:
-        sigma: standard deviation of a reading about the line through the series, outliers left out.
+        reading: standard deviation of a reading about the line through the series, outliers left out.
         degrees_of_freedom: of it.
         drift: change over the series, if it is significant; zero otherwise.
         outliers: readings that were left out.
         correlation: of successive readings, if it is significantly positive; zero otherwise.
     """
 
-    sigma: float
+    reading: float
     degrees_of_freedom: int
     drift: float
     outliers: int
@@ -63,7 +63,7 @@ class ReadingNoise:
         """Standard deviation, mm, of the mean of successive readings."""
         lags = np.arange(1, readings)
         related = 2.0 * np.sum((1.0 - lags / readings) * self.correlation**lags)
-        return float(self.sigma * np.sqrt((1.0 + related) / readings))
+        return float(self.reading * np.sqrt((1.0 + related) / readings))
 
     def exceeds(self, stated: float, readings: int, significance: float = SIGNIFICANCE) -> bool:
         """Whether the mean of successive readings is significantly noisier than stated (chi-square)."""

@@ -40,9 +40,7 @@ def visit(by_joints):
 def test_stops_that_the_encoders_see_are_no_scatter(visit) -> None:
     found = [visit() for _ in range(1000)]
     assert np.mean([one.source is not None for one in found]) < 0.005
-    assert np.mean([one.chi_square / one.degrees_of_freedom for one in found]) == pytest.approx(
-        1.0, abs=0.03
-    )
+    assert np.mean([one.ratio**2 for one in found]) == pytest.approx(1.0, abs=0.03)
     assert {one.degrees_of_freedom for one in found} == {3 * (VISITS - 1)}
     assert np.mean([one.ball_mm for one in found]) > 0.05  # the ball moved with them
 

@@ -42,7 +42,7 @@ def found():
 def test_the_variance_has_the_distribution_of_its_degrees_of_freedom(found) -> None:
     clean = [one for one in found if not one.outliers]
     assert {one.degrees_of_freedom for one in clean} == {READINGS - 2}
-    scaled = np.array([one.degrees_of_freedom * (one.sigma / SIGMA) ** 2 for one in clean])
+    scaled = np.array([one.degrees_of_freedom * (one.reading / SIGMA) ** 2 for one in clean])
     assert kstest(scaled, chi2(READINGS - 2).cdf).pvalue > 0.01
 
 
@@ -64,7 +64,7 @@ def test_a_drift_is_found_and_is_not_in_the_noise() -> None:
     found = [reading_noise(white(seed) + drift, STEP) for seed in range(400)]
     assert np.mean([one.drift > 0.0 for one in found]) > 0.99
     assert np.mean([one.drift for one in found]) == pytest.approx(6.0 * SIGMA, rel=0.02)
-    assert np.sqrt(np.mean([one.sigma**2 for one in found])) == pytest.approx(SIGMA, rel=0.02)
+    assert np.sqrt(np.mean([one.reading**2 for one in found])) == pytest.approx(SIGMA, rel=0.02)
 
 
 @pytest.mark.parametrize("row", [0, 17, READINGS - 1])
@@ -75,7 +75,7 @@ def test_a_false_reading_is_left_out(row) -> None:
     found = reading_noise(values, STEP)
     assert found.outliers == 1
     assert found.degrees_of_freedom == READINGS - 3
-    assert found.sigma == pytest.approx(clean.sigma, rel=0.03)
+    assert found.reading == pytest.approx(clean.reading, rel=0.03)
     assert found.drift == 0.0
 
 
@@ -87,7 +87,7 @@ def test_two_false_readings_do_not_hide_each_other() -> None:
 
 def test_a_dead_still_series_has_the_noise_of_its_display() -> None:
     found = reading_noise(np.full(READINGS, 12.345), 1e-3)
-    assert found.sigma == pytest.approx(1e-3 / np.sqrt(12.0))
+    assert found.reading == pytest.approx(1e-3 / np.sqrt(12.0))
     assert (found.drift, found.outliers, found.correlation) == (0.0, 0, 0.0)
 
 
@@ -110,7 +110,7 @@ def test_the_mean_of_correlated_readings_is_as_noisy_as_drawn(correlation) -> No
 
 def test_the_mean_of_independent_readings_is_better_by_the_root_of_their_number(found) -> None:
     independent = next(one for one in found if one.correlation == 0.0)
-    assert independent.of_mean(16) == pytest.approx(independent.sigma / 4.0)
+    assert independent.of_mean(16) == pytest.approx(independent.reading / 4.0)
 
 
 def test_a_random_walk_has_the_largest_correlation() -> None:

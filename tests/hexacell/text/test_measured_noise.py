@@ -6,12 +6,11 @@ from typing import Any
 
 import pytest
 
-from hexacell.noise.approach_scatter import ScatterSource
+from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource
 from hexacell.noise.measured_noise import (
     AveragingForecast,
     InstrumentNoise,
     MeasuredNoise,
-    RepeatedApproaches,
 )
 from hexacell.text.measured_noise import measured_noise_text
 

@@ -15,7 +15,7 @@ from hexacell.cell.recovery import Action, FailureKind
 from hexacell.config.interface import ControllerLimits
 from hexacell.identification.solver.result import DataFaultKind
 from hexacell.kinematics.parameters import JointUnit
-from hexacell.noise.approach_scatter import ScatterSource
+from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource
 from hexacell.noise.measured_noise import (
     AveragingForecast,
     InstrumentNoise,

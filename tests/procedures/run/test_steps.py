@@ -20,7 +20,6 @@ from hexacell.noise.measured_noise import (
     AveragingForecast,
     InstrumentNoise,
     MeasuredNoise,
-    RepeatedApproaches,
 )
 from hexacell.results.result import OutlierRecord
 from hexacell.verdict.acceptance_gates import AcceptanceGate

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from hexacell.cell.fields import NotNegative, Positive, Section, Text, broken_rule
+from hexacell.cell.fields import NotNegative, Positive, Section, Six, Text, broken_rule, key
 
 NUMBER = re.compile(  # a number as instruments send it
     r"[+-]?\d+(\.\d*)?"
@@ -23,16 +23,16 @@ Wire = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[\x00-\xff]
 class DescribedFrame(Section):
     """What a gauge sends: its pattern, and what its number is."""
 
-    answer: Text = Field(
+    answer: Text = key(
+        ...,
+        "regular expression of what the gauge sends, without line ends; the group called number, or the "
+        "first group, is the number",
         min_length=1,
-        description="regular expression of what the gauge sends, without line ends; the group "
-        "called number, or "
-        "the first group, is the number",
     )
-    example: Wire = Field(description="typical text that the gauge sends, which answer must match")
-    mm_per_unit: Positive = Field(1.0, description="one unit of the number, mm: 25.4 for inches")
-    at_end: Wire | None = Field(
-        None, description="regular expression of the answer with the plunger at an end of its travel"
+    example: Wire = key(..., "typical text that the gauge sends, which answer must match")
+    mm_per_unit: Positive = key(1.0, "one unit of the number, mm: 25.4 for inches")
+    at_end: Wire | None = key(
+        None, "regular expression of the answer with the plunger at an end of its travel"
     )
 
     @model_validator(mode="after")
@@ -60,8 +60,8 @@ class DescribedFrame(Section):
 class RequestSettings(DescribedFrame):
     """What a gauge of protocol ``request`` is asked, and what it answers."""
 
-    ask: Wire = Field(description="text that is sent to ask for a value")
-    ends_with: Wire = Field("\r", description="first character of an answer's line end")
+    ask: Wire = key(..., "text that is sent to ask for a value")
+    ends_with: Wire = key("\r", "first character of an answer's line end")
 
 
 class StreamSettings(DescribedFrame):
@@ -94,20 +94,17 @@ CHANNEL_PLACE = "{channel}"
 class VisaSettings(Section):
     """What an instrument of protocol ``visa`` is asked, and how it must be set."""
 
-    ask: Text = Field(
+    ask: Text = key(
+        ...,
+        "SCPI query of the value: MEAS:DIST?, or READ? (@{channel}) where gauges share it",
         min_length=1,
-        description="SCPI query of the value: MEAS:DIST?, or READ? (@{channel}) where gauges share it",
     )
-    mm_per_unit: Positive = Field(1.0, description="one unit of the number, mm: 1000 for metres")
-    expect: dict[Text, Text] = Field(
-        default_factory=dict,
-        max_length=20,
-        description='answers that queries of its settings must get: { "UNIT:LENG?" = "M" }',
+    mm_per_unit: Positive = key(1.0, "one unit of the number, mm: 1000 for metres")
+    expect: dict[Text, Text] = key(
+        {}, 'answers that queries of its settings must get: { "UNIT:LENG?" = "M" }', max_length=20
     )
-    identify: bool = Field(True, description="whether the instrument is asked *IDN?")
-    backend: Text = Field(
-        "@py", description="backend of PyVISA: @py is pure Python, @ivi the library of a maker"
-    )
+    identify: bool = key(True, "whether the instrument is asked *IDN?")
+    backend: Text = key("@py", "backend of PyVISA: @py is pure Python, @ivi the library of a maker")
 
     @property
     def has_channel(self) -> bool:
@@ -119,67 +116,55 @@ class VisaSettings(Section):
         return self.ask.replace(CHANNEL_PLACE, str(channel))
 
 
-class ModbusSettings(Section):
-    """Where the position of a gauge of protocol ``modbus`` is, and what it is."""
-
-    device: int = Field(1, ge=1, le=247, description="address of the device on the line")
-    register_: int = Field(
-        alias="register", ge=0, le=65535, description="first register of the number, counted from 0"
-    )
-    kind: Literal["input", "holding"] = Field(
-        "input", description="kind of the registers: input (function 4) or holding (function 3)"
-    )
-    type: Literal["int16", "uint16", "int32", "uint32", "float32"] = Field(
-        "int32", description="type of the number, in one or two registers"
-    )
-    word_order: Literal["big", "little"] = Field(
-        "big", description="order of two registers: big if the first one has the upper half"
-    )
-    mm_per_unit: Positive = Field(0.001, description="one count, mm")
-    at_end: tuple[int, ...] = Field(
-        (), max_length=8, description="numbers that mean an end of the travel, or no value"
-    )
-
-
 ModbusAddress = Annotated[int, Field(ge=1, le=247)]
 Register = Annotated[int, Field(ge=0, le=65535)]
-SixDevices = tuple[ModbusAddress, ModbusAddress, ModbusAddress, ModbusAddress, ModbusAddress, ModbusAddress]
-SixRegisters = tuple[Register, Register, Register, Register, Register, Register]
+
+
+class RegisterSettings(Section):
+    """How the registers of a Modbus device are read."""
+
+    kind: Literal["input", "holding"] = key(
+        "input", "kind of the registers: input (function 4) or holding (function 3)"
+    )
+    word_order: Literal["big", "little"] = key(
+        "big", "order of two registers: big if the first one has the upper half"
+    )
+
+
+class ModbusSettings(RegisterSettings):
+    """Where the position of a gauge of protocol ``modbus`` is, and what it is."""
+
+    device: ModbusAddress = key(1, "address of the device on the line")
+    register_: Register = key(..., "first register of the number, counted from 0", alias="register")
+    type: Literal["int16", "uint16", "int32", "uint32", "float32"] = key(
+        "int32", "type of the number, in one or two registers"
+    )
+    mm_per_unit: Positive = key(0.001, "one count, mm")
+    at_end: tuple[int, ...] = key((), "numbers that mean an end of the travel, or no value", max_length=8)
 
 
 class LatchSettings(Section):
     """What is written to all devices at once for each of them to keep its position of that instant."""
 
-    register_: Register = Field(alias="register", description="register that is written, counted from 0")
-    value: int = Field(1, ge=0, le=65535, description="value that is written")
-    delay_s: NotNegative = Field(0.005, description="wait before the devices are asked, s")
+    register_: Register = key(..., "register that is written, counted from 0", alias="register")
+    value: int = key(1, "value that is written", ge=0, le=65535)
+    delay_s: NotNegative = key(0.005, "wait before the devices are asked, s")
 
 
-class ModbusEncoderSettings(Section):
+class ModbusEncoderSettings(RegisterSettings):
     """Where the positions of encoders of protocol ``modbus`` are; they are counts."""
 
-    port: Text | None = Field(None, description="device path or pyserial URL of the line with all of them")
-    serial: dict[str, Any] = Field(
-        default_factory=dict, description="settings for pyserial; by default 19200 baud and even parity"
+    port: Text | None = key(None, "device path or pyserial URL of the line with all of them")
+    serial: dict[str, Any] = key({}, "settings for pyserial; by default 19200 baud and even parity")
+    devices: Six[ModbusAddress] = key(
+        (1, 1, 1, 1, 1, 1), "addresses of the devices with legs 1 to 6; one device may have several legs"
     )
-    devices: SixDevices = Field(
-        (1, 1, 1, 1, 1, 1),
-        description="addresses of the devices with legs 1 to 6; one device may have several legs",
+    registers: Six[Register] = key(..., "first register of the position of legs 1 to 6, counted from 0")
+    bits: Literal[16, 32] = key(32, "bits of a position, in one or two registers")
+    latch: LatchSettings | None = key(
+        None, "register that samples several devices at one instant, where they have one"
     )
-    registers: SixRegisters = Field(
-        description="first register of the position of legs 1 to 6, counted from 0"
-    )
-    kind: Literal["input", "holding"] = Field(
-        "input", description="kind of the registers: input (function 4) or holding (function 3)"
-    )
-    bits: Literal[16, 32] = Field(32, description="bits of a position, in one or two registers")
-    word_order: Literal["big", "little"] = Field(
-        "big", description="order of two registers: big if the first one has the upper half"
-    )
-    latch: LatchSettings | None = Field(
-        None, description="register that samples several devices at one instant, where they have one"
-    )
-    invalid: tuple[int, ...] = Field((), max_length=8, description="counts that mean no valid position")
+    invalid: tuple[int, ...] = key((), "counts that mean no valid position", max_length=8)
 
     @property
     def places(self) -> tuple[tuple[int, int], ...]:
@@ -201,25 +186,20 @@ MessageSignal = Annotated[str, Field(max_length=200, pattern=r"^\w+\.\w+$")]
 class DbcSettings(Section):
     """Encoders that send what a DBC file describes."""
 
-    file: Text = Field(min_length=1, description="DBC file, relative to the cell file")
-    signals: tuple[
-        MessageSignal, MessageSignal, MessageSignal, MessageSignal, MessageSignal, MessageSignal
-    ] = Field(
-        description="signals with the positions of legs 1 to 6, as Message.Signal; their unit "
-        "is that of the DBC "
-        "file"
+    file: Text = key(..., "DBC file, relative to the cell file", min_length=1)
+    signals: Six[MessageSignal] = key(
+        ...,
+        "signals with the positions of legs 1 to 6, as Message.Signal; their unit is that of the DBC file",
     )
-    request: str | None = Field(
+    request: str | None = key(
         None,
+        "frame that asks all encoders, as candump has it: 080#; without it they send unasked",
         pattern=r"^[0-9A-Fa-f]{3}#([0-9A-Fa-f]{2}){0,8}$",
-        description="frame that asks all encoders, as candump has it: 080#; without it they send unasked",
     )
-    delay_s: NotNegative = Field(0.005, description="how old a position may be that comes unasked, s")
-    window_s: Positive = Field(0.02, description="longest time between the six positions of a sample, s")
-    must_be: dict[Text, int] = Field(
-        default_factory=dict,
+    delay_s: NotNegative = key(0.005, "how old a position may be that comes unasked, s")
+    window_s: Positive = key(0.02, "longest time between the six positions of a sample, s")
+    must_be: dict[Text, int] = key(
+        {},
+        "signals of these messages and the values that they have where a position is valid: { Error = 0 }",
         max_length=20,
-        description="signals of these messages and the values that they have where a position "
-        "is valid: { Error ="
-        " 0 }",
     )

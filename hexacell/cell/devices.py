@@ -23,9 +23,11 @@ from hexacell.cell.fields import (
     NotNegative,
     Positive,
     Section,
+    Six,
     SixInRange,
     Text,
     broken_rule,
+    key,
 )
 from hexacell.kinematics.parameters import JointUnit
 
@@ -64,60 +66,43 @@ class GaugeAxis:
 class GaugeSettings(Section):
     """One dial indicator."""
 
-    name: Name = Field(description="name of the gauge on screens and in reports")
-    axis: Literal["x", "y", "z"] = Field(description="base axis along which the gauge's plunger moves")
-    sign: Literal[1, -1] = Field(
-        1, description="1 if the reading grows when the ball moves along +axis, else -1"
+    name: Name = key(..., "name of the gauge on screens and in reports")
+    axis: Literal["x", "y", "z"] = key(..., "base axis along which the gauge's plunger moves")
+    sign: Literal[1, -1] = key(1, "1 if the reading grows when the ball moves along +axis, else -1")
+    protocol: Text = key(
+        ...,
+        "protocol of the gauge: sylvac, mux10, cdi and others of docs/drivers.md, or one that a plug-in "
+        "adds",
     )
-    protocol: Text = Field(
-        description="protocol of the gauge: sylvac, mux10, cdi and others of docs/drivers.md, or one "
-        "that a plug-in adds"
-    )
-    port: Text | None = Field(
-        None, description="device path, pyserial URL or VISA resource; gauges may share one"
-    )
-    serial: dict[str, Any] = Field(
-        default_factory=dict, description="settings for pyserial in place of the protocol's defaults"
-    )
-    channel: int = Field(
-        1,
-        ge=0,
-        le=9999,
-        description="input of a multiplexer, from 1; the four digits of a U-WAVE",
-    )
-    timeout_s: Positive = Field(0.5, description="longest wait for an answer, s")
-    delay_s: NotNegative | None = Field(
+    port: Text | None = key(None, "device path, pyserial URL or VISA resource; gauges may share one")
+    serial: dict[str, Any] = key({}, "settings for pyserial in place of the protocol's defaults")
+    channel: int = key(1, "input of a multiplexer, from 1; the four digits of a U-WAVE", ge=0, le=9999)
+    timeout_s: Positive = key(0.5, "longest wait for an answer, s")
+    delay_s: NotNegative | None = key(
         None,
-        description="how old a value may be when it comes from a gauge that sends unasked, s; by default "
-        "0.5 for uwave, else 0.1",
+        "how old a value may be when it comes from a gauge that sends unasked, s; by default 0.5 for "
+        "uwave, else 0.1",
     )
-    travel_mm: Positive = Field(12.5, description="measuring range of the instrument, mm")
-    resolution_mm: Positive | None = Field(
+    travel_mm: Positive = key(12.5, "measuring range of the instrument, mm")
+    resolution_mm: Positive | None = key(
+        None, "last digit of the gauge's display, mm; a display with other decimals is set to inches"
+    )
+    agreement_mm: Positive | None = key(
         None,
-        description="last digit of the gauge's display, mm; a display with other decimals is set to inches",
+        "largest difference at which three readings in a row agree, mm, where two hardly differ they "
+        "count; by default from [noise]",
     )
-    agreement_mm: Positive | None = Field(
+    middle_mm: InRange | None = key(
         None,
-        description="largest difference at which three readings in a row agree, mm, where two hardly "
-        "differ they count; by default from [noise]",
+        "reading in the middle of the gauge's travel, mm; without it, the display does not show where "
+        "the plunger stands",
     )
-    middle_mm: InRange | None = Field(
-        None,
-        description="reading in the middle of the gauge's travel, mm; without it, the display does not "
-        "show where the plunger stands",
-    )
-    serial_number: Text = Field(
-        "", description="serial number of the instrument, where it does not report it itself"
-    )
-    request: RequestSettings | None = Field(
-        None, description="question and answer of a gauge of protocol request"
-    )
-    stream: StreamSettings | None = Field(None, description="lines that a gauge of protocol stream sends")
-    visa: VisaSettings | None = Field(None, description="queries of an instrument of protocol visa")
-    modbus: ModbusSettings | None = Field(None, description="registers of a gauge of protocol modbus")
-    certificate: CertificateSettings | None = Field(
-        None, description="certificate of the gauge's calibration"
-    )
+    serial_number: Text = key("", "serial number of the instrument, where it does not report it itself")
+    request: RequestSettings | None = key(None, "question and answer of a gauge of protocol request")
+    stream: StreamSettings | None = key(None, "lines that a gauge of protocol stream sends")
+    visa: VisaSettings | None = key(None, "queries of an instrument of protocol visa")
+    modbus: ModbusSettings | None = key(None, "registers of a gauge of protocol modbus")
+    certificate: CertificateSettings | None = key(None, "certificate of the gauge's calibration")
 
     @model_validator(mode="after")
     def _a_multiplexer_has_the_channel(self) -> Self:
@@ -153,44 +138,35 @@ OF_CONTROLLER = "controller"
 class EncoderSettings(Section, ABC):
     """The bank of six joint encoders, but for what a count is."""
 
-    protocol: Text = Field(
-        "cia406",
-        description="protocol of the encoders: cia406, controller, dbc, modbus, or one that a plug-in adds",
+    protocol: Text = key(
+        "cia406", "protocol of the encoders: cia406, controller, dbc, modbus, or one that a plug-in adds"
     )
-    bus: dict[str, Any] | None = Field(None, description="settings for python-can's Bus")
-    nodes: tuple[NodeId, NodeId, NodeId, NodeId, NodeId, NodeId] = Field(
-        (1, 2, 3, 4, 5, 6), description="CANopen node ids of legs 1 to 6, each from 1 to 127"
+    bus: dict[str, Any] | None = key(None, "settings for python-can's Bus")
+    nodes: Six[NodeId] = key((1, 2, 3, 4, 5, 6), "CANopen node ids of legs 1 to 6, each from 1 to 127")
+    signed: bool = key(True, "whether positions are I32 (linear devices) rather than U32")
+    direction: Six[Direction] = key(
+        (1, 1, 1, 1, 1, 1), "sense of each encoder: 1 if counts grow with the joint variable, else -1"
     )
-    signed: bool = Field(True, description="whether positions are I32 (linear devices) rather than U32")
-    direction: tuple[Direction, Direction, Direction, Direction, Direction, Direction] = Field(
-        (1, 1, 1, 1, 1, 1),
-        description="sense of each encoder: 1 if counts grow with the joint variable, else -1",
+    offset: SixInRange = key((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), "joint variable at count 0", alias="offset_mm")
+    serial_numbers: Six[Unsigned] | None = key(
+        None, "serial number of each node, object 1018h:4; another device is refused"
     )
-    offset: SixInRange = Field(
-        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), alias="offset_mm", description="joint variable at count 0"
-    )
-    serial_numbers: tuple[Unsigned, Unsigned, Unsigned, Unsigned, Unsigned, Unsigned] | None = Field(
-        None, description="serial number of each node, object 1018h:4; another device is refused"
-    )
-    eds: Text | None = Field(
+    eds: Text | None = key(
         None,
-        description="EDS file of the devices, relative to the cell file; they must be what it describes, "
-        "and settings that differ from it are reported",
+        "EDS file of the devices, relative to the cell file; they must be what it describes, and "
+        "settings that differ from it are reported",
     )
-    timeout_s: Positive = Field(0.5, description="longest wait for a complete round or an SDO answer, s")
-    heartbeat_ms: int = Field(500, ge=0, le=65535, description="heartbeat period written to the nodes, ms")
-    largest_speed: Positive | None = Field(
+    timeout_s: Positive = key(0.5, "longest wait for a complete round or an SDO answer, s")
+    heartbeat_ms: int = key(500, "heartbeat period written to the nodes, ms", ge=0, le=65535)
+    largest_speed: Positive | None = key(
         None,
+        "largest speed of a joint; a faster one between two samples is a jump; by default from [speed]",
         alias="largest_speed_mm_s",
-        description="largest speed of a joint; a faster one between two samples is a jump; by default "
-        "from [speed]",
     )
-    dbc: DbcSettings | None = Field(None, description="messages of encoders of protocol dbc")
-    modbus: ModbusEncoderSettings | None = Field(
-        None, description="registers of encoders of protocol modbus"
-    )
-    certificate: CertificateSettings | None = Field(
-        None, description="certificate of the calibration of all six encoders"
+    dbc: DbcSettings | None = key(None, "messages of encoders of protocol dbc")
+    modbus: ModbusEncoderSettings | None = key(None, "registers of encoders of protocol modbus")
+    certificate: CertificateSettings | None = key(
+        None, "certificate of the calibration of all six encoders"
     )
 
     @field_validator("nodes")
@@ -226,9 +202,9 @@ class EncoderSettings(Section, ABC):
 class LinearEncoderSettings(EncoderSettings):
     """The bank of six encoders of joints that slide, or of legs."""
 
-    measuring_step_nm: Positive = Field(1000, description="one count, nm, as the device must report it")
-    step_object: Literal["any", "6005h", "6501h"] = Field(
-        "any", description="object with the measuring step, where a device has both and they differ"
+    measuring_step_nm: Positive = key(1000, "one count, nm, as the device must report it")
+    step_object: Literal["any", "6005h", "6501h"] = key(
+        "any", "object with the measuring step, where a device has both and they differ"
     )
 
     @property
@@ -245,11 +221,8 @@ class LinearEncoderSettings(EncoderSettings):
 class RotaryEncoderSettings(EncoderSettings):
     """The bank of six encoders of joints that turn."""
 
-    counts_per_turn: int = Field(
-        1 << 20,
-        ge=1,
-        le=0xFFFF_FFFF,
-        description="counts in a turn of the joint, as the device must report them",
+    counts_per_turn: int = key(
+        1 << 20, "counts in a turn of the joint, as the device must report them", ge=1, le=0xFFFF_FFFF
     )
 
     @property
@@ -266,18 +239,15 @@ class RotaryEncoderSettings(EncoderSettings):
 class ThermometerSettings(Section):
     """A thermometer at the machine or in the room; its readings are kept with every record."""
 
-    name: Name = Field(description="place of the thermometer: room, base, platform")
-    protocol: Text = Field(
-        "sysfs", description="protocol of the thermometer: sysfs, or one that a plug-in adds"
-    )
-    path: Text = Field(
-        min_length=1,
-        description="sysfs: the file with the temperature in millidegrees, such as "
+    name: Name = key(..., "place of the thermometer: room, base, platform")
+    protocol: Text = key("sysfs", "protocol of the thermometer: sysfs, or one that a plug-in adds")
+    path: Text = key(
+        ...,
+        "sysfs: the file with the temperature in millidegrees, such as "
         "/sys/bus/w1/devices/28-.../temperature",
+        min_length=1,
     )
-    legs: tuple[LegNumber, ...] = Field(
-        (),
-        max_length=6,
-        description="legs that the thermometer is on, from 1: their expansion is no drift",
+    legs: tuple[LegNumber, ...] = key(
+        (), "legs that the thermometer is on, from 1: their expansion is no drift", max_length=6
     )
-    timeout_s: Positive = Field(2.0, description="longest wait for a reading, s")
+    timeout_s: Positive = key(2.0, "longest wait for a reading, s")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import date, datetime
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -30,6 +30,11 @@ LARGEST_SEED = 2**32 - 1
 LONGEST_TEXT = 1000
 LONGEST_NAME = 64
 SIGNS_OF_NAMES = " ._-+()#"
+
+
+def key(default: object, meaning: str, **constraints: Any) -> Any:  # noqa: ANN401 - as pydantic's Field
+    """A key of the cell file: its default (``...``: it is required), meaning and constraints."""
+    return Field(default, description=meaning, **constraints)
 
 
 def broken_rule(problem: str, action: str) -> PydanticCustomError:
@@ -119,9 +124,12 @@ Password = Annotated[
 Day = Annotated[date, BeforeValidator(_a_day)]
 Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
 Point = tuple[Finite, Finite, Finite]
-SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+Item = TypeVar("Item")
+Six = tuple[Item, Item, Item, Item, Item, Item]
+"""One each of the six legs or axes."""
+SixNumbers = Six[Finite]
 PointInRange = tuple[InRange, InRange, InRange]
-SixInRange = tuple[InRange, InRange, InRange, InRange, InRange, InRange]
+SixInRange = Six[InRange]
 
 
 class Frozen(BaseModel):
@@ -168,18 +176,14 @@ GeometryDocument = dict[str, tuple[Finite | tuple[Finite, ...], ...]]
 class CertificateSettings(Section):
     """The certificate of an instrument, to which its readings are traceable."""
 
-    number: Text = Field(min_length=1, description="number of the certificate, with who issued it")
-    due: Day | None = Field(
+    number: Text = key(..., "number of the certificate, with who issued it", min_length=1)
+    due: Day | None = key(
         None,
-        description='last day on which the certificate holds, as "2027-03-31"; afterwards a person must '
-        "approve what rests on it",
+        'last day on which the certificate holds, as "2027-03-31"; afterwards a person must approve what '
+        "rests on it",
     )
-    expanded_um: float | None = Field(
-        None,
-        gt=0,
-        le=1000,
-        allow_inf_nan=False,
-        description="expanded uncertainty, k = 2, as certified, um",
+    expanded_um: float | None = key(
+        None, "expanded uncertainty, k = 2, as certified, um", gt=0, le=1000, allow_inf_nan=False
     )
 
     def has_expired(self, day: date) -> bool:

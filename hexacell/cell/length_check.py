@@ -16,6 +16,7 @@ from hexacell.cell.fields import (
     Section,
     Text,
     broken_rule,
+    key,
 )
 
 MicrometresPerMetreKelvin = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
@@ -26,55 +27,35 @@ COARSEST_SHARE = 1e-3
 class LengthCheckSettings(Section):
     """A fixture with two parallel seats for the gauges, a certified distance apart."""
 
-    first_seat: PointInRange = Field(
-        description="position of the ball in the first seat, mm, in the base frame"
-    )
-    direction: PointInRange = Field(
+    first_seat: PointInRange = key(..., "position of the ball in the first seat, mm, in the base frame")
+    direction: PointInRange = key(
         (1.0, 0.0, 0.0),
-        description="direction from the first seat to the second; a way on which all joints move alike "
-        "is best",
+        "direction from the first seat to the second; a way on which all joints move alike is best",
     )
-    distance_mm: float = Field(
-        ge=20, le=5000, description="certified distance of the two places of the ball, mm"
+    distance_mm: float = key(..., "certified distance of the two places of the ball, mm", ge=20, le=5000)
+    uncertainty_mm: Positive = key(..., "certified expanded uncertainty (k = 2) of that distance, mm")
+    certificate: CertificateSettings | None = key(None, "certificate of that distance")
+    parallel_mrad: NotNegative = key(0.1, "angle between the seats about each axis, mrad, 1 sigma", le=20)
+    height_mm: NotNegative = key(
+        50.0, "height of the ball above the line along which the distance is certified, mm; 0: at the ball"
     )
-    uncertainty_mm: Positive = Field(
-        description="certified expanded uncertainty (k = 2) of that distance, mm"
+    seating_um: NotNegative = key(
+        5.0, "scatter of the gauges in a seat, from one mounting to the next, um, 1 sigma", le=1000
     )
-    certificate: CertificateSettings | None = Field(None, description="certificate of that distance")
-    parallel_mrad: NotNegative = Field(
-        0.1, le=20, description="angle between the seats about each axis, mrad, 1 sigma"
+    certified_at_c: InRange = key(20.0, "temperature for which the certificate holds, deg C")
+    temperature_c: InRange = key(20.0, "temperature of the fixture, deg C, where no thermometer shows it")
+    thermometer: Text | None = key(None, "name of the thermometer on the fixture")
+    temperature_sigma_k: NotNegative = key(1.0, "uncertainty of that temperature, K, 1 sigma", le=50)
+    expansion_um_m_k: MicrometresPerMetreKelvin = key(
+        11.5, "thermal expansion of the fixture, um/m/K: steel 11.5, aluminium 23, Invar 1.5"
     )
-    height_mm: NotNegative = Field(
-        50.0,
-        description="height of the ball above the line along which the distance is certified, mm; 0: at "
-        "the ball",
+    repeats: int = key(1, "how often the second seat is measured", ge=1, le=20)
+    orientations: int = key(
+        5, "orientations of the platform with the ball in the middle of a seat", ge=1, le=25
     )
-    seating_um: NotNegative = Field(
-        5.0,
-        le=1000,
-        description="scatter of the gauges in a seat, from one mounting to the next, um, 1 sigma",
-    )
-    certified_at_c: InRange = Field(20.0, description="temperature for which the certificate holds, deg C")
-    temperature_c: InRange = Field(
-        20.0, description="temperature of the fixture, deg C, where no thermometer shows it"
-    )
-    thermometer: Text | None = Field(None, description="name of the thermometer on the fixture")
-    temperature_sigma_k: NotNegative = Field(
-        1.0, le=50, description="uncertainty of that temperature, K, 1 sigma"
-    )
-    expansion_um_m_k: MicrometresPerMetreKelvin = Field(
-        11.5, description="thermal expansion of the fixture, um/m/K: steel 11.5, aluminium 23, Invar 1.5"
-    )
-    repeats: int = Field(1, ge=1, le=20, description="how often the second seat is measured")
-    orientations: int = Field(
-        5, ge=1, le=25, description="orientations of the platform with the ball in the middle of a seat"
-    )
-    tilt_deg: Positive = Field(
-        10.0, le=45, description="tilt of all orientations but the first, which is level, deg"
-    )
-    mounting: Literal["by-hand", "fixed"] = Field(
-        "by-hand",
-        description="how the gauges come into the seats: by-hand, or fixed where no person is needed",
+    tilt_deg: Positive = key(10.0, "tilt of all orientations but the first, which is level, deg", le=45)
+    mounting: Literal["by-hand", "fixed"] = key(
+        "by-hand", "how the gauges come into the seats: by-hand, or fixed where no person is needed"
     )
 
     @property

@@ -12,9 +12,11 @@ from hexacell.cell.fields import (
     PointInRange,
     Positive,
     Section,
+    Six,
     SixInRange,
     Text,
     broken_rule,
+    key,
 )
 from hexacell.kinematics.commanded_motion import RefusedCommand
 
@@ -41,22 +43,19 @@ def _has_direction(axis: tuple[float, float, float]) -> tuple[float, float, floa
 
 
 MinMax = Annotated[tuple[InRange, InRange], AfterValidator(_ordered)]
-SixRanges = tuple[MinMax, MinMax, MinMax, MinMax, MinMax, MinMax]
 Cone = Annotated[float, Field(gt=0, le=180, allow_inf_nan=False)]
-SixCones = tuple[Cone, Cone, Cone, Cone, Cone, Cone]
 JointAxis = Annotated[PointInRange, AfterValidator(_has_direction)]
-SixJointAxes = tuple[JointAxis, JointAxis, JointAxis, JointAxis, JointAxis, JointAxis]
 
 
 class AxisLimitSettings(Section):
     """Smallest and largest command of each of the controller's axes; None: any."""
 
-    x: MinMax | None = Field(None, description="smallest and largest command, mm")
-    y: MinMax | None = Field(None, description="smallest and largest command, mm")
-    z: MinMax | None = Field(None, description="smallest and largest command, mm")
-    a: MinMax | None = Field(None, description="smallest and largest command, deg")
-    b: MinMax | None = Field(None, description="smallest and largest command, deg")
-    c: MinMax | None = Field(None, description="smallest and largest command, deg")
+    x: MinMax | None = key(None, "smallest and largest command, mm")
+    y: MinMax | None = key(None, "smallest and largest command, mm")
+    z: MinMax | None = key(None, "smallest and largest command, mm")
+    a: MinMax | None = key(None, "smallest and largest command, deg")
+    b: MinMax | None = key(None, "smallest and largest command, deg")
+    c: MinMax | None = key(None, "smallest and largest command, deg")
 
     @property
     def ranges(self) -> tuple[MinMax | None, ...]:
@@ -67,63 +66,35 @@ class AxisLimitSettings(Section):
 class PassiveJointSettings(Section):
     """How far each leg may turn in its two passive joints, from the joint's axis."""
 
-    base_cone_deg: Cone = Field(
-        180.0, description="half angle of the cone at the base's end of each leg, deg; 180: any"
-    )
-    platform_cone_deg: Cone = Field(
-        180.0, description="half angle of the cone at the platform, deg; 180: any"
-    )
-    base_cones_deg: SixCones | None = Field(
+    base_cone_deg: Cone = key(180.0, "half angle of the cone at the base's end of each leg, deg; 180: any")
+    platform_cone_deg: Cone = key(180.0, "half angle of the cone at the platform, deg; 180: any")
+    base_axes: Six[JointAxis] | None = key(
         None,
-        description="cones at the base's end of each leg, deg, where they differ; takes the place of "
-        "base_cone_deg",
+        "axes of the cones in the base frame of the drawing, from the platform to the base; by default "
+        "each leg's direction at the middle of all points, untilted. On a crank: in its own frame, x "
+        "along the crank and z along its axis",
     )
-    platform_cones_deg: SixCones | None = Field(
+    platform_axes: Six[JointAxis] | None = key(
         None,
-        description="cones of each leg at the platform, deg, where they differ; takes the place of "
-        "platform_cone_deg",
+        "axes of the cones at the platform, in the platform frame of the drawing; by default as base_axes",
     )
-    base_axes: SixJointAxes | None = Field(
-        None,
-        description="axes of the cones in the base frame of the drawing, from the platform to the base; by "
-        "default each leg's direction at the middle of all points, untilted. On a crank: in its own frame, "
-        "x along the crank and z along its axis",
-    )
-    platform_axes: SixJointAxes | None = Field(
-        None,
-        description="axes of the cones at the platform, in the platform frame of the drawing; by default "
-        "as base_axes",
-    )
-
-    @property
-    def base_cones(self) -> tuple[float, ...]:
-        """The cones of the six legs at the base, deg."""
-        return self.base_cones_deg or (self.base_cone_deg,) * 6
-
-    @property
-    def platform_cones(self) -> tuple[float, ...]:
-        """The cones of the six legs at the platform, deg."""
-        return self.platform_cones_deg or (self.platform_cone_deg,) * 6
 
 
 class ExclusionSettings(Section):
     """What the robot must not be sent to: a point as a whole, or a pose with all commands near it."""
 
-    point: Annotated[int, Field(ge=1)] | None = Field(
-        None, description="number of a point of [identification], from 1, that is not measured"
+    point: Annotated[int, Field(ge=1)] | None = key(
+        None, "number of a point of [identification], from 1, that is not measured"
     )
-    pose: SixInRange | None = Field(
-        None, description="x, y, z, a, b, c in the controller's frames, mm and deg, that is never commanded"
+    pose: SixInRange | None = key(
+        None, "x, y, z, a, b, c in the controller's frames, mm and deg, that is never commanded"
     )
-    within_mm: NotNegative = Field(
+    within_mm: NotNegative = key(
         NEAR_MM,
-        description="distance from the pose, mm, within which no command goes if its angle is within "
-        "within_deg, too",
+        "distance from the pose, mm, within which no command goes if its angle is within within_deg, too",
     )
-    within_deg: NotNegative = Field(
-        NEAR_DEG,
-        description="angle from the pose, deg, within which no command goes; 0: this pose alone is "
-        "excluded",
+    within_deg: NotNegative = key(
+        NEAR_DEG, "angle from the pose, deg, within which no command goes; 0: this pose alone is excluded"
     )
 
     @model_validator(mode="after")
@@ -143,39 +114,28 @@ class ExclusionSettings(Section):
 class LimitSettings(Section):
     """Limits of every commanded pose, and of the way to it."""
 
-    gauge_travel_mm: Positive = Field(
-        5.0, description="largest deviation of the ball from the zeroed reference, mm"
-    )
-    tilt_deg: Positive = Field(45.0, le=80, description="largest tilt of the platform, deg")
-    turn_deg: Positive = Field(
-        180.0, le=180, description="largest turn of the platform about its normal, deg"
-    )
-    joint_min: InRange = Field(
-        -1000.0, alias="joint_min_mm", description="smallest joint variable of any leg"
-    )
-    joint_max: InRange = Field(
-        1000.0, alias="joint_max_mm", description="largest joint variable of any leg"
-    )
-    joints: SixRanges | None = Field(
+    gauge_travel_mm: Positive = key(5.0, "largest deviation of the ball from the zeroed reference, mm")
+    tilt_deg: Positive = key(45.0, "largest tilt of the platform, deg", le=80)
+    turn_deg: Positive = key(180.0, "largest turn of the platform about its normal, deg", le=180)
+    joint_min: InRange = key(-1000.0, "smallest joint variable of any leg", alias="joint_min_mm")
+    joint_max: InRange = key(1000.0, "largest joint variable of any leg", alias="joint_max_mm")
+    joints: Six[MinMax] | None = key(
         None,
+        "smallest and largest joint variable of each leg, where they differ; those of all legs hold as "
+        "well",
         alias="joints_mm",
-        description="smallest and largest joint variable of each leg, where they differ; those of all legs "
-        "hold as well",
     )
     axes: AxisLimitSettings = AxisLimitSettings()
-    ini: Text | None = Field(
+    ini: Text | None = key(
         None,
+        "LinuxCNC's INI file, relative to the cell file: its limits of axes and joints hold as well",
         min_length=1,
-        description="LinuxCNC's INI file, relative to the cell file: its limits of axes and joints hold as "
-        "well",
     )
     passive_joints: PassiveJointSettings = PassiveJointSettings()
-    leg_distance_mm: NotNegative = Field(
-        0.0, description="smallest distance of two legs, from middle line to middle line, mm; 0: any"
+    leg_distance_mm: NotNegative = key(
+        0.0, "smallest distance of two legs, from middle line to middle line, mm; 0: any"
     )
-    singularity_margin: Positive = Field(
-        0.03, description="smallest singular value of the dimensionless pose Jacobian"
-    )
+    singularity_margin: Positive = key(0.03, "smallest singular value of the dimensionless pose Jacobian")
 
     @model_validator(mode="after")
     def _joint_limits_are_ordered(self) -> Self:
@@ -188,16 +148,13 @@ class LimitSettings(Section):
 class SpeedSettings(Section):
     """The largest speeds of a move; from the stricter of two, each move gets its duration."""
 
-    joint: Positive = Field(100.0, alias="joint_mm_s", description="largest speed of any joint variable")
-    edge_mm_s: Positive = Field(
-        100.0, description="largest speed of the ball and of any joint of the platform, mm/s"
-    )
-    joint_at_gauges: Positive = Field(
+    joint: Positive = key(100.0, "largest speed of any joint variable", alias="joint_mm_s")
+    edge_mm_s: Positive = key(100.0, "largest speed of the ball and of any joint of the platform, mm/s")
+    joint_at_gauges: Positive = key(
         25.0,
+        "largest speed of any joint variable on a move that begins or ends with gauges at the ball",
         alias="joint_at_gauges_mm_s",
-        description="largest speed of any joint variable on a move that begins or ends with gauges at "
-        "the ball",
     )
-    edge_at_gauges_mm_s: Positive = Field(
-        25.0, description="largest speed of the ball and of any joint of the platform on such a move, mm/s"
+    edge_at_gauges_mm_s: Positive = key(
+        25.0, "largest speed of the ball and of any joint of the platform on such a move, mm/s"
     )

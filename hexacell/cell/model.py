@@ -19,6 +19,7 @@ from hexacell.cell.fields import (
     Name,
     Section,
     broken_rule,
+    key,
 )
 from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.limits import MOST_EXCLUSIONS, ExclusionSettings, LimitSettings, SpeedSettings
@@ -71,8 +72,8 @@ class ToleranceSettings(Section):
 class CellSettings(Section):
     """A whole cell file."""
 
-    version: Literal[1] = Field(1, description="version of the cell file's format")
-    name: Name = Field(description="name of the cell, on screens and in reports")
+    version: Literal[1] = key(1, "version of the cell file's format")
+    name: Name = key(..., "name of the cell, on screens and in reports")
     robot: RobotSettings
     controller: ControllerSettings
     gauges: tuple[GaugeSettings, GaugeSettings, GaugeSettings]

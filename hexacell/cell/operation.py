@@ -6,9 +6,9 @@ import re
 from enum import StrEnum
 from typing import Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
-from hexacell.cell.fields import Name, NotNegative, Positive, Section, Text, broken_rule
+from hexacell.cell.fields import Name, NotNegative, Positive, Section, Text, broken_rule, key
 from hexacell.storage.secrets import MASK
 
 _POSTGRESQL = re.compile(r"postgresql://(?P<login>[^/@]*@)?[^/@]*/[^/?]+(?P<query>\?.*)?")
@@ -17,11 +17,10 @@ _POSTGRESQL = re.compile(r"postgresql://(?P<login>[^/@]*@)?[^/@]*/[^/?]+(?P<quer
 class ArchiveSettings(Section):
     """The index over the cell's runs; the runs themselves are in their folders."""
 
-    url: Text | None = Field(
+    url: Text | None = key(
         None,
-        description="address of an archive that several cells may share, "
-        "postgresql://user@host/database; without it, a file beside the runs. A password belongs in "
-        "the user's ~/.pgpass",
+        "address of an archive that several cells may share, postgresql://user@host/database; without "
+        "it, a file beside the runs. A password belongs in the user's ~/.pgpass",
     )
 
     @field_validator("url")
@@ -46,39 +45,38 @@ def mistake_in_url(url: str) -> tuple[str, str] | None:
 class OpcUaSettings(Section):
     """The server that ``hexacell serve`` starts; its messages are always signed and encrypted."""
 
-    host: Text = Field("127.0.0.1", min_length=1, description="address that the server listens at")
-    port: int = Field(4840, ge=1, le=65535, description="TCP port that the server listens at")
-    folder: Text = Field(
+    host: Text = key("127.0.0.1", "address that the server listens at", min_length=1)
+    port: int = key(4840, "TCP port that the server listens at", ge=1, le=65535)
+    folder: Text = key(
         "opcua",
+        "folder of the server's certificate and private key, relative to the cell file; made where absent",
         min_length=1,
-        description="folder of the server's certificate and private key, relative to the cell file; made "
-        "where absent",
     )
-    password_file: Text | None = Field(
+    password_file: Text | None = key(
         None,
+        "TOML file with user and password of who may read, relative to the cell file, which others must "
+        "not be able to read. HEXACELL_OPCUA_USER and HEXACELL_OPCUA_PASSWORD in the environment take "
+        "precedence",
         min_length=1,
-        description="TOML file with user and password of who may read, relative to the cell file, which "
-        "others must not be able to read. HEXACELL_OPCUA_USER and HEXACELL_OPCUA_PASSWORD in the "
-        "environment take precedence",
     )
-    anonymous: bool = Field(False, description="whether anybody may read without a password")
-    poll_s: float = Field(
-        2.0, ge=0.05, le=3600, allow_inf_nan=False, description="time between two looks for new runs, s"
+    anonymous: bool = key(False, "whether anybody may read without a password")
+    poll_s: float = key(
+        2.0, "time between two looks for new runs, s", ge=0.05, le=3600, allow_inf_nan=False
     )
 
 
 class ReportSettings(Section):
     """What a report of a run says beside what was measured; all of it may be left out."""
 
-    machine: Text = Field("", description="maker and model of the robot")
-    serial_number: Text = Field("", description="serial number of the robot")
-    laboratory: Text = Field("", description="name and address of who calibrates")
-    country: Text = Field(
-        "", pattern="^([A-Z]{2})?$", description="country of the laboratory, ISO 3166: two letters, as DE"
+    machine: Text = key("", "maker and model of the robot")
+    serial_number: Text = key("", "serial number of the robot")
+    laboratory: Text = key("", "name and address of who calibrates")
+    country: Text = key(
+        "", "country of the laboratory, ISO 3166: two letters, as DE", pattern="^([A-Z]{2})?$"
     )
-    customer: Text = Field("", description="name and address of the customer")
-    place: Text = Field("", description="place of the robot")
-    authorised_by: Text = Field("", description="name of who answers for reports of this cell")
+    customer: Text = key("", "name and address of the customer")
+    place: Text = key("", "place of the robot")
+    authorised_by: Text = key("", "name of who answers for reports of this cell")
 
 
 DAY_MINUTES = 24 * 60
@@ -90,27 +88,25 @@ Weekday = Literal["mon", "tue", "wed", "thu", "fri", "sat", "sun"]
 class UnattendedSettings(Section):
     """Runs without a person: check, quick level or calibration, from a schedule or typed."""
 
-    quiet_hours: tuple[Text, ...] = Field(
+    quiet_hours: tuple[Text, ...] = key(
         (),
+        "times in which no run begins and one that goes on ends, as 05:30-22:00, in the computer's time "
+        "zone; past midnight as 22:00-06:00",
         max_length=20,
-        description="times in which no run begins and one that goes on ends, as 05:30-22:00, in the "
-        "computer's time zone; past midnight as 22:00-06:00",
     )
-    quiet_days: tuple[Weekday, ...] = Field(
-        ("mon", "tue", "wed", "thu", "fri", "sat", "sun"),
-        description="days on which quiet hours begin",
+    quiet_days: tuple[Weekday, ...] = key(
+        ("mon", "tue", "wed", "thu", "fri", "sat", "sun"), "days on which quiet hours begin"
     )
-    window_minutes: NotNegative = Field(
+    window_minutes: NotNegative = key(
         0.0,
+        "minutes after its time in which a run that could not begin is tried again; 0: not at all",
         le=DAY_MINUTES,
-        description="minutes after its time in which a run that could not begin is tried again; 0: not "
-        "at all",
     )
-    retry_minutes: Positive = Field(10.0, le=DAY_MINUTES, description="minutes between two tries")
-    longest_minutes: Positive | None = Field(
+    retry_minutes: Positive = key(10.0, "minutes between two tries", le=DAY_MINUTES)
+    longest_minutes: Positive | None = key(
         None,
-        description="longest duration of a run, minutes; then it goes back to its reference and ends, "
-        "and can be resumed",
+        "longest duration of a run, minutes; then it goes back to its reference and ends, and can be "
+        "resumed",
     )
 
     @field_validator("quiet_hours")
@@ -162,35 +158,32 @@ _WILD = re.compile(r"[#+\0]")
 class NotificationSettings(Section):
     """Somebody who is notified of runs without a person."""
 
-    name: Name = Field(description="name of the recipient")
-    url: Text | None = Field(
+    name: Name = key(..., "name of the recipient")
+    url: Text | None = key(
         None,
-        description="address: https://host/path (webhook, JSON), mqtts://host (MQTT), "
-        "mailto://host?from=...&to=... or a chat service's address as apprise has it. One with a "
-        "token in it belongs in password_file",
+        "address: https://host/path (webhook, JSON), mqtts://host (MQTT), mailto://host?from=...&to=... "
+        "or a chat service's address as apprise has it. One with a token in it belongs in password_file",
     )
-    on: tuple[OccasionWord, ...] = Field(
+    on: tuple[OccasionWord, ...] = key(
         USUAL_OCCASIONS,
-        description="runs that are reported: no-pass are those with another verdict than a pass, failure "
-        "those without one",
+        "runs that are reported: no-pass are those with another verdict than a pass, failure those "
+        "without one",
     )
-    topic: Text | None = Field(
-        None,
-        min_length=1,
-        description="MQTT topic below which the state is kept; by default hexacell/NAME-OF-CELL",
+    topic: Text | None = key(
+        None, "MQTT topic below which the state is kept; by default hexacell/NAME-OF-CELL", min_length=1
     )
-    ca_file: Text | None = Field(
+    ca_file: Text | None = key(
         None,
+        "certificates (PEM) that must have signed a webhook's or broker's, relative to the cell file; by "
+        "default those that the computer trusts",
         min_length=1,
-        description="certificates (PEM) that must have signed a webhook's or broker's, relative to the "
-        "cell file; by default those that the computer trusts",
     )
-    password_file: Text | None = Field(
+    password_file: Text | None = key(
         None,
+        "TOML file with any of url, user, password and token, relative to the cell file, which others "
+        "must not be able to read. HEXACELL_NOTIFY_NAME_URL, ..._USER, ..._PASSWORD and ..._TOKEN in the "
+        "environment take precedence",
         min_length=1,
-        description="TOML file with any of url, user, password and token, relative to the cell file, which "
-        "others must not be able to read. HEXACELL_NOTIFY_NAME_URL, ..._USER, ..._PASSWORD and ..._TOKEN "
-        "in the environment take precedence",
     )
 
     @field_validator("url")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
-from hexacell.cell.fields import NotNegative, Positive, Section, broken_rule
+from hexacell.cell.fields import NotNegative, Positive, Section, broken_rule, key
 
 
 class Action(StrEnum):
@@ -76,56 +76,51 @@ class Escalations(Section):
 class AttendedRecovery(Escalations):
     """With a technician at the machine."""
 
-    gauge_silent: Escalation = Field(_ASK, description="no answer, or an invalid one")
-    gauge_setting: Escalation = Field(_ASK, description="inches, hold, a wrong mode, a low battery")
-    gauge_at_end: Escalation = Field(_ASK, description="a plunger at an end of its travel at a reference")
-    mounting: Escalation = Field(_ASK, description="gauges are not mounted as they must be")
-    unsettled: Escalation = Field(_ASK, description="the readings did not settle")
-    zero_void: Escalation = Field(_ASK, description="a gauge was switched off or set differently")
-    encoder_silent: Escalation = Field(_ASK, description="a round of positions was not complete")
-    encoder_alarm: Escalation = Field(_ASK, description="an encoder reports an error")
-    encoder_restarted: Escalation = Field(_ASK, description="an encoder lost its configuration")
-    controller: Escalation = Field(_ASK, description="the controller refused, or stopped at another place")
-    link_lost: Escalation = Field(_ASK, description="a cable or connection broke")
-    drift: Escalation = Field(_ASK, description="the reference is beyond acceptance.drift_mm at the end")
-    no_way: Escalation = Field(_ASK, description="no safe path")
-    guard: Escalation = Field(_ASK, description="a guard tripped")
-    file: Escalation = Field(_ASK, description="a file could not be written or read")
-    other: Escalation = Field(_ASK, description="any other failure of a device")
+    gauge_silent: Escalation = key(_ASK, "no answer, or an invalid one")
+    gauge_setting: Escalation = key(_ASK, "inches, hold, a wrong mode, a low battery")
+    gauge_at_end: Escalation = key(_ASK, "a plunger at an end of its travel at a reference")
+    mounting: Escalation = key(_ASK, "gauges are not mounted as they must be")
+    unsettled: Escalation = key(_ASK, "the readings did not settle")
+    zero_void: Escalation = key(_ASK, "a gauge was switched off or set differently")
+    encoder_silent: Escalation = key(_ASK, "a round of positions was not complete")
+    encoder_alarm: Escalation = key(_ASK, "an encoder reports an error")
+    encoder_restarted: Escalation = key(_ASK, "an encoder lost its configuration")
+    controller: Escalation = key(_ASK, "the controller refused, or stopped at another place")
+    link_lost: Escalation = key(_ASK, "a cable or connection broke")
+    drift: Escalation = key(_ASK, "the reference is beyond acceptance.drift_mm at the end")
+    no_way: Escalation = key(_ASK, "no safe path")
+    guard: Escalation = key(_ASK, "a guard tripped")
+    file: Escalation = key(_ASK, "a file could not be written or read")
+    other: Escalation = key(_ASK, "any other failure of a device")
 
 
 class UnattendedRecovery(Escalations):
     """Without a technician: a bounded number of attempts, then the run ends."""
 
-    gauge_silent: Escalation = Field(("retry", *_REDO), description="no answer, or an invalid one")
-    gauge_setting: Escalation = Field(_ABORT, description="inches, hold, a wrong mode, a low battery")
-    gauge_at_end: Escalation = Field(
-        ("redo-set", "abort"), description="a plunger at an end at a reference"
+    gauge_silent: Escalation = key(("retry", *_REDO), "no answer, or an invalid one")
+    gauge_setting: Escalation = key(_ABORT, "inches, hold, a wrong mode, a low battery")
+    gauge_at_end: Escalation = key(("redo-set", "abort"), "a plunger at an end at a reference")
+    mounting: Escalation = key(_ABORT, "gauges are not mounted as they must be")
+    unsettled: Escalation = key(
+        ("retry", "measure-again", "redo-set", "abort"), "the readings did not settle"
     )
-    mounting: Escalation = Field(_ABORT, description="gauges are not mounted as they must be")
-    unsettled: Escalation = Field(
-        ("retry", "measure-again", "redo-set", "abort"), description="the readings did not settle"
+    zero_void: Escalation = key(_REDO, "a gauge was switched off or set differently")
+    encoder_silent: Escalation = key(
+        ("retry", "measure-again", "measure-again", "abort"), "a round was not complete"
     )
-    zero_void: Escalation = Field(_REDO, description="a gauge was switched off or set differently")
-    encoder_silent: Escalation = Field(
-        ("retry", "measure-again", "measure-again", "abort"), description="a round was not complete"
+    encoder_alarm: Escalation = key(
+        ("measure-again", "measure-again", "abort"), "an encoder reports an error"
     )
-    encoder_alarm: Escalation = Field(
-        ("measure-again", "measure-again", "abort"), description="an encoder reports an error"
+    encoder_restarted: Escalation = key(_REDO, "an encoder lost its configuration")
+    controller: Escalation = key(_ABORT, "the controller refused, or stopped at another place")
+    link_lost: Escalation = key(
+        ("measure-again", "measure-again", "measure-again", "abort"), "a cable or connection broke"
     )
-    encoder_restarted: Escalation = Field(_REDO, description="an encoder lost its configuration")
-    controller: Escalation = Field(
-        _ABORT, description="the controller refused, or stopped at another place"
-    )
-    link_lost: Escalation = Field(
-        ("measure-again", "measure-again", "measure-again", "abort"),
-        description="a cable or connection broke",
-    )
-    drift: Escalation = Field(_REDO, description="the reference is beyond acceptance.drift_mm at the end")
-    no_way: Escalation = Field(("redo-set", "abort"), description="no safe path")
-    guard: Escalation = Field(_ABORT, description="a guard tripped")
-    file: Escalation = Field(_ABORT, description="a file could not be written or read")
-    other: Escalation = Field(_ABORT, description="any other failure of a device")
+    drift: Escalation = key(_REDO, "the reference is beyond acceptance.drift_mm at the end")
+    no_way: Escalation = key(("redo-set", "abort"), "no safe path")
+    guard: Escalation = key(_ABORT, "a guard tripped")
+    file: Escalation = key(_ABORT, "a file could not be written or read")
+    other: Escalation = key(_ABORT, "any other failure of a device")
 
     @model_validator(mode="after")
     def _never_asks(self) -> Self:
@@ -138,15 +133,14 @@ class UnattendedRecovery(Escalations):
 class RecoverySettings(Section):
     """How failures and interruptions are handled."""
 
-    agreement_mm: Positive = Field(
-        0.05,
-        description="largest change of a reference, gauges and encoders, with which a set continues, mm",
+    agreement_mm: Positive = key(
+        0.05, "largest change of a reference, gauges and encoders, with which a set continues, mm"
     )
-    wait_s: NotNegative = Field(2.0, description="wait before a failed device is tried again, s")
-    away_minutes: Positive = Field(
+    wait_s: NotNegative = key(2.0, "wait before a failed device is tried again, s")
+    away_minutes: Positive = key(
         30.0,
-        description="minutes without anybody connected after which a run that waits for a person ends; "
-        "it can be resumed",
+        "minutes without anybody connected after which a run that waits for a person ends; it can be "
+        "resumed",
     )
     attended: AttendedRecovery = AttendedRecovery()
     unattended: UnattendedRecovery = UnattendedRecovery()

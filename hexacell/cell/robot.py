@@ -7,9 +7,18 @@ from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, model_validator
 
-from hexacell.cell.fields import GeometrySettings, InRange, PointInRange, Section, Text, broken_rule
+from hexacell.cell.fields import (
+    GeometrySettings,
+    InRange,
+    PointInRange,
+    Section,
+    Six,
+    Text,
+    broken_rule,
+    key,
+)
 from hexacell.kinematics.encoder_scales import WithEncoderScales
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
@@ -28,44 +37,37 @@ def _a_direction(vector: PointInRange) -> PointInRange:
 
 
 Direction = Annotated[PointInRange, AfterValidator(_a_direction)]
-SixPoints = tuple[PointInRange, PointInRange, PointInRange, PointInRange, PointInRange, PointInRange]
-SixDirections = tuple[Direction, Direction, Direction, Direction, Direction, Direction]
 
 
 class ScrewSettings(Section):
     """Screws that are not held against turning, in legs between universal joints."""
 
-    lead_mm: InRange = Field(
-        description="lead of the screws, mm a turn; below zero for left-handed threads"
+    lead_mm: InRange = key(..., "lead of the screws, mm a turn; below zero for left-handed threads")
+    base_axes: Six[Direction] = key(
+        ..., "axes of the joints on the base that the legs turn about, in the base frame, legs 1 to 6"
     )
-    base_axes: SixDirections = Field(
-        description="axes of the joints on the base that the legs turn about, in the base frame, legs 1 "
-        "to 6"
-    )
-    platform_axes: SixDirections = Field(
-        description="axes of the joints on the platform that the legs turn about, in the platform frame, "
-        "legs 1 to 6"
+    platform_axes: Six[Direction] = key(
+        ...,
+        "axes of the joints on the platform that the legs turn about, in the platform frame, legs 1 to 6",
     )
 
 
 class RobotSettings(Section):
     """The mechanism and its drawing."""
 
-    mechanism: Text = Field(
+    mechanism: Text = key(
         DEFAULT_MECHANISM,
-        description="name of the mechanism: hexaglide, gough-stewart, six-rails, rotary-cranks, or one "
-        "that a plug-in adds",
+        "name of the mechanism: hexaglide, gough-stewart, six-rails, rotary-cranks, or one that a "
+        "plug-in adds",
     )
-    nominal: GeometrySettings = Field(
-        description="geometry by the drawing, with which identification starts"
-    )
-    encoder_scales: bool = Field(
+    nominal: GeometrySettings = key(..., "geometry by the drawing, with which identification starts")
+    encoder_scales: bool = key(
         False,
-        description="whether errors of the encoders' scales are identified too: encoder_scale in drawing, "
-        "tolerances and the controller's config, which needs a place for them",
+        "whether errors of the encoders' scales are identified too: encoder_scale in drawing, tolerances "
+        "and the controller's config, which needs a place for them",
     )
-    screws: ScrewSettings | None = Field(
-        None, description="screws of a Gough-Stewart platform whose legs may turn in their nuts"
+    screws: ScrewSettings | None = key(
+        None, "screws of a Gough-Stewart platform whose legs may turn in their nuts"
     )
 
     @model_validator(mode="after")
@@ -106,7 +108,7 @@ def _with_scales(mechanism: Mechanism, *, encoder_scales: bool) -> Mechanism:
 
 @cache
 def _screw_legs(
-    settings: ScrewSettings, base: SixPoints, platform: SixPoints, *, encoder_scales: bool
+    settings: ScrewSettings, base: Six[PointInRange], platform: Six[PointInRange], *, encoder_scales: bool
 ) -> Mechanism:
     """The mechanism with joints that are drawn on base and platform there, mm."""
     screws = Screws(settings.lead_mm, np.array(settings.base_axes), np.array(settings.platform_axes))

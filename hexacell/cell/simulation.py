@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
-
 from hexacell.cell.controller import STARTUP_WORDS, StartupWord
 from hexacell.cell.fields import (
     GeometrySettings,
@@ -16,6 +14,7 @@ from hexacell.cell.fields import (
     Seed,
     SixInRange,
     Text,
+    key,
 )
 
 FaultKind = Literal[
@@ -56,117 +55,100 @@ FaultKind = Literal[
 class SimulatedGauges(Section):
     """How the simulated dial indicators behave."""
 
-    noise_mm: NotNegative = Field(0.01, description="noise drawn at every stop of the robot, mm, 1 sigma")
-    flicker_mm: NotNegative = Field(0.001, description="noise drawn at every reading, mm, 1 sigma")
-    latency_s: NotNegative = Field(0.02, description="time between request and answer, s")
-    baudrate: int | None = Field(
-        None, ge=300, le=10_000_000, description="speed of the line, baud; by default the protocol's"
+    noise_mm: NotNegative = key(0.01, "noise drawn at every stop of the robot, mm, 1 sigma")
+    flicker_mm: NotNegative = key(0.001, "noise drawn at every reading, mm, 1 sigma")
+    latency_s: NotNegative = key(0.02, "time between request and answer, s")
+    baudrate: int | None = key(
+        None, "speed of the line, baud; by default the protocol's", ge=300, le=10_000_000
     )
-    transport: Literal["pty", "socket"] = Field("pty", description="how the gauges' lines are simulated")
-    misalignment_deg: NotNegative = Field(
-        0.0, description="misalignment of the triad at each station, deg, 1 sigma"
-    )
-    placing_mm: NotNegative = Field(
-        0.25, description="distance from mid-travel at which gauges are placed, mm, 1 sigma"
-    )
-    off_middle_mm: tuple[InRange, InRange, InRange] = Field(
-        (0.0, 0.0, 0.0),
-        description="constant distance of the ball from mid-travel along x, y, z beside that, mm",
+    transport: Literal["pty", "socket"] = key("pty", "how the gauges' lines are simulated")
+    misalignment_deg: NotNegative = key(0.0, "misalignment of the triad at each station, deg, 1 sigma")
+    placing_mm: NotNegative = key(0.25, "distance from mid-travel at which gauges are placed, mm, 1 sigma")
+    off_middle_mm: tuple[InRange, InRange, InRange] = key(
+        (0.0, 0.0, 0.0), "constant distance of the ball from mid-travel along x, y, z beside that, mm"
     )
 
 
 class SimulatedEncoders(Section):
     """How the simulated CANopen encoders behave."""
 
-    noise: NotNegative = Field(
-        0.01, alias="noise_mm", description="noise drawn at every stop of the robot, 1 sigma"
-    )
-    flicker: NotNegative = Field(
-        0.001, alias="flicker_mm", description="noise drawn at every sample, 1 sigma"
-    )
-    latency_s: NotNegative = Field(0.001, description="time between SYNC and the last answer, s")
-    common_scale_um_m: InRange = Field(
-        0.0, ge=-1e5, le=1e5, description="scale error that all encoders have alike, um/m"
-    )
+    noise: NotNegative = key(0.01, "noise drawn at every stop of the robot, 1 sigma", alias="noise_mm")
+    flicker: NotNegative = key(0.001, "noise drawn at every sample, 1 sigma", alias="flicker_mm")
+    latency_s: NotNegative = key(0.001, "time between SYNC and the last answer, s")
+    common_scale_um_m: InRange = key(0.0, "scale error that all encoders have alike, um/m", ge=-1e5, le=1e5)
 
 
 class SimulatedMotion(Section):
     """How the simulated robot moves."""
 
-    speed: Positive = Field(
-        100.0, alias="speed_mm_s", description="speed of the fastest joint, however short a move is to be"
+    speed: Positive = key(
+        100.0, "speed of the fastest joint, however short a move is to be", alias="speed_mm_s"
     )
-    minimum_s: NotNegative = Field(0.3, description="shortest duration of a move, s")
-    ringing_mm: NotNegative = Field(0.2, description="amplitude of the ball's oscillation on arrival, mm")
-    ringing_s: Positive = Field(0.15, description="time constant of that oscillation's decay, s")
-    repeatability: NotNegative = Field(
-        0.0, alias="repeatability_mm", description="scatter of each joint's stop, 1 sigma"
-    )
+    minimum_s: NotNegative = key(0.3, "shortest duration of a move, s")
+    ringing_mm: NotNegative = key(0.2, "amplitude of the ball's oscillation on arrival, mm")
+    ringing_s: Positive = key(0.15, "time constant of that oscillation's decay, s")
+    repeatability: NotNegative = key(0.0, "scatter of each joint's stop, 1 sigma", alias="repeatability_mm")
 
 
 class SoftLimits(Section):
     """What the simulated controller may be commanded to; it refuses any other pose and does not move."""
 
-    lowest: SixInRange = Field((-1e6,) * 6, description="lowest commands of x, y, z, mm, and a, b, c, deg")
-    highest: SixInRange = Field((1e6,) * 6, description="highest commands of x, y, z, mm, and a, b, c, deg")
+    lowest: SixInRange = key((-1e6,) * 6, "lowest commands of x, y, z, mm, and a, b, c, deg")
+    highest: SixInRange = key((1e6,) * 6, "highest commands of x, y, z, mm, and a, b, c, deg")
 
 
 class SimulatedFixture(Section):
     """How the simulated fixture of [length_check] is made, and how the gauges are mounted in it."""
 
-    distance_mm: Positive | None = Field(
-        None, description="true distance of the fixture's seats, mm; by default as certified"
+    distance_mm: Positive | None = key(
+        None, "true distance of the fixture's seats, mm; by default as certified"
     )
-    seating_mm: NotNegative = Field(0.0, description="scatter of the gauges at each mounting, mm, 1 sigma")
-    yaw_deg: InRange = Field(
-        0.0, description="angle of the fixture to its stated direction about base z, deg"
-    )
-    turned_deg: InRange = Field(
-        0.0, description="turn of the gauges in the second seat about base z, deg; 180: the wrong way round"
+    seating_mm: NotNegative = key(0.0, "scatter of the gauges at each mounting, mm, 1 sigma")
+    yaw_deg: InRange = key(0.0, "angle of the fixture to its stated direction about base z, deg")
+    turned_deg: InRange = key(
+        0.0, "turn of the gauges in the second seat about base z, deg; 180: the wrong way round"
     )
 
 
 class SimulatedFault(Section):
     """A fault that begins at a given time and may end."""
 
-    kind: FaultKind = Field(description="kind of fault")
-    device: Text = Field(
-        "",
-        description="faulty device: a gauge's name, encoder 1 to encoder 6, or controller; empty where "
-        "there is one",
+    kind: FaultKind = key(..., "kind of fault")
+    device: Text = key(
+        "", "faulty device: a gauge's name, encoder 1 to encoder 6, or controller; empty where there is one"
     )
-    at_move: int | None = Field(
+    at_move: int | None = key(
         None,
+        "move during which the fault begins, counted from 1; without it, from the start",
         ge=1,
         le=1_000_000,
-        description="move during which the fault begins, counted from 1; without it, from the start",
     )
-    after_s: NotNegative = Field(0.0, description="delay after that, s of cell time")
-    lasts_s: Positive | None = Field(None, description="duration of the fault, s; without it, permanent")
+    after_s: NotNegative = key(0.0, "delay after that, s of cell time")
+    lasts_s: Positive | None = key(None, "duration of the fault, s; without it, permanent")
 
 
 class SimulationSettings(Section):
     """The simulation of a cell."""
 
-    geometry: GeometrySettings = Field(description="true geometry, known to the simulation only")
-    seed: Seed = Field(1, description="random seed of the simulation")
-    startup: tuple[StartupWord, ...] = Field(
+    geometry: GeometrySettings = key(..., "true geometry, known to the simulation only")
+    seed: Seed = key(1, "random seed of the simulation")
+    startup: tuple[StartupWord, ...] = key(
         STARTUP_WORDS,
+        "what the program may do to make the simulated controller ready, in place of controller.startup: "
+        "it starts in emergency stop, switched off and not homed",
         max_length=len(STARTUP_WORDS),
-        description="what the program may do to make the simulated controller ready, in place of "
-        "controller.startup: it starts in emergency stop, switched off and not homed",
     )
-    station_reach_mm: Positive = Field(
-        30.0, description="distance from the gauges beyond which they are moved to the ball at rest, mm"
+    station_reach_mm: Positive = key(
+        30.0, "distance from the gauges beyond which they are moved to the ball at rest, mm"
     )
-    joints_command: tuple[Text, ...] = Field(
+    joints_command: tuple[Text, ...] = key(
         (),
-        description="command that prints six joint variables a line, mm: gauges and encoders are then "
-        "simulated at the real controller of [controller]",
+        "command that prints six joint variables a line, mm: gauges and encoders are then simulated at "
+        "the real controller of [controller]",
     )
     gauges: SimulatedGauges = SimulatedGauges()
     encoders: SimulatedEncoders = SimulatedEncoders()
     motion: SimulatedMotion = SimulatedMotion()
     soft_limits: SoftLimits = SoftLimits()
     fixture: SimulatedFixture = SimulatedFixture()
-    faults: tuple[SimulatedFault, ...] = Field((), max_length=1000, description="faults and their times")
+    faults: tuple[SimulatedFault, ...] = key((), "faults and their times", max_length=1000)

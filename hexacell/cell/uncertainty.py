@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal, Self, get_args
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
-from hexacell.cell.fields import NotNegative, Positive, Section, Text, broken_rule
+from hexacell.cell.fields import NotNegative, Positive, Section, Text, broken_rule, key
 from hexacell.kinematics.parameters import JointUnit
 
 Grade = Literal["precision", "ordinary", "ideal"]
@@ -50,42 +50,35 @@ def repeatability_key(unit: JointUnit) -> str:
 class CommonUncertaintySettings(Section):
     """Sizes of systematic effects, one standard deviation; certificates and own measurements say better."""
 
-    grade: Grade = Field(
+    grade: Grade = key(
         "precision",
-        description="what sizes that are not given are for; precision: glass scales and precision guides; "
-        "ordinary: magnetic scales and ordinary guides; ideal: no effects, as in a simulation",
+        "what sizes that are not given are for; precision: glass scales and precision guides; ordinary: "
+        "magnetic scales and ordinary guides; ideal: no effects, as in a simulation",
     )
-    stop_repeatability_acts: Literal["everywhere", "at work"] = Field(
+    stop_repeatability_acts: Literal["everywhere", "at work"] = key(
         "everywhere",
-        description="when a joint's stop scatters: everywhere, or at work alone, where the noise of the "
-        "records contains it already",
+        "when a joint's stop scatters: everywhere, or at work alone, where the noise of the records "
+        "contains it already",
     )
-    ball_roundness_um: NotNegative = Field(
-        2.0, description="largest departure of the ball from its mean radius, um"
+    ball_roundness_um: NotNegative = key(2.0, "largest departure of the ball from its mean radius, um")
+    ball_beside_tool_mm: NotNegative = key(
+        0.0, "distance of the ball's centre from that of the tool along each platform axis, mm"
     )
-    ball_beside_tool_mm: NotNegative = Field(
-        0.0, description="distance of the ball's centre from that of the tool along each platform axis, mm"
+    temperature_at_work_k: NotNegative = key(
+        1.0, "difference of the temperature between work and measuring, K"
     )
-    temperature_at_work_k: NotNegative = Field(
-        1.0, description="difference of the temperature between work and measuring, K"
-    )
-    temperature_measuring_k: NotNegative = Field(
+    temperature_measuring_k: NotNegative = key(
         1.0,
-        description="change of the temperature while measuring, K; a run with thermometers takes their "
-        "range instead",
+        "change of the temperature while measuring, K; a run with thermometers takes their range instead",
     )
-    expansion_base_um_m_k: NotNegative = Field(
-        23.0,
-        description="thermal expansion of the base with its scales, um/m/K: aluminium 23, steel 11.5, "
-        "granite 6",
+    expansion_base_um_m_k: NotNegative = key(
+        23.0, "thermal expansion of the base with its scales, um/m/K: aluminium 23, steel 11.5, granite 6"
     )
-    expansion_platform_um_m_k: NotNegative = Field(
-        23.0, description="thermal expansion of the platform, um/m/K"
-    )
-    expansion_legs_um_m_k: NotNegative = Field(23.0, description="thermal expansion of the legs, um/m/K")
-    load_n: NotNegative = Field(20.0, description="force on the tool at work in each direction, N")
-    leg_compliance_um_n: NotNegative = Field(0.03, description="compliance of a leg with its joints, um/N")
-    sources: dict[str, Text] = Field({}, description="where a size comes from, by its key")
+    expansion_platform_um_m_k: NotNegative = key(23.0, "thermal expansion of the platform, um/m/K")
+    expansion_legs_um_m_k: NotNegative = key(23.0, "thermal expansion of the legs, um/m/K")
+    load_n: NotNegative = key(20.0, "force on the tool at work in each direction, N")
+    leg_compliance_um_n: NotNegative = key(0.03, "compliance of a leg with its joints, um/N")
+    sources: dict[str, Text] = key({}, "where a size comes from, by its key")
 
     @model_validator(mode="before")
     @classmethod
@@ -123,12 +116,10 @@ class CommonUncertaintySettings(Section):
 class LinearUncertaintySettings(CommonUncertaintySettings):
     """Sizes of the effects of a machine whose joint variables are lengths."""
 
-    common_encoder_scale_um_m: NotNegative = Field(
-        15.0, description="scale error that all encoders have alike, um/m"
-    )
-    encoder_scale_um_m: NotNegative = Field(10.0, description="scale error of each encoder, um/m")
-    stop_repeatability_um: NotNegative = Field(
-        2.0, description="distance of a joint's stop from where its encoder shows it, um"
+    common_encoder_scale_um_m: NotNegative = key(15.0, "scale error that all encoders have alike, um/m")
+    encoder_scale_um_m: NotNegative = key(10.0, "scale error of each encoder, um/m")
+    stop_repeatability_um: NotNegative = key(
+        2.0, "distance of a joint's stop from where its encoder shows it, um"
     )
 
     @property
@@ -140,24 +131,24 @@ class LinearUncertaintySettings(CommonUncertaintySettings):
 class RotaryUncertaintySettings(CommonUncertaintySettings):
     """Sizes of the effects of a machine whose joints turn: a full circle has no error of scale."""
 
-    encoder_eccentricity_mdeg: NotNegative = Field(
-        2.0, description="amplitude of each encoder's error over a turn, as its disc is off centre, mdeg"
+    encoder_eccentricity_mdeg: NotNegative = key(
+        2.0, "amplitude of each encoder's error over a turn, as its disc is off centre, mdeg"
     )
-    stop_repeatability_mdeg: NotNegative = Field(
-        1.0, description="distance of a joint's stop from where its encoder shows it, mdeg"
+    stop_repeatability_mdeg: NotNegative = key(
+        1.0, "distance of a joint's stop from where its encoder shows it, mdeg"
     )
 
 
 class UncertaintySettings(LinearUncertaintySettings):
     """Sizes of the effects of a machine whose joints move along rails."""
 
-    rail_direction_mrad: NotNegative = Field(
-        0.02, description="angle of each rail from parallel, horizontally and vertically, mrad"
+    rail_direction_mrad: NotNegative = key(
+        0.02, "angle of each rail from parallel, horizontally and vertically, mrad"
     )
-    rail_wave_short_um: NotNegative = Field(3.0, description="amplitude of a short wave of each rail, um")
-    rail_wave_short_mm: Positive = Field(600.0, description="length of the short wave, mm")
-    rail_wave_long_um: NotNegative = Field(5.0, description="amplitude of a long wave of each rail, um")
-    rail_wave_long_mm: Positive = Field(1500.0, description="length of the long wave, mm")
-    rail_sag_um: NotNegative = Field(
-        10.0, description="depth to which all rails sag alike over the range of the joints, um"
+    rail_wave_short_um: NotNegative = key(3.0, "amplitude of a short wave of each rail, um")
+    rail_wave_short_mm: Positive = key(600.0, "length of the short wave, mm")
+    rail_wave_long_um: NotNegative = key(5.0, "amplitude of a long wave of each rail, um")
+    rail_wave_long_mm: Positive = key(1500.0, "length of the long wave, mm")
+    rail_sag_um: NotNegative = key(
+        10.0, "depth to which all rails sag alike over the range of the joints, um"
     )

@@ -12,6 +12,7 @@ from hexacell.errors import ReachError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.gauge_travel import GaugeTravel
@@ -81,7 +82,7 @@ def _axis_limits(limits: LimitSettings, of_controller: ControllerLimits) -> Axis
 def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLimits | None:
     """The limits of passive joints and legs; None if the cell states none."""
     stated, distance = settings.limits.passive_joints, settings.limits.leg_distance_mm
-    if distance == 0.0 and min(stated.base_cones + stated.platform_cones) >= NO_CONE_DEG:
+    if distance == 0.0 and min(stated.base_cone_deg, stated.platform_cone_deg) >= NO_CONE_DEG:
         return None
     mechanism = settings.mechanism
     drawing = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
@@ -92,8 +93,8 @@ def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLi
     return LegLimits(
         base @ frames.base.T if legs.carriers is None else base,
         _unit(platform) @ frames.platform.T,
-        np.radians(stated.base_cones),
-        np.radians(stated.platform_cones),
+        np.full(LEGS, np.radians(stated.base_cone_deg)),
+        np.full(LEGS, np.radians(stated.platform_cone_deg)),
         distance,
     )
 

@@ -80,8 +80,12 @@ class FaultyCell:
         self.bus = PacedBus(BITRATE, HEARTBEAT_S, idle_s=IDLE_S, patience_s=PATIENCE_S)
         self.bus.install(monkeypatch)
         encoders = Cia406Bank(
-            LinearEncoderSettings(
-                bus={"interface": "paced"}, heartbeat_ms=round(1000 * HEARTBEAT_S), largest_speed_mm_s=100.0
+            LinearEncoderSettings.model_validate(
+                {
+                    "bus": {"interface": "paced"},
+                    "heartbeat_ms": round(1000 * HEARTBEAT_S),
+                    "largest_speed_mm_s": 100.0,
+                }
             ),
             WireTrace(),
         )

@@ -56,7 +56,7 @@ def test_a_broken_limit_is_told_with_the_value(cell, pose, problem):
         ({"axes": {"a": (-20.0, -5.0)}}, "axis a would be at 0.0, outside -20 to -5"),
         ({"joints_mm": [(-320.0, -310.0)] * 6}, "mm, outside -320 to -310"),
         ({"leg_distance_mm": 90.0}, "two legs come within 71.3 mm, leg_distance_mm is 90"),
-        ({"passive_joints": {"base_cones_deg": (2.0,) + (90.0,) * 5}}, " in its base joint, beyond 2"),
+        ({"passive_joints": {"base_cone_deg": 2.0}}, " in its base joint, beyond 2"),
     ],
 )
 def test_limits_of_the_cell_file_are_told(cell, limits, problem):

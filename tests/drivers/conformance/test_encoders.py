@@ -45,11 +45,13 @@ class TestLinear(Cia406):
 
 
 class TestReversedAndOffset(Cia406):
-    settings = LinearEncoderSettings(
-        timeout_s=TIMEOUT_S,
-        heartbeat_ms=5000,
-        direction=(1, -1, 1, -1, 1, -1),
-        offset_mm=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0),
+    settings = LinearEncoderSettings.model_validate(
+        {
+            "timeout_s": TIMEOUT_S,
+            "heartbeat_ms": 5000,
+            "direction": (1, -1, 1, -1, 1, -1),
+            "offset_mm": (10.0, 20.0, 30.0, 40.0, 50.0, 60.0),
+        }
     )
 
 

@@ -37,7 +37,7 @@ TABLE = Path(__file__).parents[3] / "docs" / "device-faults.md"
 BEGIN = "<!-- made by tests/drivers/simulated/test_fault_table.py -->\n"
 BEFORE_MM, AFTER_MM = 1.0, 1.5
 ENCODER_BEFORE_MM, ENCODER_AFTER_MM = 30.0, 30.5
-SLOW_MM_S = 1e-3
+SLOW = {"timeout_s": 1.0, "largest_speed_mm_s": 1e-3}
 """What is a jump must not depend on how fast this machine takes two samples."""
 READINGS = 5
 ENCODER_READINGS = 50
@@ -141,7 +141,7 @@ async def gauge_row(protocol: str, fault: FaultKind) -> Row:
 
 
 async def encoder_row(fault: FaultKind) -> Row:
-    settings = LinearEncoderSettings(timeout_s=1.0, heartbeat_ms=5000, largest_speed_mm_s=SLOW_MM_S)
+    settings = LinearEncoderSettings.model_validate({**SLOW, "heartbeat_ms": 5000})
     at = [ENCODER_BEFORE_MM]
     simulated = SimulatedEncoderBank(settings, lambda: at * 6, CellClock(1.0))
     bank = Cia406Bank(settings.model_copy(update={"bus": simulated.bus_settings}))
@@ -168,8 +168,8 @@ async def dbc_row(fault: FaultKind, folder: Path) -> Row:
     file = folder / "encoders.dbc"
     file.write_text(dbc_text())
     described = DbcSettings(file=str(file), signals=SIGNALS, delay_s=0.0, must_be={"Error": 0})
-    settings = LinearEncoderSettings(
-        protocol="dbc", timeout_s=1.0, measuring_step_nm=500, largest_speed_mm_s=SLOW_MM_S, dbc=described
+    settings = LinearEncoderSettings.model_validate(
+        {**SLOW, "protocol": "dbc", "measuring_step_nm": 500, "dbc": described}
     )
     at = [0.0]
     simulated = SimulatedDbcBank(settings, described, lambda: at * 6)
@@ -188,9 +188,7 @@ async def dbc_row(fault: FaultKind, folder: Path) -> Row:
 
 async def modbus_row(fault: FaultKind) -> Row:
     described = ModbusEncoderSettings(registers=(0, 2, 4, 6, 8, 10), invalid=(INVALID,))
-    settings = LinearEncoderSettings(
-        protocol="modbus", timeout_s=1.0, largest_speed_mm_s=SLOW_MM_S, modbus=described
-    )
+    settings = LinearEncoderSettings.model_validate({**SLOW, "protocol": "modbus", "modbus": described})
     at = [ENCODER_BEFORE_MM]
     simulated = SimulatedModbusBank(settings, described, lambda: at * 6, CellClock(FAST))
     bank = ModbusBank(settings.model_copy(update={"modbus": simulated.described}))

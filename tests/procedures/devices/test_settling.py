@@ -16,9 +16,7 @@ from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, ExitCode, SeveralErrors
 from procedures.devices.settling import LEAST_WINDOWS, read_all, read_series, settle, trimmed_mean
 
-TIMING = TimingSettings(
-    window_s=0.6, interval_s=0.1, readings=5, spread_gauge_mm=0.06, spread_encoder_mm=0.05, give_up_s=20.0
-)
+TIMING = TimingSettings.model_validate({"spread_encoder_mm": 0.05})
 
 
 def unsteady(name: str) -> GaugeUnsteady:

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.simulated.linuxcnc.state import KinematicsFailure, SoftLimitExceeded
+from drivers.simulated.linuxcnc.state import MotionRefused
 from drivers.simulated.physics import RobotPhysics
 from hexacell.cell.simulation import SoftLimits
 from hexacell.clock import CellClock
-from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout
 from hexacell.errors import FileError
 from hexacell.kinematics import rotations
@@ -65,17 +64,22 @@ class SimulatedMachine:
         """Move straight to a pose, in no less than ``duration_s``; returns at the end or when stopped.
 
         Raises:
-            SoftLimitExceeded: it is beyond a soft limit.
-            KinematicsFailure: a pose on the line is out of reach.
+            MotionRefused: it is beyond a soft limit, or a pose on the line is out of reach.
         """
-        self._require_soft_limits(pose)
+        limits = self._soft_limits
+        for axis, value, low, high in zip(
+            "XYZABC", pose.as_tuple(), limits.lowest, limits.highest, strict=True
+        ):
+            if not low <= value <= high:
+                side = "positive" if value > high else "negative"
+                raise MotionRefused(f"would exceed {axis}'s {side} limit")
         stop_count = self._stop_count
         with self._lock:
             here = self._pose_now()
         line = interpolate_line(here, PoseBatch.of([pose]), LINE_STEPS)
         joints = self._joints(line)
         if np.isnan(joints).any():
-            raise KinematicsFailure("Linear move on line 0 fails kinematicsInverse")
+            raise MotionRefused("fails kinematicsInverse")
         with self._lock:
             if self._stop_count != stop_count:
                 return
@@ -83,14 +87,6 @@ class SimulatedMachine:
             self._line = line
             motion = self._physics.start_motion(joints, duration_s)
         self._clock.wait(motion.duration_s, self._stopped)
-
-    def _require_soft_limits(self, pose: Pose) -> None:
-        limits = self._soft_limits
-        for axis, value, low, high in zip(
-            "XYZABC", pose.as_tuple(), limits.lowest, limits.highest, strict=True
-        ):
-            if not low <= value <= high:
-                raise SoftLimitExceeded(axis, is_highest=value > high)
 
     def stop(self) -> None:
         with self._lock:
@@ -137,19 +133,16 @@ class SimulatedMachine:
         """The encoders are absolute: nothing to do."""
 
     def _pose_now(self) -> PoseBatch:
-        return _between(self._line, self._physics.progress())
+        """The pose on the line that the present progress of the joints corresponds to."""
+        line = self._line
+        place = self._physics.progress() * (len(line) - 1)
+        row = min(int(place), len(line) - 2)
+        share = place - row
+        if share >= 1.0:
+            return line[[row + 1]]
+        turn = rotations.to_vector(line.rotations[row + 1] @ line.rotations[row].T)
+        position = (1.0 - share) * line.positions[row] + share * line.positions[row + 1]
+        return PoseBatch(position[None], (rotations.from_vector(share * turn) @ line.rotations[row])[None])
 
     def _joints(self, poses: PoseBatch) -> Array:
-        geometry: ControllerGeometry = self._geometry
-        return self._mechanism.inverse(geometry.geometry, geometry.branch, poses)
-
-
-def _between(line: PoseBatch, fraction: float) -> PoseBatch:
-    place = fraction * (len(line) - 1)
-    row = min(int(place), len(line) - 2)
-    if place - row >= 1.0:
-        return line[[row + 1]]
-    turn = rotations.to_vector(line.rotations[row + 1] @ line.rotations[row].T)
-    share = place - row
-    position = (1.0 - share) * line.positions[row] + share * line.positions[row + 1]
-    return PoseBatch(position[None], (rotations.from_vector(share * turn) @ line.rotations[row])[None])
+        return self._mechanism.inverse(self._geometry.geometry, self._geometry.branch, poses)

@@ -18,7 +18,7 @@ from drivers.interfaces import (
     StartupAction,
     StartupActions,
 )
-from drivers.simulated.linuxcnc.state import SoftLimitExceeded
+from drivers.simulated.linuxcnc.state import MotionRefused
 from drivers.simulated.robot import SimulatedMachine
 from hexacell.cell.devices import GaugeAxis
 from hexacell.cell.recovery import Action
@@ -172,7 +172,7 @@ class FakeController(Fake):
         if self.machine:
             try:
                 self.machine.move(pose, duration_s)
-            except SoftLimitExceeded as refusal:
+            except MotionRefused as refusal:
                 raise refused(pose, str(refusal)) from refusal
 
     async def position(self) -> ReportedPosition | None:

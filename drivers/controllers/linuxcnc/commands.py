@@ -6,21 +6,12 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from typing import TypeVar
 
 from drivers.controllers.linuxcnc.connection import Connection
-from drivers.controllers.linuxcnc.protocol import (
-    Address,
-    Response,
-    parse_homed,
-    parse_pose,
-    parse_positions,
-)
+from drivers.controllers.linuxcnc.protocol import Response, parse_positions
 from drivers.errors import CommandRefused, ConnectionLost
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
-
-T = TypeVar("T")
 
 _log = logging.getLogger("drivers.controllers.linuxcnc")
 
@@ -67,13 +58,11 @@ class ErrorMessages:
 class ControllerCommands:
     """Get and set commands over one connection."""
 
-    def __init__(
-        self, connection: Connection, address: Address, messages: ErrorMessages | None = None
-    ) -> None:
+    def __init__(self, connection: Connection, messages: ErrorMessages | None = None) -> None:
         self.connection = connection
-        self.subject = address.name
-        self.unit_mm = address.unit_mm
-        self.joint_unit_mm = address.joint_unit_mm
+        self.subject = connection.address.name
+        self.unit_mm = connection.address.unit_mm
+        self.joint_unit_mm = connection.address.joint_unit_mm
         self._messages = messages or ErrorMessages()
 
     async def get(self, what: str) -> str:
@@ -98,25 +87,30 @@ class ControllerCommands:
             CommandRefused: It is refused; the reason is the controller's own.
         """
         response = await self.connection.request(f"set {what}", timeout_s)
-        if not response.accepted:
-            refusal = await self._refusal(what, response)
-            _log.warning("%s %s", self.subject, refusal.problem)
-            raise refusal
+        if response.accepted:
+            return
+        if (await self.get_if_known("enable")).upper() == "OFF":
+            reason = "another client has taken control of it"
+            action = "See that nobody else moves the robot, then prepare it again"
+        else:
+            reason, action = await self.reason(response.explanations), None
+        refusal = CommandRefused(f"'set {what}'", reason, subject=self.subject, action=action)
+        _log.warning("%s %s", self.subject, refusal.problem)
+        raise refusal
 
     async def pose(self) -> Pose:
         """The actual pose, mm and deg, by the controller's own kinematics."""
-        x, y, z, *angles = self._parsed(parse_pose, await self.get("abs_act_pos")).as_tuple()
+        x, y, z, *angles = self._parsed(await self.get("abs_act_pos"))
         return Pose(self.unit_mm * x, self.unit_mm * y, self.unit_mm * z, *angles)
 
     async def joints(self) -> tuple[float, ...]:
         """The six actual joint variables, mm or deg."""
-        positions = self._parsed(parse_positions, await self.get("joint_pos"))
-        return tuple(self.joint_unit_mm * value for value in positions)
+        return tuple(self.joint_unit_mm * value for value in self._parsed(await self.get("joint_pos")))
 
     async def all_homed(self) -> bool:
         """Whether every joint is homed."""
-        homed = parse_homed(await self.get("joint_homed"))
-        return bool(homed) and all(homed)
+        homed = (await self.get("joint_homed")).upper().split()
+        return bool(homed) and all(word == "YES" for word in homed)
 
     async def is_on(self, what: str) -> bool:
         """Whether ``estop`` or ``machine`` is on."""
@@ -152,21 +146,9 @@ class ControllerCommands:
         response = await self.connection.request(f"get {what}")
         return response if response.accepted else await self.connection.request(f"get {what}")
 
-    async def _refusal(self, what: str, response: Response) -> CommandRefused:
-        if (await self.get_if_known("enable")).upper() == "OFF":
-            return CommandRefused(
-                f"'set {what}'",
-                "another client has taken control of it",
-                subject=self.subject,
-                action="See that nobody else moves the robot, then prepare it again",
-            )
-        return CommandRefused(
-            f"'set {what}'", await self.reason(response.explanations), subject=self.subject
-        )
-
-    def _parsed(self, parse: Callable[[str], T], text: str) -> T:
+    def _parsed(self, text: str) -> tuple[float, ...]:
         try:
-            return parse(text)
+            return parse_positions(text)
         except ValueError as error:
             raise DeviceError(str(error), subject=self.subject) from error
 

@@ -107,6 +107,7 @@ class Connection:
     taken for the response to another one.
 
     Attributes:
+        address: the server's.
         server: name and version of the server.
         send_turn: entered to send a command; see :class:`SendArbiter`. Unrestricted at first.
     """
@@ -122,7 +123,7 @@ class Connection:
         self.server = ""
         self.send_turn: Callable[[], AbstractAsyncContextManager[None]] = nullcontext
         self._wire = LineRecord(address.name, recorder)
-        self._address = address
+        self.address = address
         self._timeouts = timeouts
         self._reader = reader
         self._writer = writer
@@ -168,7 +169,7 @@ class Connection:
         async with self.send_turn():
             self._outstanding = command
             await self._write(line)
-            return await self._outstanding_response(timeout_s or self._timeouts.answer)
+            return await self._outstanding_response(command, timeout_s or self._timeouts.answer)
 
     async def collect_late_response(self) -> None:
         """Receive the outstanding response, if there is one.
@@ -177,9 +178,9 @@ class Connection:
             ConnectionLost: It does not come, or the server is gone: open another connection.
         """
         if self._outstanding is not None:
-            await self._outstanding_response(self._timeouts.answer)
+            await self._outstanding_response(self._outstanding, self._timeouts.answer)
         if self._reader.at_eof():
-            raise ConnectionLost("closed the connection", subject=self._address.name)
+            raise ConnectionLost("closed the connection", subject=self.address.name)
 
     async def take_control(self, timeout_s: float | None = None) -> None:
         """Become the client that may command; on LinuxCNC 2.9 the previous one loses control.
@@ -187,11 +188,11 @@ class Connection:
         Raises:
             DeviceError: The password is wrong.
         """
-        answer = await self.request(f"set enable {self._address.enable_password}", timeout_s)
+        answer = await self.request(f"set enable {self.address.enable_password}", timeout_s)
         if not answer.accepted:
             raise DeviceError(
                 "refuses the enable password",
-                subject=self._address.name,
+                subject=self.address.name,
                 action="Set enable_password in the password_file to linuxcncrsh's own (--enablepw)",
             )
 
@@ -202,7 +203,7 @@ class Connection:
             await self._writer.wait_closed()
 
     async def _greet(self) -> None:
-        await self._write(self._encoded(f"hello {self._address.connect_password} {_CLIENT}"))
+        await self._write(self._encoded(f"hello {self.address.connect_password} {_CLIENT}"))
         self.server = self._server_in(await self._first_line())
         await self._write(self._encoded("set echo off"))
         with suppress(TimeoutError):  # the only response, if any, is the echo
@@ -219,7 +220,7 @@ class Connection:
                 raise self._not_linuxcncrsh(self._buffer.rest) from None
             raise ResponseTimeout(
                 "is frozen: it accepts the connection but does not respond",
-                subject=self._address.name,
+                subject=self.address.name,
                 action="Check that linuxcncrsh listens there, and restart LinuxCNC",
             ) from None
         return line
@@ -231,7 +232,7 @@ class Connection:
             case ["HELLO", "NAK"]:
                 raise DeviceError(
                     "refuses the connect password",
-                    subject=self._address.name,
+                    subject=self.address.name,
                     action="Set connect_password in the password_file to linuxcncrsh's own (--connectpw)",
                 )
         raise self._not_linuxcncrsh(line)
@@ -239,7 +240,7 @@ class Connection:
     def _not_linuxcncrsh(self, said: str) -> DeviceError:
         return DeviceError(
             f"is no linuxcncrsh, it says {said[:_SHOWN]!r}",
-            subject=self._address.name,
+            subject=self.address.name,
             action="Check controller.host and controller.port",
         )
 
@@ -247,7 +248,7 @@ class Connection:
         try:
             return encode_command(command)
         except ValueError as error:
-            raise UsageError(str(error), subject=self._address.name) from error
+            raise UsageError(str(error), subject=self.address.name) from error
 
     async def _write(self, line: bytes) -> None:
         self._record(TrafficDirection.SENT, line)
@@ -255,15 +256,9 @@ class Connection:
             self._writer.write(line)
             await self._writer.drain()
         except OSError as error:
-            raise ConnectionLost("closed the connection", subject=self._address.name) from error
+            raise ConnectionLost("closed the connection", subject=self.address.name) from error
 
-    async def _outstanding_response(self, timeout_s: float) -> Response:
-        assert self._outstanding is not None  # noqa: S101 - both callers make sure
-        response = await self._response_to(self._outstanding, timeout_s)
-        self._outstanding = None
-        return response
-
-    async def _response_to(self, command: str, timeout_s: float) -> Response:
+    async def _outstanding_response(self, command: str, timeout_s: float) -> Response:
         deadline = loop_time() + timeout_s
         remarks: list[str] = []
         try:
@@ -273,41 +268,39 @@ class Connection:
                     deadline = min(deadline, loop_time() + self._timeouts.explanation)
         except TimeoutError:
             if remarks:  # 2.10 refuses without a NAK while another client moves the machine
+                self._outstanding = None
                 return Response(accepted=False, explanations=tuple(remarks))
             asked = " ".join(command.split()[:2])  # no passwords in messages
-            _log.warning("%s: no answer to '%s' within %g s", self._address.name, asked, timeout_s)
+            _log.warning("%s: no answer to '%s' within %g s", self.address.name, asked, timeout_s)
             raise ResponseTimeout(
                 f"is frozen: it is connected, but did not answer '{asked}' within {timeout_s:g} s",
-                subject=self._address.name,
+                subject=self.address.name,
                 action="Restart LinuxCNC, and find out why",
             ) from None
+        self._outstanding = None
         return Response(answer.accepted, answer.text, tuple(remarks))
 
     async def _line(self, deadline: float) -> str:
         while not self._lines:
             async with asyncio.timeout_at(deadline):
-                data = await self._read()
+                try:
+                    data = await self._reader.read(_CHUNK)
+                except OSError:
+                    data = b""
+            self._record(TrafficDirection.RECEIVED, data)
+            if not data:
+                _log.warning("%s: the connection was closed", self.address.name)
+                raise ConnectionLost(
+                    "closed the connection: it was ended or restarted",
+                    subject=self.address.name,
+                    action="Start LinuxCNC if it does not run",
+                )
             self._lines.extend(self._buffer.feed(data))
         return self._lines.popleft()
 
-    async def _read(self) -> bytes:
-        try:
-            data = await self._reader.read(_CHUNK)
-        except OSError:
-            data = b""
-        self._record(TrafficDirection.RECEIVED, data)
-        if not data:
-            _log.warning("%s: the connection was closed", self._address.name)
-            raise ConnectionLost(
-                "closed the connection: it was ended or restarted",
-                subject=self._address.name,
-                action="Start LinuxCNC if it does not run",
-            )
-        return data
-
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if self._wire.is_on:
-            self._wire.add(direction, without_passwords(data, self._address))  # traces are handed to others
+            self._wire.add(direction, without_passwords(data, self.address))  # traces are handed to others
 
 
 def without_passwords(data: bytes, address: Address) -> bytes:

@@ -106,7 +106,12 @@ class LinuxcncrshController:
         stops = self._session.stop_count
         async with self._order:
             with self._ready_if_done():
-                await self._prepare(permitted, stops)
+                commands = await self._session.in_control()
+                await startup.acknowledge_on_completion(commands)
+                await self._make_ready(commands, permitted, stops)
+                if self._has_changed_modes:
+                    await self._restore_modes(commands)
+                self._restoring = restoring_block(await startup.check_coordinate_system(commands))
 
     async def move(self, pose: Pose, duration_s: float) -> None:
         """Move to ``pose`` in inverse time; returns when the actual pose agrees with it.
@@ -135,7 +140,11 @@ class LinuxcncrshController:
                 raise MoveRefused(f"to move to {pose}", reason, subject=self._name, action=action)
             await self._execute(commands, block, pose, stops, limit_s)
             await self._verify_arrival(commands, pose, stops, limit_s)
-            await self._restore_modes_unless_stopped(commands, stops)
+            try:
+                await self._restore_modes(commands)
+            except CommandRefused:
+                if not self._was_stopped_since(stops):  # the stop took control: they are restored later
+                    raise
 
     async def position(self) -> ReportedPosition | None:
         """Actual pose and joints; None before all joints are homed, when both may be those of home."""
@@ -184,7 +193,10 @@ class LinuxcncrshController:
         stops = self._session.stop_count
         async with self._order:
             with self._ready_if_done():
-                await self._switch_off(await self._session.synchronized())
+                commands = await self._session.synchronized()
+                if await commands.is_on("machine"):
+                    self._joints_before_reload = await commands.joints()
+                await startup.switch_machine(commands, self._timeouts, on=False)
                 if command := self._settings.reload_command:
                     await startup.run_reload_command(command, self._name, self._timeouts.reload)
                 await self._make_ready(await self._session.reconnect(), permitted, stops)
@@ -197,14 +209,6 @@ class LinuxcncrshController:
                     await self._restore_modes(await self._session.synchronized())
         await self._session.close()
 
-    async def _prepare(self, permitted: StartupActions, stops: int) -> None:
-        commands = await self._session.in_control()
-        await startup.acknowledge_on_completion(commands)
-        await self._make_ready(commands, permitted, stops)
-        if self._has_changed_modes:
-            await self._restore_modes(commands)
-        self._restoring = restoring_block(await startup.check_coordinate_system(commands))
-
     @contextmanager
     def _ready_if_done(self) -> Iterator[None]:
         """What fails in this context leaves a controller that moves nothing until it is prepared again."""
@@ -215,18 +219,6 @@ class LinuxcncrshController:
     async def _restore_modes(self, commands: ControllerCommands) -> None:
         await startup.restore_modes(commands, self._restoring, self._timeouts)
         self._has_changed_modes = False
-
-    async def _restore_modes_unless_stopped(self, commands: ControllerCommands, stops: int) -> None:
-        try:
-            await self._restore_modes(commands)
-        except CommandRefused:
-            if not self._was_stopped_since(stops):  # the stop took control: they are restored later
-                raise
-
-    async def _switch_off(self, commands: ControllerCommands) -> None:
-        if await commands.is_on("machine"):
-            self._joints_before_reload = await commands.joints()
-        await startup.switch_machine(commands, self._timeouts, on=False)
 
     async def _make_ready(
         self, commands: ControllerCommands, permitted: StartupActions, stops: int
@@ -240,7 +232,7 @@ class LinuxcncrshController:
                 raise StartupNotPermitted(action, self._name)
             permitted -= {action}  # what is needed again was undone by somebody
             await self._start_up(commands, action, stops)
-        self._session.machine_is_enabled()
+        self._session.was_enabled = True
         if self._joints_before_reload is not None:
             # With other zeros it reports other joints where it stands: encoders then show whether it moved.
             if not self._settings.joints_include_zeros:

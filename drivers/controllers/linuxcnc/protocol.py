@@ -203,11 +203,6 @@ def parse_response(line: str, command: str) -> Response | None:
     return None
 
 
-def parse_pose(text: str) -> Pose:
-    """The pose, mm and deg, in the words after ``ABS_ACT_POS``."""
-    return Pose(*parse_positions(text))
-
-
 def parse_positions(text: str) -> tuple[float, float, float, float, float, float]:
     """The first six numbers of an answer: joints 1 to 6, mm, or a pose's coordinates.
 
@@ -240,11 +235,6 @@ def parse_number(text: str) -> float:
         return float(text.split(maxsplit=1)[0])
     except (IndexError, ValueError):
         return math.nan
-
-
-def parse_homed(text: str) -> tuple[bool, ...]:
-    """Whether each joint is homed, from the words after ``JOINT_HOMED``."""
-    return tuple(word.upper() == "YES" for word in text.split())
 
 
 def pose_difference(one: Pose, other: Pose) -> tuple[float, float]:

@@ -10,23 +10,19 @@ import re
 import socket
 import socketserver
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from pathlib import Path
+from typing import TypeVar
 
-from drivers.simulated.linuxcnc.commands import (
-    GET_COMMANDS,
-    OF_SERVER,
-    SET_COMMANDS,
-    ClientSession,
-    Permission,
-)
-from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Machine
+from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Machine, TaskMode, WaitMode
 from drivers.simulated.served_device import Closeable
 from hexacell.cell.controller import ControllerSettings
 
 HOST = "127.0.0.1"
 SERVER = "EMCNETSVR 1.1"
 MAX_LINE_BYTES = 255
+UNITS = {1.0: "MM", 10.0: "CM", 25.4: "INCH"}
 
 _LINE_ENDS = re.compile(rb"[\r\n]")
 _CHUNK = 1600
@@ -65,7 +61,10 @@ class SimulatedController(Closeable):
 
         The machine continues. Of LinuxCNC, this is what a stopped milltask does.
         """
-        self._server.frozen_answers = _answers_now(self._server) if on else None
+        anybody = _Client(self._server, lambda _data: None)
+        self._server.frozen_answers = (
+            {what: get(anybody) for what, get in _GET.items() if what not in _OF_SERVER} if on else None
+        )
 
     def close(self) -> None:
         self._server.shutdown()
@@ -109,12 +108,6 @@ class _Server(socketserver.ThreadingTCPServer):
                 connection.shutdown(socket.SHUT_RDWR)
 
 
-def _answers_now(server: _Server) -> Mapping[str, str]:
-    """The answers to queries for the machine's state, by their names."""
-    anybody = ClientSession(server.state, server.settings)
-    return {what: get(anybody) for what, get in GET_COMMANDS.items() if what not in OF_SERVER}
-
-
 class _Handler(socketserver.BaseRequestHandler):
     server: _Server
     request: socket.socket
@@ -128,14 +121,22 @@ class _Handler(socketserver.BaseRequestHandler):
 
 
 class _Client:
-    """The lines and responses of one connection; ``write`` sends bytes back over it."""
+    """The settings, lines and responses of one connection; ``write`` sends bytes back over it."""
 
     def __init__(self, server: _Server, write: Callable[[bytes], None]) -> None:
+        self.state = server.state
+        self.settings = server.settings
+        self.echo = True
+        self.verbose = False
         self._server = server
-        self._session = ClientSession(server.state, server.settings)
+        self._greeted = False
         self._is_waiting = False
         self._write = write
         self._rest = b""
+
+    @property
+    def has_control(self) -> bool:
+        return self.state.commander is self
 
     def receive(self, data: bytes) -> None:
         """Process received bytes and respond to every completed line.
@@ -143,7 +144,7 @@ class _Client:
         Raises:
             ConnectionCut: The client sent ``quit`` or a line that is too long.
         """
-        if self._session.echo and self._session.greeted:
+        if self.echo and self._greeted:
             self._write(data)
         *lines, self._rest = _LINE_ENDS.split(self._rest + data)
         for line in lines:
@@ -153,59 +154,144 @@ class _Client:
 
     def _execute(self, line: str) -> None:
         verb, what, argument = (*line.split(maxsplit=2), "", "", "")[:3]
-        if self._is_stuck(verb.upper(), what.upper()):
+        verb = verb.upper()
+        if self._is_stuck(verb, what.upper()):
             return
-        match verb.upper():
+        match verb:
             case "HELLO":
-                self._hello(what, argument)
+                expected = self.settings.connect_password.get_secret_value()
+                if what == expected and len(argument.split()) >= 2:
+                    self._greeted = True
+                    self._write(f"HELLO ACK {SERVER}\r\n".encode())
+                else:
+                    self._write(b"HELLO NAK\r\n")
             case "GET":
-                self._get(what.upper())
+                self._write(self._got(what.upper()).encode())
             case "SET":
-                self._set(what.upper(), argument.strip())
+                self._write(self._set(what.upper(), argument.strip()).encode())
             case "QUIT":
                 raise ConnectionCut
 
     def _is_stuck(self, verb: str, what: str) -> bool:
         """Whether the server waits for a frozen controller with this command, or with an earlier one."""
         is_frozen = self._server.frozen_answers is not None
-        is_for_machine = verb == "SET" and what in SET_COMMANDS and what not in OF_SERVER
+        is_for_machine = verb == "SET" and what in _SET and what not in _OF_SERVER
         self._is_waiting = is_frozen and (self._is_waiting or is_for_machine)
         return self._is_waiting
 
-    def _hello(self, password: str, name_and_version: str) -> None:
-        expected = self._session.settings.connect_password.get_secret_value()
-        if password == expected and len(name_and_version.split()) >= 2:
-            self._session.greeted = True
-            self._write(f"HELLO ACK {SERVER}\r\n".encode())
-        else:
-            self._write(b"HELLO NAK\r\n")
-
-    def _get(self, what: str) -> None:
+    def _got(self, what: str) -> str:
         if not what:
-            self._write(b"GET NAK\r\n")
-        elif what in GET_COMMANDS:
-            self._write(f"{what} {self._answer(what)}\r\n".encode())
-        else:
-            self._write(f"GET {what} NAK\r\n\r\n".encode())
-
-    def _answer(self, what: str) -> str:
+            return "GET NAK\r\n"
+        if what not in _GET:
+            return f"GET {what} NAK\r\n\r\n"
         frozen = self._server.frozen_answers or {}
-        return frozen[what] if what in frozen else GET_COMMANDS[what](self._session)
+        return f"{what} {frozen[what] if what in frozen else _GET[what](self)}\r\n"
 
-    def _set(self, what: str, argument: str) -> None:
-        if not self._session.greeted:
-            self._write(b"SET NAK\r\n")
-        elif not what:
-            self._write(b"SET NAK\n\r")
-        elif not (self._is_permitted(what) and SET_COMMANDS[what].execute(self._session, argument)):
-            self._write(f"SET {what} NAK\n\r".encode())
-        elif self._session.verbose:
-            self._write(f"SET {what} ACK\n\r".encode())
-
-    def _is_permitted(self, what: str) -> bool:
-        if what not in SET_COMMANDS:
-            return False
-        permission = SET_COMMANDS[what].permission
-        return (permission < Permission.COMMANDER or self._session.has_control) and (
-            permission < Permission.ON or self._session.state.enabled
+    def _set(self, what: str, argument: str) -> str:
+        if not self._greeted:
+            return "SET NAK\r\n"
+        if not what:
+            return "SET NAK\n\r"
+        is_permitted = (what in _FOR_ANYBODY or self.has_control) and (
+            what not in _WHILE_ON or self.state.enabled
         )
+        if what not in _SET or not is_permitted or not _SET[what](self, argument):
+            return f"SET {what} NAK\n\r"
+        return f"SET {what} ACK\n\r" if self.verbose else ""
+
+
+def _switch(is_on: bool) -> str:
+    return "ON" if is_on else "OFF"
+
+
+def _answer(is_so: bool) -> str:
+    return "YES" if is_so else "NO"
+
+
+def _numbers(values: Iterable[float], unit: float = 1.0) -> str:
+    """Lengths in the machine's unit; angles come with unit 1."""
+    return " ".join(f"{value / unit:.6f}" for value in values)
+
+
+def _position(client: _Client, values: tuple[float, ...]) -> str:
+    """Three lengths in the machine's unit, and three angles."""
+    return f"{_numbers(values[:3], client.settings.unit_mm)} {_numbers(values[3:])}"
+
+
+_GET: dict[str, Callable[[_Client], str]] = {
+    "ECHO": lambda client: _switch(client.echo),
+    "VERBOSE": lambda client: _switch(client.verbose),
+    "ENABLE": lambda client: _switch(client.has_control),
+    "SET_WAIT": lambda client: client.state.wait_mode.value,
+    "ESTOP": lambda client: _switch(client.state.estop),
+    "MACHINE": lambda client: _switch(client.state.enabled),
+    "MODE": lambda client: client.state.mode.value,
+    "ERROR": lambda client: client.state.next_error(),
+    "TELEOP_ENABLE": lambda client: _answer(client.state.teleop),
+    "JOINT_HOMED": lambda client: " ".join([_answer(client.state.homed)] * 6),
+    "JOINT_POS": lambda client: _numbers(client.state.machine.joints(), client.settings.joint_unit_mm),
+    "ABS_ACT_POS": lambda client: _position(client, client.state.machine.pose().as_tuple()),
+    "POS_OFFSET": lambda client: _position(client, client.state.modes.offsets),
+    "PROGRAM_CODES": lambda client: client.state.modes.codes,
+    "FEED_OVERRIDE": lambda client: f"{client.state.feed_override_percent:g}",
+    "PROGRAM_UNITS": lambda _client: "MM",
+    "USER_LINEAR_UNITS": lambda client: UNITS.get(client.settings.unit_mm, "CUSTOM"),
+    "INIFILE": lambda client: Path(client.settings.config).name,
+    "PLAT": lambda _client: "Linux",
+}
+
+SettingT = TypeVar("SettingT")
+
+
+def _one_of(
+    settings: Mapping[str, SettingT], change: Callable[[_Client, SettingT], None]
+) -> Callable[[_Client, str], bool]:
+    """The effect of a command whose argument is one of some words."""
+
+    def execute(client: _Client, argument: str) -> bool:
+        word = argument.upper()
+        if word in settings:
+            change(client, settings[word])
+        return word in settings
+
+    return execute
+
+
+def _enable(client: _Client, argument: str) -> bool:
+    is_password = argument == client.settings.enable_password.get_secret_value()
+    if is_password or argument.upper() == "OFF":
+        client.state.commander = client if is_password else None
+        return True
+    return False
+
+
+def _abort(client: _Client, _argument: str) -> bool:
+    client.state.abort()
+    return True
+
+
+_SWITCH = {"ON": True, "OFF": False}
+_TASK_MODES = {mode.value: mode for mode in TaskMode}
+_WAIT_MODES = {mode.value: mode for mode in WaitMode}
+
+_SET: dict[str, Callable[[_Client, str], bool]] = {
+    "ECHO": _one_of(_SWITCH, lambda client, on: setattr(client, "echo", on)),
+    "VERBOSE": _one_of(_SWITCH, lambda client, on: setattr(client, "verbose", on)),
+    "ENABLE": _enable,
+    "SET_WAIT": _one_of(_WAIT_MODES, lambda client, mode: setattr(client.state, "wait_mode", mode)),
+    "ESTOP": _one_of(_SWITCH, lambda client, on: client.state.set_estop(on=on)),
+    "MACHINE": _one_of(_SWITCH, lambda client, on: client.state.set_machine(on=on)),
+    "MODE": _one_of(_TASK_MODES, lambda client, mode: client.state.set_mode(mode)),
+    "TELEOP_ENABLE": _one_of(_SWITCH, lambda client, on: setattr(client.state, "teleop", on)),
+    "HOME": _one_of({"-1": -1}, lambda client, _joints: client.state.home()),
+    "MDI": lambda client, block: client.state.mdi(block),
+    "ABORT": _abort,
+}
+"""The effects of commands after ``set``, given what follows their name; false becomes NAK."""
+
+_OF_SERVER = frozenset({"ECHO", "VERBOSE", "ENABLE", "SET_WAIT"})
+"""What the server answers by itself, whatever the controller does."""
+_FOR_ANYBODY = frozenset({"ECHO", "VERBOSE", "ENABLE"})
+"""What any client may set; all else, only the one in control."""
+_WHILE_ON = frozenset({"MODE", "TELEOP_ENABLE", "HOME", "MDI", "ABORT"})
+"""What can be set only while the machine is on."""

@@ -10,6 +10,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
 from enum import Enum
 from typing import Protocol
 
@@ -42,56 +43,32 @@ class ConnectionCut(Exception):
     """The connection of the command must be cut."""
 
 
-class KinematicsFailure(Exception):
-    """The target is out of reach of the controller's geometry."""
+class MotionRefused(Exception):
+    """The target is beyond a soft limit or out of reach, in the words of LinuxCNC; nothing moves."""
 
-
-class SoftLimitExceeded(Exception):
-    """The target is beyond a soft limit of an axis."""
-
-    def __init__(self, axis: str, *, is_highest: bool) -> None:
-        side = "positive" if is_highest else "negative"
-        super().__init__(f"Linear move on line 0 would exceed {axis}'s {side} limit")
+    def __init__(self, reason: str) -> None:
+        super().__init__(f"Linear move on line 0 {reason}")
 
 
 class Machine(Protocol):
     """The machine behind the controller, called from several threads.
 
-    While ``move`` or ``home`` blocks in one thread, any other method may be called from another.
+    ``move`` and ``home`` return when that has ended or was stopped; meanwhile, any other method may be called
+    from another thread. ``move`` takes no less than ``duration_s``, or raises ``MotionRefused``. The geometry
+    is read by ``switch_on`` only; if it raises ``HexacellError``, the machine stays off.
     """
 
-    def move(self, pose: Pose, duration_s: float | None) -> None:
-        """Move to ``pose``, in no less than ``duration_s``; returns when it has ended or was stopped.
+    def move(self, pose: Pose, duration_s: float | None) -> None: ...
 
-        Raises:
-            SoftLimitExceeded: It is beyond a soft limit; nothing moves.
-            KinematicsFailure: The geometry cannot reach it; nothing moves.
-        """
-        ...
+    def stop(self) -> None: ...
 
-    def stop(self) -> None:
-        """Stop a motion in place, if there is one."""
-        ...
+    def pose(self) -> Pose: ...
 
-    def pose(self) -> Pose:
-        """The pose by the joint positions and the controller's geometry."""
-        ...
+    def joints(self) -> tuple[float, ...]: ...
 
-    def joints(self) -> tuple[float, ...]:
-        """The six joint positions, mm."""
-        ...
+    def switch_on(self) -> None: ...
 
-    def switch_on(self) -> None:
-        """Enable the drives; the geometry is read from the config file here only.
-
-        Raises:
-            HexacellError: The config cannot be used; the machine stays off.
-        """
-        ...
-
-    def home(self) -> None:
-        """Home the joints; returns when that has ended or was stopped."""
-        ...
+    def home(self) -> None: ...
 
 
 class ControllerState:
@@ -146,7 +123,12 @@ class ControllerState:
             if not on:
                 self._switch_off()
             elif not self.estop and not self.enabled:
-                self._switch_on()
+                try:
+                    self.machine.switch_on()
+                except HexacellError as error:
+                    self._errors.append(str(error))
+                else:
+                    self.enabled = True
 
     def set_mode(self, mode: TaskMode) -> None:
         """Change mode; MDI before homing is acknowledged without effect."""
@@ -181,21 +163,25 @@ class ControllerState:
         """
         try:
             parsed = parse_block(block, self.machine.pose(), self.modes)
-            self._require_mdi()
+            if not self.homed:
+                raise BlockError("Can't issue MDI command when not homed")
+            if self.mode is not TaskMode.MDI:
+                raise BlockError("Must be in MDI mode to issue MDI command")
         except BlockError as error:
             self._errors.append(str(error))
             return self.wait_mode is WaitMode.RECEIVED
         self.modes = parsed.modes
         if (target := parsed.target) is None:
             return True
-        job = self._start(lambda: self._travel(target, self._overridden(parsed.duration_s)))
-        return self.wait_mode is WaitMode.RECEIVED or _outcome(job)
-
-    def _require_mdi(self) -> None:
-        if not self.homed:
-            raise BlockError("Can't issue MDI command when not homed")
-        if self.mode is not TaskMode.MDI:
-            raise BlockError("Must be in MDI mode to issue MDI command")
+        duration_s = parsed.duration_s
+        if duration_s is not None:
+            duration_s *= 100.0 / self.feed_override_percent
+        job = self._start(lambda: self._travel(target, duration_s))
+        if self.wait_mode is WaitMode.RECEIVED:
+            return True
+        with suppress(CancelledError):
+            return job.result()
+        return True  # an aborted motion succeeds, as in LinuxCNC
 
     def _start(self, motion: Callable[[], bool]) -> Future[bool]:
         with self._lock:
@@ -208,21 +194,13 @@ class ControllerState:
     def _travel(self, target: Pose, duration_s: float | None) -> bool:
         try:
             self.machine.move(target, duration_s)
-        except SoftLimitExceeded as refusal:
-            self._errors.append(str(refusal))
-            self._errors.append("invalid params in linear command")
-            return False
-        except KinematicsFailure:
-            self._errors.append("Linear move on line 0 fails kinematicsInverse")
-            self._errors.append("invalid params in linear command")
+        except MotionRefused as refusal:
+            self._errors.extend((str(refusal), "invalid params in linear command"))
             return False
         except HexacellError as error:
             self._errors.append(str(error))
             return False
         return True
-
-    def _overridden(self, duration_s: float | None) -> float | None:
-        return None if duration_s is None else duration_s * 100.0 / self.feed_override_percent
 
     def _home(self) -> bool:
         stops = self._abort_count
@@ -230,22 +208,6 @@ class ControllerState:
         self.homed = self._abort_count == stops
         return self.homed
 
-    def _switch_on(self) -> None:
-        try:
-            self.machine.switch_on()
-        except HexacellError as error:
-            self._errors.append(str(error))
-        else:
-            self.enabled = True
-
     def _switch_off(self) -> None:
         self.abort()
         self.enabled = False
-
-
-def _outcome(job: Future[bool]) -> bool:
-    """Whether a motion succeeded; an aborted one did, as in LinuxCNC."""
-    try:
-        return job.result()
-    except CancelledError:
-        return True

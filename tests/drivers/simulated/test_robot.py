@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.simulated.linuxcnc.state import KinematicsFailure
+from drivers.simulated.linuxcnc.state import MotionRefused
 from drivers.simulated.robot import LINE_STEPS
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
@@ -76,7 +76,7 @@ def test_moves_are_straight(twin) -> None:
 def test_a_pose_out_of_reach_is_refused_and_nothing_moves(twin, pose: Pose) -> None:
     twin.machine.move(TILTED)
     before, time_s = twin.physics.encoder_positions(), twin.clock.now()
-    with pytest.raises(KinematicsFailure, match="kinematicsInverse"):
+    with pytest.raises(MotionRefused, match="kinematicsInverse"):
         twin.machine.move(pose)
     assert twin.clock.now() == time_s
     assert np.array_equal(twin.physics.encoder_positions(), before)
@@ -84,7 +84,7 @@ def test_a_pose_out_of_reach_is_refused_and_nothing_moves(twin, pose: Pose) -> N
 
 
 def test_a_robot_moves_after_a_refused_pose(twin) -> None:
-    with pytest.raises(KinematicsFailure):
+    with pytest.raises(MotionRefused):
         twin.machine.move(Pose(0.0, 0.0, 2000.0))
     twin.machine.move(TILTED)
     assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)

@@ -11,8 +11,6 @@ from drivers.controllers.linuxcnc.protocol import (
     Response,
     encode_command,
     parse_explanation,
-    parse_homed,
-    parse_pose,
     parse_positions,
     parse_response,
     pose_difference,
@@ -147,7 +145,7 @@ def test_positions_beyond_the_sixth_belong_to_other_axes():
 
 
 def test_a_negative_zero_is_zero():
-    assert str(parse_pose("-0.000000 0 0 0 -0.0 0").x) == "0.0"
+    assert str(parse_positions("-0.000000 0 0 0 -0.0 0")[0]) == "0.0"
 
 
 @given(st.text() | st.lists(st.floats().map(str)).map(" ".join))
@@ -158,11 +156,6 @@ def test_positions_are_six_finite_numbers_or_refused(text):
         return
     assert len(positions) == 6
     assert all(abs(position) < float("inf") for position in positions)
-
-
-def test_homed_joints():
-    assert parse_homed("YES NO yes") == (True, False, True)
-    assert parse_homed("") == ()
 
 
 def test_the_pose_difference_ignores_full_turns_and_gives_the_largest_components():

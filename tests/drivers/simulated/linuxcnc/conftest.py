@@ -12,7 +12,7 @@ import pytest
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.simulated.linuxcnc.server import HOST, SimulatedController
-from drivers.simulated.linuxcnc.state import KinematicsFailure
+from drivers.simulated.linuxcnc.state import MotionRefused
 from hexacell.cell.controller import ControllerSettings
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, FileError
@@ -42,7 +42,7 @@ class FakeMachine:
     def move(self, pose: Pose, duration_s: float | None) -> None:
         self.durations_s.append(duration_s)
         if pose.z > 1000.0:
-            raise KinematicsFailure
+            raise MotionRefused("fails kinematicsInverse")
         if self.refusal:
             raise DeviceError(self.refusal)
         if self.ignored_moves:

@@ -44,7 +44,10 @@ class SimulatedSensors(ServedGroup):
         other_processes: bool,
     ) -> None:
         with ExitStack() as served:
-            self.gauges = served.enter_context(_gauge_bank(settings, simulation, physics, clock))
+            plungers = {gauge.name: partial(_plunger_mm, physics, gauge) for gauge in settings.gauges}
+            self.gauges = served.enter_context(
+                SimulatedGaugeBank(settings.gauges, plungers, simulation.gauges, clock)
+            )
             self.encoders = _encoder_bank(settings, simulation, physics, clock)
             served.enter_context(self.encoders)
             self._address: dict[str, Any] = {}
@@ -65,13 +68,6 @@ class SimulatedSensors(ServedGroup):
         )
 
 
-def _gauge_bank(
-    settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
-) -> SimulatedGaugeBank:
-    plungers = {gauge.name: partial(_plunger_position, physics, gauge) for gauge in settings.gauges}
-    return SimulatedGaugeBank(settings.gauges, plungers, simulation.gauges, clock)
-
-
 def _encoder_bank(
     settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
 ) -> SimulatedEncoderBank | SimulatedDbcBank | SimulatedModbusBank:
@@ -88,7 +84,7 @@ def _encoder_bank(
     return SimulatedEncoderBank(encoders, positions, clock, latency_s=latency_s)
 
 
-def _plunger_position(physics: RobotPhysics, gauge: GaugeSettings) -> float:
+def _plunger_mm(physics: RobotPhysics, gauge: GaugeSettings) -> float:
     """The position of one gauge's plunger, mm, in the instrument's own direction."""
     return gauge.mounting.reading(physics.gauge_displacement(gauge.axis))
 

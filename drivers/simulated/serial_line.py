@@ -1,4 +1,10 @@
-"""The device's end of a simulated serial line: a pseudo-terminal, or a TCP port of this machine."""
+"""The device's end of a simulated serial line: a pseudo-terminal, or a TCP port of this machine.
+
+One thread receives, what comes on the descriptors that are ready, possibly nothing; ``send`` may be
+called from another one, and what a full buffer does not take in time is lost, as on a cable. ``url`` is
+what ``serial.serial_for_url`` opens, the same after unplugging and plugging in again. ``connections`` is
+how many clients have connected; 0 where a connection cannot be noticed.
+"""
 
 from __future__ import annotations
 
@@ -14,52 +20,10 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Protocol
 
 CHUNK = 1024
 LOOPBACK = "127.0.0.1"
 NOT_IN_FILE_NAMES = re.compile(r"[^\w.-]+")
-
-
-class SerialLine(Protocol):
-    """Carries bytes to and from one client. Plugged in from the start.
-
-    One thread receives; ``send`` may be called from another one.
-    """
-
-    @property
-    def url(self) -> str:
-        """What ``serial.serial_for_url`` opens; the same after unplugging and plugging in again."""
-        ...
-
-    @property
-    def connections(self) -> int:
-        """How many clients have connected; 0 where a connection cannot be noticed."""
-        ...
-
-    def descriptors(self) -> list[int]:
-        """The file descriptors to wait on for input."""
-        ...
-
-    def receive(self, ready: Sequence[int]) -> bytes:
-        """The bytes that came on the descriptors that are ``ready``, possibly none."""
-        ...
-
-    def send(self, data: bytes, wait_s: float = 0.0) -> None:
-        """Send ``data``; what a full buffer does not take within ``wait_s`` is lost, as on a cable."""
-        ...
-
-    def unplug(self) -> None:
-        """Break the line: a client that has it open gets an error, and opening it fails."""
-        ...
-
-    def plug_in(self) -> None:
-        """Restore the line."""
-        ...
-
-    def close(self) -> None:
-        """Release everything."""
-        ...
 
 
 class PtyLine:
@@ -208,6 +172,9 @@ class SocketLine:
         if self._client is not None:
             self._client.close()
             self._client = None
+
+
+SerialLine = PtyLine | SocketLine
 
 
 def _write_or_drop(descriptor: int, data: bytes, wait_s: float) -> None:

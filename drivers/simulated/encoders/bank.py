@@ -25,6 +25,12 @@ JUMP = 400.0
 """By how much an encoder that jumps shows more, in the unit of the joint variables."""
 
 
+def shown_positions(settings: EncoderSettings, positions: Positions) -> list[float]:
+    """What each encoder shows now, from its own zero and in its own direction."""
+    places = zip(positions(), settings.offset, settings.direction, strict=True)
+    return [(position - offset) * direction for position, offset, direction in places]
+
+
 class SimulatedEncoderBank(Closeable):
     """Six encoders on a virtual CAN bus of their own.
 
@@ -42,6 +48,7 @@ class SimulatedEncoderBank(Closeable):
         vendors: Sequence[Vendor] | None = None,
     ) -> None:
         self.channel = f"hexacell-encoders-{uuid.uuid4().hex}"
+        self.bus_settings: dict[str, Any] = {"interface": "virtual", "channel": self.channel}
         self.bus = SimulatedCanBus(self.channel)
         self._settings = settings
         self._positions = positions
@@ -53,11 +60,12 @@ class SimulatedEncoderBank(Closeable):
         self._encoders = tuple(
             self._make(leg, serial_number) for leg, serial_number in enumerate(serial_numbers, 1)
         )
-        self._start()
-
-    @property
-    def bus_settings(self) -> dict[str, Any]:
-        return {"interface": "virtual", "channel": self.channel}
+        with self.bus.lock:
+            self._sample()
+            self.bus.subscribe(_SYNC, self._on_sync)
+            for encoder in self._encoders:
+                encoder.set_unplugged(on=False)
+        self.bus.start()
 
     def close(self) -> None:
         self.bus.close()
@@ -84,14 +92,6 @@ class SimulatedEncoderBank(Closeable):
         with self.bus.lock:
             switch(on=on)
 
-    def _start(self) -> None:
-        with self.bus.lock:
-            self._sample()
-            self.bus.subscribe(_SYNC, self._on_sync)
-            for encoder in self._encoders:
-                encoder.set_unplugged(on=False)
-        self.bus.start()
-
     def _make(self, leg: int, serial_number: int) -> SimulatedEncoder:
         settings = self._settings
         step = round(settings.step / NM)
@@ -112,13 +112,9 @@ class SimulatedEncoderBank(Closeable):
                     send()
 
     def _sample(self) -> None:
-        positions = self._positions()
-        for leg, (encoder, position) in enumerate(zip(self._encoders, positions, strict=True), 1):
-            encoder.sample(self._counts(leg, position))
-
-    def _counts(self, leg: int, position: float) -> int:
-        """The counts at a position; they wrap around at 32 bits."""
+        """Sample the counts of all encoders, which wrap around at 32 bits."""
         settings = self._settings
-        from_zero = (position - settings.offset[leg - 1]) * settings.direction[leg - 1]
-        counts = round(from_zero / settings.step) % _ALL_BITS
-        return counts - _ALL_BITS if settings.signed and counts >= _ALL_BITS // 2 else counts
+        for encoder, shown in zip(self._encoders, shown_positions(settings, self._positions), strict=True):
+            counts = round(shown / settings.step) % _ALL_BITS
+            is_negative = settings.signed and counts >= _ALL_BITS // 2
+            encoder.sample(counts - _ALL_BITS if is_negative else counts)

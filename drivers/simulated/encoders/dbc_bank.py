@@ -6,7 +6,7 @@ import uuid
 from typing import Any
 
 from drivers.encoders.dbc import PositionSignal, read_database
-from drivers.simulated.encoders.bank import JUMP, Positions
+from drivers.simulated.encoders.bank import JUMP, Positions, shown_positions
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
 from drivers.simulated.served_device import Closeable, Switch, setting
 from hexacell.cell.described_devices import DbcSettings
@@ -61,6 +61,7 @@ class SimulatedDbcBank(Closeable):
         if len(database.frames) < len(self._signals):
             raise FileError("legs share a message", subject=described.file, action="Give each leg its own")
         self.channel = f"hexacell-encoders-{uuid.uuid4().hex}"
+        self.bus_settings: dict[str, Any] = {"interface": "virtual", "channel": self.channel}
         self.bus = SimulatedCanBus(self.channel)
         self._encoders = tuple(SimulatedDbcEncoder(one, described.must_be) for one in self._signals)
         if described.request is None:
@@ -69,10 +70,6 @@ class SimulatedDbcBank(Closeable):
             asked = int(described.request.partition("#")[0], 16)
             self.bus.subscribe(asked, lambda _id, _data, _time: self._send())
         self.bus.start()
-
-    @property
-    def bus_settings(self) -> dict[str, Any]:
-        return {"interface": "virtual", "channel": self.channel}
 
     def faults(self, leg: int) -> dict[FaultKind, Switch]:
         encoder = self._encoders[leg - 1]
@@ -88,16 +85,8 @@ class SimulatedDbcBank(Closeable):
         self.bus.close()
 
     def _send(self) -> None:
-        settings = self._settings
-        places = zip(
-            self._signals,
-            self._encoders,
-            self._positions(),
-            settings.offset,
-            settings.direction,
-            strict=True,
-        )
-        for signal, encoder, position, offset, direction in places:
-            data = encoder.frame((position - offset) * direction)
+        positions = shown_positions(self._settings, self._positions)
+        for signal, encoder, position in zip(self._signals, self._encoders, positions, strict=True):
+            data = encoder.frame(position)
             if not encoder.is_silent:
                 self.bus.send_message(signal.frame.number, data)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
 
-from drivers.simulated.encoders.bank import JUMP, Positions
+from drivers.simulated.encoders.bank import JUMP, Positions, shown_positions
 from drivers.simulated.gauges.instruments import Instrument
 from drivers.simulated.gauges.modbus import BROADCAST, WRITE_REGISTER, answer, refusal, split_requests
 from drivers.simulated.gauges.server import LATE_TIMEOUTS, GaugeLineServer, LineFault, LineFaults
@@ -130,28 +130,25 @@ class SimulatedModbusBank(Closeable):
         self._served.close()
 
     def _counts(self) -> list[int]:
-        positions = self._positions()
-        return [self._count(leg, position) for leg, position in enumerate(positions, 1)]
+        return [self._count(leg, shown) for leg, shown in enumerate(self._shown())]
 
-    def _count(self, leg: int, position: float) -> int:
-        scale, step = self._faulty[leg - 1], self._settings.step
+    def _count(self, place: int, shown: float) -> int:
+        scale = self._faulty[place]
         if scale.is_invalid:
             return self.described.invalid[0]
         if scale.frozen is not None:
             return scale.frozen
         sign = -1 if scale.is_reversed else 1
-        return round(sign * (self._shown(leg, position) + scale.shift) / step)
+        return round(sign * (shown + scale.shift) / self._settings.step)
 
-    def _shown(self, leg: int, position: float) -> float:
-        return (position - self._settings.offset[leg - 1]) * self._settings.direction[leg - 1]
+    def _shown(self) -> list[float]:
+        return shown_positions(self._settings, self._positions)
 
     def _set_silent(self, leg: int, *, on: bool) -> None:
         (self._scales.silent_legs.add if on else self._scales.silent_legs.discard)(leg)
 
     def _set_zeroed(self, leg: int, *, on: bool) -> None:
-        now = self._shown(leg, self._positions()[leg - 1])
-        self._faulty[leg - 1].shift = -now if on else 0.0
+        self._faulty[leg - 1].shift = -self._shown()[leg - 1] if on else 0.0
 
     def _set_frozen(self, leg: int, *, on: bool) -> None:
-        scale = self._faulty[leg - 1]
-        scale.frozen = self._count(leg, self._positions()[leg - 1]) if on else None
+        self._faulty[leg - 1].frozen = self._counts()[leg - 1] if on else None

@@ -177,11 +177,10 @@ class SimulatedEncoder:
     def _frames(self, number: int) -> Iterator[tuple[int, bytes]]:
         cob_id = self._value(0x1800 + number - 1, 1)
         if not cob_id & object_dictionary.TPDO_OFF:
-            yield cob_id & 0x7FF, self._mapped_data(0x1A00 + number - 1)
-
-    def _mapped_data(self, mapping: int) -> bytes:
-        slots = (self._value(mapping, slot) for slot in range(1, self._value(mapping, 0) + 1))
-        return b"".join(self._node.get_data(slot >> 16, slot >> 8 & 0xFF) for slot in slots)
+            mapping = 0x1A00 + number - 1
+            slots = (self._value(mapping, slot) for slot in range(1, self._value(mapping, 0) + 1))
+            data = b"".join(self._node.get_data(slot >> 16, slot >> 8 & 0xFF) for slot in slots)
+            yield cob_id & 0x7FF, data
 
     def _value(self, index: int, subindex: int) -> int:
         return int.from_bytes(self._node.get_data(index, subindex), "little")
@@ -205,12 +204,10 @@ class SimulatedEncoder:
         self._event_timers.clear()
 
     def _read_position(self, index: int, subindex: int, **_: object) -> int | None:
-        if index == object_dictionary.POSITION or (index, subindex) == (
-            object_dictionary.POSITION_OF_MAGNET,
-            1,
-        ):
-            return self.counts
-        return None
+        is_position = index == object_dictionary.POSITION or (
+            index == object_dictionary.POSITION_OF_MAGNET and subindex == 1
+        )
+        return self.counts if is_position else None
 
     def _check_pdo_rules(self, index: int, subindex: int, od: ODVariable, data: bytes) -> None:
         """CiA 301: PDOs are changed in PRE-OPERATIONAL, COB-ID and mapping only while off."""
@@ -219,19 +216,15 @@ class SimulatedEncoder:
             raise SdoAbortedError(_NOT_NOW)
         value = int.from_bytes(data, "little")
         if 0x1800 <= index < 0x1A00 and subindex == 1:
-            self._check_cob_id(self._value(index, 1), value)
+            old = self._value(index, 1)
+            if not (old | value) & object_dictionary.TPDO_OFF and old != value:
+                raise SdoAbortedError(_WRONG_VALUE)
         if 0x1A00 <= index < 0x1C00:
             self._check_mapping(index, subindex)
-
-    def _check_cob_id(self, old: int, new: int) -> None:
-        both_on = not (old | new) & object_dictionary.TPDO_OFF
-        if both_on and old != new:
-            raise SdoAbortedError(_WRONG_VALUE)
 
     def _check_mapping(self, index: int, subindex: int) -> None:
         if not self._vendor.mapping_writable:
             raise SdoAbortedError(_READ_ONLY)
-        if not self._value(index - 0x200, 1) & object_dictionary.TPDO_OFF:
-            raise SdoAbortedError(_NOT_NOW)
-        if subindex and self._value(index, 0):
+        is_on = not self._value(index - 0x200, 1) & object_dictionary.TPDO_OFF
+        if is_on or (subindex and self._value(index, 0)):
             raise SdoAbortedError(_NOT_NOW)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from canopen.objectdictionary import ObjectDictionary, ODRecord, ODVariable
 from canopen.objectdictionary.datatypes import INTEGER16, INTEGER32, UNSIGNED8, UNSIGNED16, UNSIGNED32
@@ -75,92 +76,76 @@ TPDO_OFF = 1 << 31
 MAPPING_SLOTS = 8
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
-    index: int
-    subindex: int
-    name: str
-    kind: int
-    value: int
-    access: str = "ro"
+_Row = tuple[int, int, str, int, int, str]
+"""Index, subindex, name, data type, default value and access of an object."""
 
 
 def build(vendor: Vendor, data: DeviceData) -> ObjectDictionary:
     """The object dictionary of a device after power-on."""
     dictionary = ObjectDictionary()  # type: ignore[no-untyped-call]
-    position = INTEGER32 if data.signed else UNSIGNED32
-    rows = [*_communication(vendor, data.serial_number), *_profile(vendor, data.step, position)]
-    for number, tpdo in enumerate(vendor.tpdos, 1):
-        rows += _tpdo(number, tpdo, data.node)
-    for row in rows:
-        _add(dictionary, row)
+    tpdos = (_tpdo(number, tpdo, data.node) for number, tpdo in enumerate(vendor.tpdos, 1))
+    for index, subindex, name, kind, value, access in chain(_objects(vendor, data), *tpdos):
+        variable = ODVariable(name, index, subindex)
+        variable.data_type, variable.default, variable.access_type = kind, value, access
+        if subindex == 0 and index not in _RECORDS:
+            dictionary.add_object(variable)
+            continue
+        if index not in dictionary:
+            dictionary.add_object(ODRecord(f"record {index:04X}h", index))
+        record = dictionary[index]
+        assert isinstance(record, ODRecord)  # noqa: S101 - for the type checker
+        record.add_member(variable)
     return dictionary
 
 
-def _communication(vendor: Vendor, serial_number: int) -> Iterator[_Row]:
-    yield _Row(0x1000, 0, "device type", UNSIGNED32, vendor.device_type)
-    yield _Row(ERROR_REGISTER, 0, "error register", UNSIGNED8, 0)
-    yield _Row(0x1017, 0, "producer heartbeat time", UNSIGNED16, 0, "rw")
-    yield _Row(SYNC_COUNTER, 0, "overflow of the counter in SYNC", UNSIGNED8, 0, "rw")
-    yield _Row(0x1018, 0, "number of identity entries", UNSIGNED8, 4)
-    yield _Row(0x1018, 1, "vendor", UNSIGNED32, 0x0000_0406)
-    yield _Row(0x1018, 2, "product code", UNSIGNED32, vendor.device_type >> 16)
-    yield _Row(0x1018, 3, "revision", UNSIGNED32, 0x0001_0000)
-    yield _Row(0x1018, 4, "serial number in identity", UNSIGNED32, serial_number)
-    yield _Row(0x650B, 0, "serial number", UNSIGNED32, serial_number)
-
-
-def _profile(vendor: Vendor, step: int, position: int) -> Iterator[_Row]:
-    yield _Row(OPERATING_PARAMETERS, 0, "operating parameters", UNSIGNED16, 0, "rw")
+def _objects(vendor: Vendor, data: DeviceData) -> Iterator[_Row]:
+    """The objects of communication, and those of the profile."""
+    position, step = INTEGER32 if data.signed else UNSIGNED32, data.step
+    yield (0x1000, 0, "device type", UNSIGNED32, vendor.device_type, "ro")
+    yield (ERROR_REGISTER, 0, "error register", UNSIGNED8, 0, "ro")
+    yield (0x1017, 0, "producer heartbeat time", UNSIGNED16, 0, "rw")
+    yield (SYNC_COUNTER, 0, "overflow of the counter in SYNC", UNSIGNED8, 0, "rw")
+    yield (0x1018, 0, "number of identity entries", UNSIGNED8, 4, "ro")
+    yield (0x1018, 1, "vendor", UNSIGNED32, 0x0000_0406, "ro")
+    yield (0x1018, 2, "product code", UNSIGNED32, vendor.device_type >> 16, "ro")
+    yield (0x1018, 3, "revision", UNSIGNED32, 0x0001_0000, "ro")
+    yield (0x1018, 4, "serial number in identity", UNSIGNED32, data.serial_number, "ro")
+    yield (0x650B, 0, "serial number", UNSIGNED32, data.serial_number, "ro")
+    yield (OPERATING_PARAMETERS, 0, "operating parameters", UNSIGNED16, 0, "rw")
     if vendor.magnets == 1:
-        yield _Row(POSITION, 0, "position", position, 0)
+        yield (POSITION, 0, "position", position, 0, "ro")
     else:
-        yield _Row(POSITION_OF_MAGNET, 0, "number of magnets", UNSIGNED8, vendor.magnets)
+        yield (POSITION_OF_MAGNET, 0, "number of magnets", UNSIGNED8, vendor.magnets, "ro")
         for magnet in range(1, vendor.magnets + 1):
-            yield _Row(POSITION_OF_MAGNET, magnet, f"position of magnet {magnet}", position, 0)
+            yield (POSITION_OF_MAGNET, magnet, f"position of magnet {magnet}", position, 0, "ro")
     if vendor.is_rotary:
-        yield _Row(0x6001, 0, "measuring units per revolution", UNSIGNED32, step)
+        yield (0x6001, 0, "measuring units per revolution", UNSIGNED32, step, "ro")
     elif vendor.step_in_6005:
-        yield _Row(0x6005, 0, "number of step settings", UNSIGNED8, 2)
-        yield _Row(0x6005, 1, "position step", UNSIGNED32, step)
-        yield _Row(0x6005, 2, "speed step", UNSIGNED32, 100)
-    yield _Row(0x6030, 0, "number of speeds", UNSIGNED8, 1)
-    yield _Row(0x6030, 1, "speed", INTEGER16, 0)
-    yield _Row(MEASURING_STEP, 0, "measuring step", UNSIGNED32, step)
-    yield _Row(ALARMS, 0, "alarms", UNSIGNED16, 0)
-    yield _Row(0x6504, 0, "supported alarms", UNSIGNED16, 1)
-    yield _Row(WARNINGS, 0, "warnings", UNSIGNED16, 0)
-    yield _Row(OFFSET, 0, "offset", INTEGER32, 0)
+        yield (0x6005, 0, "number of step settings", UNSIGNED8, 2, "ro")
+        yield (0x6005, 1, "position step", UNSIGNED32, step, "ro")
+        yield (0x6005, 2, "speed step", UNSIGNED32, 100, "ro")
+    yield (0x6030, 0, "number of speeds", UNSIGNED8, 1, "ro")
+    yield (0x6030, 1, "speed", INTEGER16, 0, "ro")
+    yield (MEASURING_STEP, 0, "measuring step", UNSIGNED32, step, "ro")
+    yield (ALARMS, 0, "alarms", UNSIGNED16, 0, "ro")
+    yield (0x6504, 0, "supported alarms", UNSIGNED16, 1, "ro")
+    yield (WARNINGS, 0, "warnings", UNSIGNED16, 0, "ro")
+    yield (OFFSET, 0, "offset", INTEGER32, 0, "ro")
 
 
 def _tpdo(number: int, tpdo: TpdoDefaults, node: int) -> Iterator[_Row]:
     parameter, mapping = 0x1800 + number - 1, 0x1A00 + number - 1
     cob_id = 0x80 + 0x100 * number + node
     off = 0 if tpdo.enabled else TPDO_OFF
-    yield _Row(parameter, 0, f"entries of TPDO {number}", UNSIGNED8, 5)
-    yield _Row(parameter, 1, "COB-ID", UNSIGNED32, cob_id | off, "rw")
-    yield _Row(parameter, 2, "transmission type", UNSIGNED8, tpdo.transmission_type, "rw")
-    yield _Row(parameter, 3, "inhibit time", UNSIGNED16, 0, "rw")
-    yield _Row(parameter, 5, "event timer", UNSIGNED16, tpdo.event_timer_ms, "rw")
-    yield _Row(mapping, 0, f"mapped entries of TPDO {number}", UNSIGNED8, len(tpdo.mapping), "rw")
+    yield (parameter, 0, f"entries of TPDO {number}", UNSIGNED8, 5, "ro")
+    yield (parameter, 1, "COB-ID", UNSIGNED32, cob_id | off, "rw")
+    yield (parameter, 2, "transmission type", UNSIGNED8, tpdo.transmission_type, "rw")
+    yield (parameter, 3, "inhibit time", UNSIGNED16, 0, "rw")
+    yield (parameter, 5, "event timer", UNSIGNED16, tpdo.event_timer_ms, "rw")
+    yield (mapping, 0, f"mapped entries of TPDO {number}", UNSIGNED8, len(tpdo.mapping), "rw")
     slots = [index << 16 | subindex << 8 | bits for index, subindex, bits in tpdo.mapping]
     for slot, value in enumerate(slots + [0] * (MAPPING_SLOTS - len(slots)), 1):
-        yield _Row(mapping, slot, f"slot {slot}", UNSIGNED32, value, "rw")
-
-
-def _add(dictionary: ObjectDictionary, row: _Row) -> None:
-    variable = ODVariable(row.name, row.index, row.subindex)
-    variable.data_type = row.kind
-    variable.default = row.value
-    variable.access_type = row.access
-    if row.subindex == 0 and row.index not in _RECORDS:
-        dictionary.add_object(variable)
-        return
-    if row.index not in dictionary:
-        dictionary.add_object(ODRecord(f"record {row.index:04X}h", row.index))
-    record = dictionary[row.index]
-    assert isinstance(record, ODRecord)  # noqa: S101 - for the type checker
-    record.add_member(variable)
+        yield (mapping, slot, f"slot {slot}", UNSIGNED32, value, "rw")
 
 
 _RECORDS = {0x1018, 0x6005, 0x6020, 0x6030, *range(0x1800, 0x1804), *range(0x1A00, 0x1A04)}

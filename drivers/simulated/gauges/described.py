@@ -29,10 +29,7 @@ class ByRequest(SingleIndicator):
 
     def answer(self, command: bytes) -> bytes:
         """The value; commands come without their line end."""
-        return self._reply(command.decode("latin-1")) if self.indicator.powered else b""
-
-    def _reply(self, command: str) -> bytes:
-        if command.encode("latin-1") != self._asked.rstrip(b"\r\n"):
+        if not self.indicator.powered or command != self._asked.rstrip(b"\r\n"):
             return b""
         shown = self.indicator.shown()
         return self.at_end if shown is None else self._template.filled(shown, 1)
@@ -46,10 +43,6 @@ class Streaming(Instrument):
     def __init__(self, indicators: Mapping[int, Indicator], described: StreamSettings) -> None:
         super().__init__(indicators)
         self._template = _Template(described)
-
-    def answer(self, command: bytes) -> bytes:
-        del command
-        return b""
 
     def _value(self, channel: int) -> bytes:
         shown = self.indicators[channel].shown()

@@ -5,7 +5,6 @@ An instrument is announced in the entry point group ``hexacell.simulated_gauges`
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from math import copysign
 from typing import ClassVar
@@ -102,7 +101,7 @@ class Indicator:
         return (-position if self.reversed else position) + self._offset_mm
 
 
-class Instrument(ABC):
+class Instrument:
     """An indicator, or a multiplexer with several, that answers commands.
 
     ``indicators`` are by channel, counted from 1; all but a multiplexer have channel 1 only.
@@ -135,9 +134,10 @@ class Instrument(ABC):
         *commands, rest = received.split(self.command_end)
         return [command.strip(b"\n") for command in commands], rest
 
-    @abstractmethod
     def answer(self, command: bytes) -> bytes:
-        """The answer to ``command``, without its end."""
+        """The answer to ``command``, without its end; nothing from those that send by themselves."""
+        del command
+        return b""
 
     def unasked(self) -> tuple[bytes, ...]:
         """What it sends each period, of all its indicators that are on."""
@@ -171,6 +171,7 @@ class SingleIndicator(Instrument):
         """The value, a setting, or what the protocol answers to a command."""
         return self._reply(command.decode("ascii", "replace")) if self.indicator.powered else b""
 
-    @abstractmethod
     def _reply(self, command: str) -> bytes:
-        """The answer while it is on."""
+        """The answer while it is on: to any command the value, if the protocol knows no others."""
+        del command
+        return self._value(1)

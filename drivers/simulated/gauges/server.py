@@ -72,7 +72,7 @@ class LineFaults:
         unchanged, before = answer, self._latest
         is_whole = self._answers % DAMAGED_EVERY != 0
         changes: dict[LineFault, Callable[[bytes], bytes]] = {
-            LineFault.DAMAGED: self._damaged,
+            LineFault.DAMAGED: lambda sent: sent if is_whole else self._damaged(sent),
             LineFault.CUT_SHORT: lambda sent: sent if is_whole else sent[: len(sent) // 2],
             LineFault.REPEATED: lambda sent: sent + unchanged,
             LineFault.UNASKED: lambda sent: before + sent,
@@ -87,9 +87,7 @@ class LineFaults:
         return answer
 
     def _damaged(self, answer: bytes) -> bytes:
-        """One bit of each fifth answer is another."""
-        if self._answers % DAMAGED_EVERY:
-            return answer
+        """One bit is another."""
         place = int(self._random.integers(len(answer)))
         changed = answer[place] ^ 1 << int(self._random.integers(7))
         return answer[:place] + bytes((changed,)) + answer[place + 1 :]
@@ -141,7 +139,12 @@ class GaugeLineServer(Closeable):
 
     def switch_on(self, channel: int = 1) -> None:
         """Switch an indicator on again; the instrument sends its introduction."""
-        self._run_on_thread(lambda: self._switch_on(channel))
+
+        def switch_on() -> None:
+            self.instrument.indicators[channel].switch_on()
+            self._line.send(self.instrument.introduction)
+
+        self._run_on_thread(switch_on)
 
     def close(self) -> None:
         if self._stopping:
@@ -172,7 +175,7 @@ class GaugeLineServer(Closeable):
     def _serve_until_stopped(self) -> None:
         while not self._stopping:
             watched = [self._wake_read, *self._line.descriptors()]
-            ready, _, _ = select.select(watched, [], [], self._until_next_answer_s())
+            ready, _, _ = select.select(watched, [], [], self._until_next_s())
             if self._wake_read in ready:
                 os.read(self._wake_read, COMMAND_LIMIT)
                 self._do_jobs()
@@ -206,7 +209,7 @@ class GaugeLineServer(Closeable):
         free_at = max([self._clock.now(), *(due for due, _ in self._answers)])
         self._answers.append((free_at + self._latency_s + late_s + wire_s, answer))
 
-    def _until_next_answer_s(self) -> float | None:
+    def _until_next_s(self) -> float | None:
         times = [due for due, _ in self._answers][:1]
         if self._next_unasked is not None:
             times.append(self._next_unasked)
@@ -226,10 +229,6 @@ class GaugeLineServer(Closeable):
         for frame in () if self._silent else self.instrument.unasked():
             sent = self.faults.sent(b"", frame)
             self._answers.append((now + len(sent) * self._byte_s, sent))
-
-    def _switch_on(self, channel: int) -> None:
-        self.instrument.indicators[channel].switch_on()
-        self._line.send(self.instrument.introduction)
 
     def _unplug(self) -> None:
         self._received = b""

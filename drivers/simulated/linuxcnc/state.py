@@ -53,9 +53,9 @@ class MotionRefused(Exception):
 class Machine(Protocol):
     """The machine behind the controller, called from several threads.
 
-    ``move`` and ``home`` return when that has ended or was stopped; meanwhile, any other method may be called
-    from another thread. ``move`` takes no less than ``duration_s``, or raises ``MotionRefused``. The geometry
-    is read by ``switch_on`` only; if it raises ``HexacellError``, the machine stays off.
+    ``move`` and ``home`` return when that has ended or was stopped; meanwhile, any other method may be
+    called from another thread. ``move`` takes no less than ``duration_s``, or raises ``MotionRefused``.
+    The geometry is read by ``switch_on`` only; if it raises ``HexacellError``, the machine stays off.
     """
 
     def move(self, pose: Pose, duration_s: float | None) -> None: ...
@@ -163,10 +163,7 @@ class ControllerState:
         """
         try:
             parsed = parse_block(block, self.machine.pose(), self.modes)
-            if not self.homed:
-                raise BlockError("Can't issue MDI command when not homed")
-            if self.mode is not TaskMode.MDI:
-                raise BlockError("Must be in MDI mode to issue MDI command")
+            self._require_mdi()
         except BlockError as error:
             self._errors.append(str(error))
             return self.wait_mode is WaitMode.RECEIVED
@@ -182,6 +179,12 @@ class ControllerState:
         with suppress(CancelledError):
             return job.result()
         return True  # an aborted motion succeeds, as in LinuxCNC
+
+    def _require_mdi(self) -> None:
+        if not self.homed:
+            raise BlockError("Can't issue MDI command when not homed")
+        if self.mode is not TaskMode.MDI:
+            raise BlockError("Must be in MDI mode to issue MDI command")
 
     def _start(self, motion: Callable[[], bool]) -> Future[bool]:
         with self._lock:

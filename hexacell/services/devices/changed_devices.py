@@ -13,7 +13,7 @@ from dataclasses import replace
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.loader import Cell
 from hexacell.errors import HexacellError
-from hexacell.runs.run_folder import RunFolder, run_folders
+from hexacell.runs.run_folder import run_folders
 from procedures.journal.line_format import decode
 from procedures.steps import events
 
@@ -27,37 +27,31 @@ COMPARED = {
 
 
 def with_changes(cell: Cell, found: Iterable[DeviceIdentity]) -> tuple[DeviceIdentity, ...]:
-    """Devices as found, each with a remark on what differs from the last run that can be read."""
+    """Devices as found, each with a remark on what differs from the last run that can be read.
+
+    What the earlier run did not know is no change. The name of a run is its time.
+    """
     run, known = _last(cell)
-    return tuple(_remarked(one, known.get(one.name), run) for one in found)
+    remarked = []
+    for now in found:
+        changes = []
+        for field, word in COMPARED.items():
+            before, after = getattr(known.get(now.name), field, None), getattr(now, field)
+            if before and before != after:
+                changes.append(f"{word} {after or 'none'}, which was {before}")
+        if changes:
+            remark = f"since the run {run}: {', '.join(changes)}"
+            remarked.append(replace(now, remark="; ".join(filter(None, (now.remark, remark)))))
+        else:
+            remarked.append(now)
+    return tuple(remarked)
 
 
 def _last(cell: Cell) -> tuple[str, dict[str, DeviceIdentity]]:
-    """The name of the last run, which its time is, and the devices with which it began."""
-    for folder in reversed(run_folders(cell)):
-        started = _started(folder)
-        if started is not None and started.devices:
-            return folder.name, {one.name: one for one in started.devices}
+    """The name of the last run whose first event can be read, and the devices with which it began."""
+    for run in reversed(run_folders(cell)):
+        with suppress(OSError, HexacellError), run.journal.open("rb") as journal:
+            entry = decode(journal.readline(), run.journal, 1)
+            if entry is not None and isinstance(entry.event, events.RunStarted) and entry.event.devices:
+                return run.name, {one.name: one for one in entry.event.devices}
     return "", {}
-
-
-def _started(run: RunFolder) -> events.RunStarted | None:
-    """The first event of a run; None where it cannot be read."""
-    with suppress(OSError, HexacellError), run.journal.open("rb") as journal:
-        entry = decode(journal.readline(), run.journal, 1)
-        if entry is not None and isinstance(entry.event, events.RunStarted):
-            return entry.event
-    return None
-
-
-def _remarked(now: DeviceIdentity, then: DeviceIdentity | None, run: str) -> DeviceIdentity:
-    """A device with its changes in words; what the earlier run did not know is no change."""
-    changes = []
-    for field, word in COMPARED.items():
-        before, after = getattr(then, field, None), getattr(now, field)
-        if before and before != after:
-            changes.append(f"{word} {after or 'none'}, which was {before}")
-    if not changes:
-        return now
-    remark = f"since the run {run}: {', '.join(changes)}"
-    return replace(now, remark="; ".join(filter(None, (now.remark, remark))))

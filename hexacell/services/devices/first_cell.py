@@ -39,58 +39,34 @@ HELD_OUT_OFFSETS = ((-0.5, -0.25, -0.5), (0.5, 0.5, 0.0), (0.0, -0.5, 0.25))
 """Places of the ball, in units of its largest distance from the middle: as in Table 3 of the paper."""
 
 Document = dict[str, Any]
-Setting = Callable[[Document, str], None]
-"""Puts an answer into a document; raises ``ValueError`` with what is expected."""
 
 
 @dataclass(frozen=True, slots=True)
 class CellAnswer:
-    """One thing that is asked: where its answer belongs, how it gets there, and what it is by default."""
+    """One thing that is asked.
+
+    Attributes:
+        path: where the answer belongs.
+        default: the answer that is proposed.
+        read: makes the value at the path of it, or raises ``ValueError`` with what is expected.
+        put: enters an answer with more than this one value into a document, instead.
+    """
 
     name: str
     path: KeyPath
-    put: Setting
     default: str
+    read: Callable[[str], object] = str.strip
+    put: Callable[[Document, str], None] | None = None
 
-
-def machine_answers() -> Iterator[CellAnswer]:
-    """The robot and its controller; its config comes before."""
-    yield CellAnswer("tolerance", ("tolerances", "S_mm"), _put_tolerance, "7")
-    yield CellAnswer("host", ("controller", "host"), putting(("controller", "host")), "127.0.0.1")
-    yield CellAnswer("port", ("controller", "port"), putting(("controller", "port"), _whole), "5007")
-    yield CellAnswer("sliders", ("limits", "joint_min_mm"), _put_sliders, "-800 800")
-
-
-def gauge_answers(number: int) -> Iterator[CellAnswer]:
-    """One gauge: what it speaks, where, and which way it counts."""
-    axis, place = GAUGE_AXES[number], ("gauges", number)
-    yield CellAnswer(
-        f"protocol {axis}", (*place, "protocol"), putting((*place, "protocol"), _protocol), "sylvac"
-    )
-    yield CellAnswer(f"port {axis}", (*place, "port"), putting((*place, "port")), f"/dev/ttyUSB{number}")
-    yield CellAnswer(f"sign {axis}", (*place, "sign"), putting((*place, "sign"), _sign), "yes")
-
-
-def other_answers() -> Iterator[CellAnswer]:
-    """Encoders, gauges' plates, and where to measure."""
-    yield CellAnswer("bus", ("encoders", "bus"), _put_bus, "socketcan can0")
-    yield CellAnswer("nodes", ("encoders", "nodes"), putting(("encoders", "nodes"), _six), "1 2 3 4 5 6")
-    yield CellAnswer(
-        "plates", ("limits", "gauge_travel_mm"), putting(("limits", "gauge_travel_mm"), _number), "5"
-    )
-    yield CellAnswer("points", ("identification", "points"), _put_points, "0 0 550 200")
-
-
-def putting(path: KeyPath, read: Callable[[str], object] = str.strip) -> Setting:
-    """A setting that reads an answer and puts it at a path."""
-
-    def put(document: Document, given: str) -> None:
+    def enter(self, document: Document, given: str) -> None:
+        """Put an answer into a document; raises ``ValueError`` with what is expected."""
+        if self.put is not None:
+            self.put(document, given)
+            return
         place: Any = document
-        for key in path[:-1]:
+        for key in self.path[:-1]:
             place = place[key]
-        place[path[-1]] = read(given)
-
-    return put
+        place[self.path[-1]] = self.read(given)
 
 
 def _number(given: str) -> float:
@@ -112,10 +88,6 @@ def _numbers(given: str, count: int, names: str) -> list[float]:
     if len(words) != count:
         raise ValueError(f"{count} numbers are expected: {names}")
     return [_number(word) for word in words]
-
-
-def _six(given: str) -> list[int]:
-    return [int(number) for number in _numbers(given, 6, "the node of each leg")]
 
 
 def _protocol(given: str) -> str:
@@ -156,6 +128,14 @@ def _put_points(document: Document, given: str) -> None:
         document[section]["points"] = points
 
 
+def _gauge_answers(number: int) -> Iterator[CellAnswer]:
+    """One gauge: what it speaks, where, and which way it counts."""
+    axis, place = GAUGE_AXES[number], ("gauges", number)
+    yield CellAnswer(f"protocol {axis}", (*place, "protocol"), "sylvac", _protocol)
+    yield CellAnswer(f"port {axis}", (*place, "port"), f"/dev/ttyUSB{number}")
+    yield CellAnswer(f"sign {axis}", (*place, "sign"), "yes", _sign)
+
+
 @dataclass(frozen=True)
 class FoundKeys:
     """Keys of a cell file whose values devices reported."""
@@ -177,13 +157,23 @@ class CellDraft:
 
     def answers(self) -> tuple[CellAnswer, ...]:
         """All that is asked, in order."""
-        config = CellAnswer("config", ("controller", "config"), self._put_config, self._likely_config())
         return (
-            CellAnswer("name", ("name",), putting(("name",)), self.path.stem[:40]),
-            config,
-            *machine_answers(),
-            *(answer for number in range(len(GAUGE_AXES)) for answer in gauge_answers(number)),
-            *other_answers(),
+            CellAnswer("name", ("name",), self.path.stem[:40]),
+            CellAnswer("config", ("controller", "config"), self._likely_config(), put=self._put_config),
+            CellAnswer("tolerance", ("tolerances", "S_mm"), "7", put=_put_tolerance),
+            CellAnswer("host", ("controller", "host"), "127.0.0.1"),
+            CellAnswer("port", ("controller", "port"), "5007", _whole),
+            CellAnswer("sliders", ("limits", "joint_min_mm"), "-800 800", put=_put_sliders),
+            *(answer for number in range(len(GAUGE_AXES)) for answer in _gauge_answers(number)),
+            CellAnswer("bus", ("encoders", "bus"), "socketcan can0", put=_put_bus),
+            CellAnswer(
+                "nodes",
+                ("encoders", "nodes"),
+                "1 2 3 4 5 6",
+                lambda given: [int(number) for number in _numbers(given, 6, "the node of each leg")],
+            ),
+            CellAnswer("plates", ("limits", "gauge_travel_mm"), "5", _number),
+            CellAnswer("points", ("identification", "points"), "0 0 550 200", put=_put_points),
         )
 
     def problem(self, name: str, given: str) -> str:
@@ -198,8 +188,11 @@ class CellDraft:
         try:
             validated(document, cell_model(DEFAULT_MECHANISM), self.path)
         except HexacellError as error:
+            # What it says of this answer, or of its section, by their lines.
             lines = {document.line_of(answer.path), document.line_of(answer.path[:-1])}
-            return _about(error, lines)
+            for one in flatten_errors(error):
+                if isinstance(one, FileError) and one.line in lines:
+                    return one.problem if one.action is None else f"{one.problem}. {one.action}"
         return ""
 
     def write(self) -> None:
@@ -221,16 +214,27 @@ class CellDraft:
 
     def _text(self, given: dict[str, str]) -> str:
         """The file; raises ``ValueError`` where an answer cannot be read."""
-        document = _beginning()
+        bundled: Document = tomllib.loads(bundled_config("simulated-hexaglide").read_text())
+        document: Document = {
+            "version": 1,
+            "name": "",
+            "controller": {"config": "robot.toml"},
+            "gauges": [{"name": axis, "axis": axis, "protocol": "sylvac"} for axis in GAUGE_AXES],
+            "encoders": {"protocol": "cia406"},
+            "tolerances": {},
+            "identification": {"points": []},
+            "verification": {"points": []},
+            **{name: bundled[name] for name in KEPT_SECTIONS},
+        }
         for gauge, keys in zip(document["gauges"], self.found.gauges, strict=False):
             gauge.update(keys)
         document["encoders"] |= self.found.encoders
         for answer in self.answers():
             if answer.name in given:
-                answer.put(document, given[answer.name])
+                answer.enter(document, given[answer.name])
             else:
                 with suppress(ValueError):  # it is asked later
-                    answer.put(document, answer.default)
+                    answer.enter(document, answer.default)
         return HEADER + tomlkit.dumps(document)
 
     def _put_config(self, document: Document, given: str) -> None:
@@ -244,43 +248,14 @@ class CellDraft:
 
     def _likely_config(self) -> str:
         """The only file beside it that is a controller's config, or a usual name."""
-        found = [path.name for path in sorted(self.path.parent.glob("*.toml")) if _is_config(path)]
+        found = []
+        for path in sorted(self.path.parent.glob("*.toml")):
+            with suppress(HexacellError):
+                _config_format().read(path)
+                found.append(path.name)
         return found[0] if len(found) == 1 else "robot.toml"
-
-
-def _beginning() -> Document:
-    """What every first cell has."""
-    bundled: dict[str, Any] = tomllib.loads(bundled_config("simulated-hexaglide").read_text())
-    kept = {name: bundled[name] for name in KEPT_SECTIONS}
-    return {
-        "version": 1,
-        "name": "",
-        "controller": {"config": "robot.toml"},
-        "gauges": [{"name": axis, "axis": axis, "protocol": "sylvac"} for axis in GAUGE_AXES],
-        "encoders": {"protocol": "cia406"},
-        "tolerances": {},
-        "identification": {"points": []},
-        "verification": {"points": []},
-        **kept,
-    }
 
 
 def _config_format() -> NativeToml:
     mechanism: Mechanism = load(Group.MECHANISMS, DEFAULT_MECHANISM)()
     return NativeToml(mechanism.parameters)
-
-
-def _is_config(path: Path) -> bool:
-    try:
-        _config_format().read(path)
-    except HexacellError:
-        return False
-    return True
-
-
-def _about(error: HexacellError, lines: set[int | None]) -> str:
-    """What an error says of an answer, or of its section, by their lines; empty for errors elsewhere."""
-    for one in flatten_errors(error):
-        if isinstance(one, FileError) and one.line in lines:
-            return one.problem if one.action is None else f"{one.problem}. {one.action}"
-    return ""

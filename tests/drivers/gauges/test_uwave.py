@@ -11,7 +11,7 @@ from drivers.gauges.uwave import UwaveGauge, channel_of
 from drivers.interfaces import GaugeReading
 from drivers.serial.opening import SLICE_S
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.displays import Uwave
+from drivers.simulated.gauges.indicators import Uwave
 from hexacell.cell.devices import GaugeSettings
 from tests.drivers.gauges.streaming_line import StreamingLine
 

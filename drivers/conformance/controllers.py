@@ -6,7 +6,7 @@ import asyncio
 from abc import abstractmethod
 from typing import Protocol
 
-from drivers.conformance.suite import Suite, failure, require_named
+from drivers.conformance.suite import Suite, against_twin, failure, require_named
 from drivers.controllers.linuxcnc.protocol import pose_difference
 from drivers.errors import MotionInterrupted, MoveRefused, StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction
@@ -52,121 +52,120 @@ class ControllerConformance(Suite[Controller, ControllerTwin]):
     def _driver_of(self, twin: ControllerTwin) -> Controller:
         return self.driver(twin.settings)
 
-    def test_it_is_the_same_whenever_it_is_opened(self) -> None:
-        async def check(controller: Controller, _: ControllerTwin) -> None:
-            first = await controller.open()
-            await controller.close()
-            assert await controller.open() == first
+    @against_twin
+    async def test_it_is_the_same_whenever_it_is_opened(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        first = await controller.open()
+        await controller.close()
+        assert await controller.open() == first
 
-        self._run(check)
+    @against_twin
+    async def test_it_is_made_ready_by_what_is_permitted_only(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        await controller.open()
+        assert isinstance(await failure(lambda: controller.prepare(frozenset())), StartupNotPermitted)
+        assert not (await controller.status()).may_move
+        await controller.prepare(ALL)
+        assert (await controller.status()).may_move
+        assert await controller.position() is not None
 
-    def test_it_is_made_ready_by_what_is_permitted_only(self) -> None:
-        async def check(controller: Controller, _: ControllerTwin) -> None:
-            await controller.open()
-            assert isinstance(await failure(lambda: controller.prepare(frozenset())), StartupNotPermitted)
-            assert not (await controller.status()).may_move
-            await controller.prepare(ALL)
-            assert (await controller.status()).may_move
-            assert await controller.position() is not None
+    @against_twin
+    async def test_a_move_ends_at_its_pose(self, controller: Controller, twin: ControllerTwin) -> None:
+        start = await self._ready(controller)
+        for pose in (twin.target, start):
+            await controller.move(pose, QUICK_S)
+            assert await self._is_at(controller, twin, pose)
 
-        self._run(check)
+    @against_twin
+    async def test_a_pose_out_of_reach_is_refused_and_nothing_moves(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        start = await self._ready(controller)
+        refused = await failure(lambda: controller.move(twin.out_of_reach, QUICK_S))
+        assert isinstance(refused, MoveRefused), refused
+        assert await self._is_at(controller, twin, start)
+        await controller.move(twin.target, QUICK_S)
 
-    def test_a_move_ends_at_its_pose(self) -> None:
-        async def check(controller: Controller, twin: ControllerTwin) -> None:
-            start = await self._ready(controller)
-            for pose in (twin.target, start):
-                await controller.move(pose, QUICK_S)
-                assert await self._is_at(controller, twin, pose)
+    @against_twin
+    async def test_a_stop_ends_a_move_in_place(self, controller: Controller, twin: ControllerTwin) -> None:
+        await self._ready(controller)
+        moving = await self._begun(controller, twin)
+        await controller.stop()
+        [error] = await asyncio.gather(moving, return_exceptions=True)
+        assert isinstance(error, MotionInterrupted), error
+        await self._require_at_rest(controller, twin)
+        await controller.move(twin.target, QUICK_S)
 
-        self._run(check)
+    @against_twin
+    async def test_a_move_that_is_given_up_is_stopped(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        await self._ready(controller)
+        moving = await self._begun(controller, twin)
+        moving.cancel()
+        await asyncio.gather(moving, return_exceptions=True)
+        await self._require_at_rest(controller, twin)
 
-    def test_a_pose_out_of_reach_is_refused_and_nothing_moves(self) -> None:
-        async def check(controller: Controller, twin: ControllerTwin) -> None:
-            start = await self._ready(controller)
-            refused = await failure(lambda: controller.move(twin.out_of_reach, QUICK_S))
-            assert isinstance(refused, MoveRefused), refused
-            assert await self._is_at(controller, twin, start)
-            await controller.move(twin.target, QUICK_S)
+    @against_twin
+    async def test_an_emergency_stop_is_told_and_ends_moves(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        name = (await controller.open()).name
+        await controller.prepare(ALL)
+        moving = await self._begun(controller, twin)
+        twin.inject("emergency stop", on=True)
+        [error] = await asyncio.gather(moving, return_exceptions=True)
+        require_named(error, name)
+        assert (await controller.status()).estop
+        require_named(await failure(lambda: controller.move(twin.target, QUICK_S)), name)
 
-        self._run(check)
+    @against_twin
+    async def test_a_reload_moves_no_joint_and_leaves_it_ready(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        await self._ready(controller)
+        await controller.move(twin.target, QUICK_S)
+        await controller.reload(frozenset())
+        assert (await controller.status()).may_move
+        assert await self._is_at(controller, twin, twin.target)
 
-    def test_a_stop_ends_a_move_in_place(self) -> None:
-        async def check(controller: Controller, twin: ControllerTwin) -> None:
-            await self._ready(controller)
-            moving = await self._begun(controller, twin)
-            await controller.stop()
-            [error] = await asyncio.gather(moving, return_exceptions=True)
-            assert isinstance(error, MotionInterrupted), error
-            await self._require_at_rest(controller, twin)
-            await controller.move(twin.target, QUICK_S)
+    @against_twin
+    async def test_one_that_is_unplugged_fails_and_can_be_opened_again(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        await self._fails_and_comes_back(controller, twin, "unplugged")
 
-        self._run(check)
+    @against_twin
+    async def test_one_that_is_silent_fails_and_can_be_opened_again(
+        self, controller: Controller, twin: ControllerTwin
+    ) -> None:
+        await self._fails_and_comes_back(controller, twin, "silent")
 
-    def test_a_move_that_is_given_up_is_stopped(self) -> None:
-        async def check(controller: Controller, twin: ControllerTwin) -> None:
-            await self._ready(controller)
-            moving = await self._begun(controller, twin)
-            moving.cancel()
-            await asyncio.gather(moving, return_exceptions=True)
-            await self._require_at_rest(controller, twin)
+    @against_twin
+    async def test_closing_twice_is_harmless(self, controller: Controller, twin: ControllerTwin) -> None:
+        await controller.close()
+        await self._ready(controller)
+        await controller.close()
+        await controller.close()
+        await self._ready(controller)
+        await controller.move(twin.target, QUICK_S)
 
-        self._run(check)
-
-    def test_an_emergency_stop_is_told_and_ends_moves(self) -> None:
-        async def check(controller: Controller, twin: ControllerTwin) -> None:
-            name = (await controller.open()).name
-            await controller.prepare(ALL)
-            moving = await self._begun(controller, twin)
-            twin.inject("emergency stop", on=True)
-            [error] = await asyncio.gather(moving, return_exceptions=True)
-            require_named(error, name)
-            assert (await controller.status()).estop
-            require_named(await failure(lambda: controller.move(twin.target, QUICK_S)), name)
-
-        self._run(check)
-
-    def test_a_reload_moves_no_joint_and_leaves_it_ready(self) -> None:
-        async def check(controller: Controller, twin: ControllerTwin) -> None:
-            await self._ready(controller)
-            await controller.move(twin.target, QUICK_S)
-            await controller.reload(frozenset())
-            assert (await controller.status()).may_move
-            assert await self._is_at(controller, twin, twin.target)
-
-        self._run(check)
-
-    def test_one_that_is_unplugged_fails_and_can_be_opened_again(self) -> None:
-        self._fails_and_comes_back("unplugged")
-
-    def test_one_that_is_silent_fails_and_can_be_opened_again(self) -> None:
-        self._fails_and_comes_back("silent")
-
-    def test_closing_twice_is_harmless(self) -> None:
-        async def check(controller: Controller, twin: ControllerTwin) -> None:
-            await controller.close()
-            await self._ready(controller)
-            await controller.close()
-            await controller.close()
-            await self._ready(controller)
-            await controller.move(twin.target, QUICK_S)
-
-        self._run(check)
-
-    def _fails_and_comes_back(self, fault: FaultKind) -> None:
-        async def check(controller: Controller, twin: ControllerTwin) -> None:
-            name = (await controller.open()).name
-            await controller.prepare(ALL)
-            twin.inject(fault, on=True)
-            for call in (controller.status, controller.position):
-                require_named(await failure(call), name)
-            require_named(await failure(lambda: controller.move(twin.target, QUICK_S)), name)
-            twin.inject(fault, on=False)
-            await controller.close()
-            await self._ready(controller)
-            await controller.move(twin.target, QUICK_S)
-            assert await self._is_at(controller, twin, twin.target)
-
-        self._run(check)
+    async def _fails_and_comes_back(
+        self, controller: Controller, twin: ControllerTwin, fault: FaultKind
+    ) -> None:
+        name = (await controller.open()).name
+        await controller.prepare(ALL)
+        twin.inject(fault, on=True)
+        for call in (controller.status, controller.position):
+            require_named(await failure(call), name)
+        require_named(await failure(lambda: controller.move(twin.target, QUICK_S)), name)
+        twin.inject(fault, on=False)
+        await controller.close()
+        await self._ready(controller)
+        await controller.move(twin.target, QUICK_S)
+        assert await self._is_at(controller, twin, twin.target)
 
     async def _ready(self, controller: Controller) -> Pose:
         """Open and prepare it; where it stands."""

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol
 
-from drivers.conformance.suite import Suite, failure, require_named
+from drivers.conformance.suite import Suite, against_twin, failure, require_named
 from drivers.encoders.bank import joint_variables
 from drivers.interfaces import EncoderBank
 from hexacell.cell.devices import EncoderSettings
@@ -54,88 +54,86 @@ class EncoderConformance(Suite[EncoderBank, EncoderTwin]):
     def _driver_of(self, twin: EncoderTwin) -> EncoderBank:
         return self.driver(twin)
 
-    def test_they_are_the_same_whenever_they_are_opened(self) -> None:
-        async def check(bank: EncoderBank, _: EncoderTwin) -> None:
-            first = await bank.open()
-            await bank.close()
-            assert await bank.open() == first
-            assert len({identity.name for identity in first}) == len(first) == 6
+    @against_twin
+    async def test_they_are_the_same_whenever_they_are_opened(
+        self, bank: EncoderBank, twin: EncoderTwin
+    ) -> None:
+        first = await bank.open()
+        await bank.close()
+        assert await bank.open() == first
+        assert len({identity.name for identity in first}) == len(first) == 6
 
-        self._run(check)
+    @against_twin
+    async def test_they_read_where_the_joints_are(self, bank: EncoderBank, twin: EncoderTwin) -> None:
+        await bank.open()
+        for joints in POSITIONS:
+            twin.stand_at(joints)
+            await self._require_at(bank, twin, joints)
 
-    def test_they_read_where_the_joints_are(self) -> None:
-        async def check(bank: EncoderBank, twin: EncoderTwin) -> None:
-            await bank.open()
-            for joints in POSITIONS:
-                twin.stand_at(joints)
-                await self._require_at(bank, twin, joints)
+    @against_twin
+    async def test_counts_are_raw_and_give_the_positions_again(
+        self, bank: EncoderBank, twin: EncoderTwin
+    ) -> None:
+        twin.stand_at(POSITIONS[1])
+        await bank.open()
+        sample = await bank.read()
+        assert all(isinstance(count, int) for count in sample.counts)
+        assert sample.positions == joint_variables(sample.counts, twin.settings)
 
-        self._run(check)
-
-    def test_counts_are_raw_and_give_the_positions_again(self) -> None:
-        async def check(bank: EncoderBank, twin: EncoderTwin) -> None:
-            twin.stand_at(POSITIONS[1])
-            await bank.open()
-            sample = await bank.read()
-            assert all(isinstance(count, int) for count in sample.counts)
-            assert sample.positions == joint_variables(sample.counts, twin.settings)
-
-        self._run(check)
-
-    def test_a_sample_is_of_one_instant(self) -> None:
+    @against_twin
+    async def test_a_sample_is_of_one_instant(self, bank: EncoderBank, twin: EncoderTwin) -> None:
         """All joints move together: a sample of two instants differs in itself."""
+        twin.stand_at((0.0,) * 6)
+        await bank.open()
+        with _moving(twin):
+            for _ in range(STEPS):
+                found = (await bank.read()).positions
+                assert max(found) - min(found) <= 2 * self.tolerance, found
 
-        async def check(bank: EncoderBank, twin: EncoderTwin) -> None:
-            twin.stand_at((0.0,) * 6)
-            await bank.open()
-            with _moving(twin):
-                for _ in range(STEPS):
-                    found = (await bank.read()).positions
-                    assert max(found) - min(found) <= 2 * self.tolerance, found
+    @against_twin
+    async def test_closing_twice_is_harmless_and_closed_ones_are_named(
+        self, bank: EncoderBank, twin: EncoderTwin
+    ) -> None:
+        await bank.close()
+        await bank.open()
+        await bank.close()
+        await bank.close()
+        require_named(await failure(bank.read), self.name)
 
-        self._run(check)
+    @against_twin
+    async def test_one_that_is_unplugged_fails_all_and_can_be_opened_again(
+        self, bank: EncoderBank, twin: EncoderTwin
+    ) -> None:
+        await self._fails_and_comes_back(bank, twin, "unplugged")
 
-    def test_closing_twice_is_harmless_and_closed_ones_are_named(self) -> None:
-        async def check(bank: EncoderBank, _: EncoderTwin) -> None:
-            await bank.close()
-            await bank.open()
-            await bank.close()
-            await bank.close()
-            require_named(await failure(bank.read), self.name)
+    @against_twin
+    async def test_one_that_is_silent_fails_all_and_can_be_opened_again(
+        self, bank: EncoderBank, twin: EncoderTwin
+    ) -> None:
+        await self._fails_and_comes_back(bank, twin, "silent")
 
-        self._run(check)
+    @against_twin
+    async def test_a_sample_that_is_given_up_leaves_them_in_step(
+        self, bank: EncoderBank, twin: EncoderTwin
+    ) -> None:
+        await bank.open()
+        for joints in POSITIONS:
+            given_up = asyncio.create_task(bank.read())
+            await asyncio.sleep(0)
+            given_up.cancel()
+            await asyncio.gather(given_up, return_exceptions=True)
+            twin.stand_at(joints)
+            await self._require_at(bank, twin, joints)
 
-    def test_one_that_is_unplugged_fails_all_and_can_be_opened_again(self) -> None:
-        self._fails_and_comes_back("unplugged")
-
-    def test_one_that_is_silent_fails_all_and_can_be_opened_again(self) -> None:
-        self._fails_and_comes_back("silent")
-
-    def test_a_sample_that_is_given_up_leaves_them_in_step(self) -> None:
-        async def check(bank: EncoderBank, twin: EncoderTwin) -> None:
-            await bank.open()
-            for joints in POSITIONS:
-                given_up = asyncio.create_task(bank.read())
-                await asyncio.sleep(0)
-                given_up.cancel()
-                await asyncio.gather(given_up, return_exceptions=True)
-                twin.stand_at(joints)
-                await self._require_at(bank, twin, joints)
-
-        self._run(check)
-
-    def _fails_and_comes_back(self, fault: FaultKind) -> None:
-        async def check(bank: EncoderBank, twin: EncoderTwin) -> None:
-            await bank.open()
-            twin.inject(fault, on=True)
-            require_named(await failure(bank.read), self.name)
-            twin.inject(fault, on=False)
-            twin.stand_at(POSITIONS[1])
-            await bank.close()
-            await bank.open()
-            await self._require_at(bank, twin, POSITIONS[1])
-
-        self._run(check)
+    async def _fails_and_comes_back(self, bank: EncoderBank, twin: EncoderTwin, fault: FaultKind) -> None:
+        await bank.open()
+        twin.inject(fault, on=True)
+        require_named(await failure(bank.read), self.name)
+        twin.inject(fault, on=False)
+        twin.stand_at(POSITIONS[1])
+        await bank.close()
+        await bank.open()
+        await self._require_at(bank, twin, POSITIONS[1])
 
     async def _require_at(self, bank: EncoderBank, twin: EncoderTwin, joints: Sequence[float]) -> None:
         sample = await bank.read()

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Protocol
 
-from drivers.conformance.suite import Suite, failure, require_named
+from drivers.conformance.suite import Suite, against_twin, failure, require_named
 from drivers.interfaces import Gauge
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
@@ -49,93 +49,90 @@ class GaugeConformance(Suite[Gauge, GaugeTwin]):
     def driver(self, settings: GaugeSettings, ports: SharedSerialPorts) -> Gauge:
         """The driver under test."""
 
-    def test_it_is_the_same_whenever_it_is_opened(self) -> None:
-        async def check(gauge: Gauge, _: GaugeTwin) -> None:
-            first = await gauge.open()
-            await gauge.close()
-            assert await gauge.open() == first
-            assert first.name == gauge.name
+    @against_twin
+    async def test_it_is_the_same_whenever_it_is_opened(self, gauge: Gauge, twin: GaugeTwin) -> None:
+        first = await gauge.open()
+        await gauge.close()
+        assert await gauge.open() == first
+        assert first.name == gauge.name
 
-        self._run(check)
+    @against_twin
+    async def test_it_reads_what_the_instrument_shows(self, gauge: Gauge, twin: GaugeTwin) -> None:
+        await gauge.open()
+        for mm in VALUES_MM:
+            twin.show(mm)
+            for read in (gauge.read, gauge.read_once):
+                found = await read()
+                assert abs(found.value_mm - mm) <= self.tolerance_mm, found
 
-    def test_it_reads_what_the_instrument_shows(self) -> None:
-        async def check(gauge: Gauge, twin: GaugeTwin) -> None:
-            await gauge.open()
-            for mm in VALUES_MM:
-                twin.show(mm)
-                for read in (gauge.read, gauge.read_once):
-                    found = await read()
-                    assert abs(found.value_mm - mm) <= self.tolerance_mm, found
+    @against_twin
+    async def test_an_unchanged_instrument_passes_the_check(self, gauge: Gauge, twin: GaugeTwin) -> None:
+        await gauge.open()
+        await gauge.check()
+        twin.show(1.0)
+        await gauge.check()
 
-        self._run(check)
+    @against_twin
+    async def test_closing_twice_is_harmless_and_a_closed_one_names_itself(
+        self, gauge: Gauge, twin: GaugeTwin
+    ) -> None:
+        await gauge.close()
+        await gauge.open()
+        await gauge.close()
+        await gauge.close()
+        for call in (gauge.read, gauge.read_once, gauge.check):
+            require_named(await failure(call), gauge.name)
 
-    def test_an_unchanged_instrument_passes_the_check(self) -> None:
-        async def check(gauge: Gauge, twin: GaugeTwin) -> None:
-            await gauge.open()
-            await gauge.check()
-            twin.show(1.0)
-            await gauge.check()
+    @against_twin
+    async def test_one_that_is_unplugged_fails_and_can_be_opened_again(
+        self, gauge: Gauge, twin: GaugeTwin
+    ) -> None:
+        await self._fails_and_comes_back(gauge, twin, "unplugged")
 
-        self._run(check)
+    @against_twin
+    async def test_one_that_is_silent_fails_and_can_be_opened_again(
+        self, gauge: Gauge, twin: GaugeTwin
+    ) -> None:
+        await self._fails_and_comes_back(gauge, twin, "silent")
 
-    def test_closing_twice_is_harmless_and_a_closed_one_names_itself(self) -> None:
-        async def check(gauge: Gauge, _: GaugeTwin) -> None:
-            await gauge.close()
-            await gauge.open()
-            await gauge.close()
-            await gauge.close()
-            for call in (gauge.read, gauge.read_once, gauge.check):
-                require_named(await failure(call), gauge.name)
+    @against_twin
+    async def test_damaged_answers_are_never_read_as_something_else(
+        self, gauge: Gauge, twin: GaugeTwin
+    ) -> None:
+        twin.show(1.0)
+        await gauge.open()
+        twin.inject("damaged", on=True)
+        agreement_mm = twin.settings.agreement_mm or 0.05
+        for _ in range(20):
+            try:
+                found = await gauge.read()
+            except DeviceError:
+                continue
+            assert abs(found.value_mm - 1.0) <= agreement_mm + self.tolerance_mm, found
 
-        self._run(check)
+    @against_twin
+    async def test_a_reading_that_is_given_up_leaves_the_line_in_step(
+        self, gauge: Gauge, twin: GaugeTwin
+    ) -> None:
+        await gauge.open()
+        for mm in VALUES_MM:
+            given_up = asyncio.create_task(gauge.read_once())
+            await asyncio.sleep(0)
+            given_up.cancel()
+            await asyncio.gather(given_up, return_exceptions=True)
+            twin.show(mm)
+            assert abs((await gauge.read()).value_mm - mm) <= self.tolerance_mm
 
-    def test_one_that_is_unplugged_fails_and_can_be_opened_again(self) -> None:
-        self._fails_and_comes_back("unplugged")
-
-    def test_one_that_is_silent_fails_and_can_be_opened_again(self) -> None:
-        self._fails_and_comes_back("silent")
-
-    def test_damaged_answers_are_never_read_as_something_else(self) -> None:
-        async def check(gauge: Gauge, twin: GaugeTwin) -> None:
-            twin.show(1.0)
-            await gauge.open()
-            twin.inject("damaged", on=True)
-            agreement_mm = twin.settings.agreement_mm or 0.05
-            for _ in range(20):
-                try:
-                    found = await gauge.read()
-                except DeviceError:
-                    continue
-                assert abs(found.value_mm - 1.0) <= agreement_mm + self.tolerance_mm, found
-
-        self._run(check)
-
-    def test_a_reading_that_is_given_up_leaves_the_line_in_step(self) -> None:
-        async def check(gauge: Gauge, twin: GaugeTwin) -> None:
-            await gauge.open()
-            for mm in VALUES_MM:
-                given_up = asyncio.create_task(gauge.read_once())
-                await asyncio.sleep(0)
-                given_up.cancel()
-                await asyncio.gather(given_up, return_exceptions=True)
-                twin.show(mm)
-                assert abs((await gauge.read()).value_mm - mm) <= self.tolerance_mm
-
-        self._run(check)
-
-    def _fails_and_comes_back(self, fault: FaultKind) -> None:
-        async def check(gauge: Gauge, twin: GaugeTwin) -> None:
-            await gauge.open()
-            twin.inject(fault, on=True)
-            require_named(await failure(gauge.read), gauge.name)
-            require_named(await failure(gauge.check), gauge.name)
-            twin.inject(fault, on=False)
-            twin.show(2.0)
-            await gauge.close()
-            await gauge.open()
-            assert abs((await gauge.read()).value_mm - 2.0) <= self.tolerance_mm
-
-        self._run(check)
+    async def _fails_and_comes_back(self, gauge: Gauge, twin: GaugeTwin, fault: FaultKind) -> None:
+        await gauge.open()
+        twin.inject(fault, on=True)
+        require_named(await failure(gauge.read), gauge.name)
+        require_named(await failure(gauge.check), gauge.name)
+        twin.inject(fault, on=False)
+        twin.show(2.0)
+        await gauge.close()
+        await gauge.open()
+        assert abs((await gauge.read()).value_mm - 2.0) <= self.tolerance_mm
 
     def _driver_of(self, twin: GaugeTwin) -> Gauge:
         return self.driver(twin.settings, self._ports)

@@ -44,14 +44,6 @@ class Suite(ABC, Generic[DeviceT, TwinT]):
     def _driver_of(self, twin: TwinT) -> DeviceT:
         """The driver under test, for a twin."""
 
-    def _run(self, check: Callable[[DeviceT, TwinT], Awaitable[None]]) -> None:
-        async def run() -> None:
-            with self.twin() as twin:
-                async with self._closed_after(twin) as device, asyncio.timeout(LONGEST_S):
-                    await check(device, twin)
-
-        asyncio.run(run())
-
     @asynccontextmanager
     async def _closed_after(self, twin: TwinT) -> AsyncIterator[DeviceT]:
         device = self._driver_of(twin)
@@ -59,3 +51,18 @@ class Suite(ABC, Generic[DeviceT, TwinT]):
             yield device
         finally:
             await device.close()
+
+
+def against_twin(check: Callable[[Any, DeviceT, TwinT], Awaitable[None]]) -> Callable[[Any], None]:
+    """A test of a suite, without arguments for pytest: the check of a device and its twin."""
+
+    def test(self: Suite[DeviceT, TwinT]) -> None:
+        async def run() -> None:
+            with self.twin() as twin:
+                async with self._closed_after(twin) as device, asyncio.timeout(LONGEST_S):
+                    await check(self, device, twin)
+
+        asyncio.run(run())
+
+    test.__name__, test.__doc__ = check.__name__, check.__doc__
+    return test

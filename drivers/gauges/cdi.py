@@ -9,7 +9,7 @@ answer: the bare number and ``pXXX=number`` are both accepted. Older indicators 
 from __future__ import annotations
 
 import re
-from enum import Enum, IntEnum
+from enum import IntEnum
 from functools import partial
 from typing import ClassVar
 
@@ -29,15 +29,8 @@ PARAMETER = re.compile(rb"(?:[pP](\d{3}) ?= ?)?(\d{1,3})\r")
 UNITS = {b"IN": Unit.INCH, b"MM": Unit.MM}
 UNIT_NUMBERS = {1: Unit.INCH, 2: Unit.MM}
 MODES = {0: "ABS", 1: "TIR", 2: "INCR"}
-
-
-class CdiError(Enum):
-    """The error frames of the instrument."""
-
-    NOT_FOUND = b"NOT FOUND\r"
-    NO_ACCESS = b"NO ACCESS\r"
-    OUT_OF_BOUNDS = b"OUT OF BOUNDS\r"
-    NON_NUMERIC = b"NON NUMERIC\r"
+OUT_OF_BOUNDS = b"OUT OF BOUNDS\r"
+UNKNOWN_PARAMETER = (b"NOT FOUND\r", b"NO ACCESS\r")
 
 
 class Parameter(IntEnum):
@@ -50,27 +43,13 @@ class Parameter(IntEnum):
     RATIO = 40
 
 
-def parse_value(frame: bytes) -> DisplayedValue | CdiError:
-    """The value or the error in an answer to ``R``.
-
-    Raises:
-        FrameRejected: The frame is neither, to the last byte.
-    """
-    if match := VALUE_FRAME.fullmatch(frame):
-        return DisplayedValue.of(match[1], match[2], frame, UNITS[match[3]])
-    try:
-        return CdiError(frame)
-    except ValueError:
-        raise FrameRejected(frame) from None
-
-
 def parse_parameter(frame: bytes, parameter: Parameter) -> int | None:
     """The value of ``parameter`` in the answer; None if the instrument has no such parameter.
 
     Raises:
         FrameRejected: The frame is something else, or names another parameter.
     """
-    if frame in {CdiError.NOT_FOUND.value, CdiError.NO_ACCESS.value}:
+    if frame in UNKNOWN_PARAMETER:
         return None
     match = PARAMETER.fullmatch(frame)
     if match is None or int(match[1] or parameter) != parameter:
@@ -90,15 +69,17 @@ class CdiGauge(SerialGauge):
     _knows_parameters: bool | None = None
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
-        answer = parse_value(frame)
-        if isinstance(answer, DisplayedValue):
-            return answer
-        if answer is CdiError.OUT_OF_BOUNDS:
+        if match := VALUE_FRAME.fullmatch(frame):
+            return DisplayedValue.of(match[1], match[2], frame, UNITS[match[3]])
+        if frame == OUT_OF_BOUNDS:
             raise self._at_end("plunger at its end (OUT OF BOUNDS)")
-        raise FrameRejected(frame)  # the request was garbled
+        raise FrameRejected(frame)  # also another error: the request was garbled
 
     async def _read_state(self) -> GaugeState:
-        unit = await self._unit()
+        try:
+            unit: Unit | None = (await self._read_value()).unit
+        except GaugeAtEnd:
+            unit = UNIT_NUMBERS.get(await self._parameter(Parameter.UNIT) or 0)
         mode = await self._parameter(Parameter.MODE)
         return GaugeState(
             unit=unit,
@@ -107,13 +88,6 @@ class CdiGauge(SerialGauge):
             hold=_flag(await self._parameter(Parameter.HOLD)),
             scaling=_flag(await self._parameter(Parameter.RATIO)),
         )
-
-    async def _unit(self) -> Unit | None:
-        try:
-            return (await self._read_value()).unit
-        except GaugeAtEnd:
-            number = await self._parameter(Parameter.UNIT)
-            return None if number is None else UNIT_NUMBERS.get(number)
 
     async def _parameter(self, parameter: Parameter) -> int | None:
         """Its value; None if the instrument does not have it, or knows no parameters at all."""

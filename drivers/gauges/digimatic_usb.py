@@ -30,9 +30,6 @@ class DigimaticUsbGauge(ValueOnlyGauge):
         if match := VALUE_FRAME.fullmatch(frame):
             return DisplayedValue.of(match[1], match[2], frame)
         if error := ERROR.fullmatch(frame):
-            raise DeviceError(
-                f"its adapter reports: {error[1].decode('ascii')}",
-                subject=self.subject,
-                action="Switch the indicator on and check its cable",
-            )
+            problem = f"its adapter reports: {error[1].decode('ascii')}"
+            raise self._error(DeviceError, problem, "Switch the indicator on and check its cable")
         raise FrameRejected(frame)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from typing import ClassVar
 
+from drivers.errors import WrongSetting
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import ValueOnlyGauge
 
@@ -33,8 +34,6 @@ class HeidenhainGauge(ValueOnlyGauge):
         if match[3] == b"?":
             raise self._voided(f"has lost the signal of its probe ({match[0].decode('ascii').strip()})")
         if match[4] not in ACTUAL:
-            raise self._wrong_setting(
-                f"shows a result of a series of measurements ({match[4].decode('ascii')})",
-                "Set it to the actual value",
-            )
+            problem = f"shows a result of a series of measurements ({match[4].decode('ascii')})"
+            raise self._error(WrongSetting, problem, "Set it to the actual value")
         return DisplayedValue.of(match[1], match[2], frame, Unit.INCH if match[3] == b'"' else Unit.MM)

@@ -32,20 +32,16 @@ class KeyenceGauge(ValueOnlyGauge):
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
         if error := ERROR.fullmatch(frame):
-            raise DeviceError(
-                f"reports error {error[1].decode('ascii')} instead of its value",
-                subject=self.subject,
-                action="Look it up in the manual of the DL-RS1A",
-            )
+            problem = f"reports error {error[1].decode('ascii')} instead of its value"
+            raise self._error(DeviceError, problem, "Look it up in the manual of the DL-RS1A")
         match = FRAME.fullmatch(frame)
         if match is None:
             raise FrameRejected(frame)
         values, place = match[1].split(b",")[1:], self.settings.channel
         if not 1 <= place <= len(values):
-            raise EmptyChannel(
-                f"has channel {place}, where {len(values)} amplifiers answer",
-                subject=self.subject,
-                action="Correct channel in the cell file: 1 for the amplifier 00",
+            action = "Correct channel in the cell file: 1 for the amplifier 00"
+            raise self._error(
+                EmptyChannel, f"has channel {place}, where {len(values)} amplifiers answer", action
             )
         value = values[place - 1]
         shown = DisplayedValue.of(value[:1], value[1:], value, Unit.MM)

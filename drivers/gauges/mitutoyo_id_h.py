@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from typing import ClassVar
 
+from drivers.errors import WrongSetting
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec
 from drivers.gauges.serial_gauge import ValueOnlyGauge
 from drivers.serial.shared_port import SharedSerialPorts
@@ -36,5 +37,5 @@ class IdHGauge(ValueOnlyGauge):
         if match is None or int(match[2]) != self.channel:
             raise FrameRejected(frame)
         if mode := PEAK_MODES.get(match[1]):
-            raise self._wrong_setting(f"shows its {mode}", "Set it to normal measuring")
+            raise self._error(WrongSetting, f"shows its {mode}", "Set it to normal measuring")
         return DisplayedValue.of(match[3], match[4], frame)

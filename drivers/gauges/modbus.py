@@ -49,10 +49,9 @@ class ModbusGauge(ValueOnlyGauge):
         )
 
     def _garbled(self, received: bytes) -> DeviceError:
-        return WrongAnswer(
-            f"answers {received!r}, no single frame with a right checksum",
-            subject=self.subject,
-            action="Check its cable, and its baud rate and parity against serial in the cell file",
+        action = "Check its cable, and its baud rate and parity against serial in the cell file"
+        return self._error(
+            WrongAnswer, f"answers {received!r}, no single frame with a right checksum", action
         )
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:

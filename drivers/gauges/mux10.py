@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import re
-from dataclasses import dataclass
+from contextlib import suppress
 from typing import ClassVar
 
 from drivers.errors import EmptyChannel, GaugeAtEnd, GaugeSilent, WrongAnswer
@@ -34,32 +34,11 @@ IDENTIFICATION_FRAME = re.compile(rb"([ -~]{4,60})\r")
 NO_GAUGE = 1
 BUSY = 8
 BUSY_TRIES = 20
+BUSY_ACTION = "Disconnect the foot switch and other triggers"
 
 
 class MultiplexerBusy(Exception):
     """Error 918: repeat the request after a pause."""
-
-
-@dataclass(frozen=True, slots=True)
-class MultiplexerError:
-    """An error frame: its last digit."""
-
-    code: int
-
-
-def parse_value(frame: bytes, channel: int) -> DisplayedValue | MultiplexerError:
-    """The value or the error in an answer for ``channel``.
-
-    Raises:
-        FrameRejected: The frame is neither a value of this channel nor an error, to the last byte.
-    """
-    value = VALUE_FRAME.fullmatch(frame)
-    if value and int(value[1]) == channel:
-        return DisplayedValue.of(value[2], value[3], frame)
-    error = ERROR_FRAME.fullmatch(frame)
-    if error and int(error[1]) in {1, channel}:
-        return MultiplexerError(int(error[2]))
-    raise FrameRejected(frame)
 
 
 def parse_identification(frame: bytes) -> str:
@@ -93,11 +72,7 @@ class Mux10Gauge(SerialGauge):
         try:
             return await super().read_once()
         except MultiplexerBusy:
-            raise WrongAnswer(
-                "its multiplexer is busy (918)",
-                subject=self.subject,
-                action="Disconnect the foot switch and other triggers",
-            ) from None
+            raise self._error(WrongAnswer, "its multiplexer is busy (918)", BUSY_ACTION) from None
 
     async def _read_value(self) -> DisplayedValue:
         for _ in range(BUSY_TRIES):
@@ -105,41 +80,33 @@ class Mux10Gauge(SerialGauge):
                 return await super()._read_value()
             except MultiplexerBusy:
                 await asyncio.sleep(self.busy_pause_s)
-        raise DeviceError(
-            "its multiplexer stays busy (918)",
-            subject=self.subject,
-            action="Disconnect the foot switch and other triggers",
-        )
+        raise self._error(DeviceError, "its multiplexer stays busy (918)", BUSY_ACTION)
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
-        answer = parse_value(frame, self.settings.channel)
-        if isinstance(answer, DisplayedValue):
-            return answer
-        if answer.code == BUSY:
+        value = VALUE_FRAME.fullmatch(frame)
+        if value and int(value[1]) == self.channel:
+            return DisplayedValue.of(value[2], value[3], frame)
+        error = ERROR_FRAME.fullmatch(frame)
+        if error is None or int(error[1]) not in {1, self.channel}:
+            raise FrameRejected(frame)
+        code, displayed = int(error[2]), frame.decode("ascii").strip()
+        if code == BUSY:
             raise MultiplexerBusy
-        displayed = frame.decode("ascii").strip()
-        if answer.code == NO_GAUGE:
-            raise EmptyChannel(
-                f"does not answer its multiplexer ({displayed})",
-                subject=self.subject,
-                action="Switch it on, check its cable, and channel in the cell file",
-            )
+        if code == NO_GAUGE:
+            action = "Switch it on, check its cable, and channel in the cell file"
+            raise self._error(EmptyChannel, f"does not answer its multiplexer ({displayed})", action)
         raise self._at_end(f"shows an error instead of a value ({displayed}), as at an end of its travel")
 
     async def _read_state(self) -> GaugeState:
-        displayed: DisplayedValue | None
-        try:
+        displayed: DisplayedValue | None = None
+        with suppress(GaugeAtEnd):
             displayed = await self._read_value()
-        except GaugeAtEnd:
-            displayed = None
-        identification = self._state.identification if self._state else await self._identification()
+        identification: str | None = None
+        if self._state is not None:
+            identification = self._state.identification
+        else:
+            with suppress(GaugeSilent, WrongAnswer):
+                identification = await self._query(b"V\r", parse_identification)
         if displayed is None:
-            return GaugeState(identification=identification)
+            return GaugeState(identification)
         return GaugeState(identification, displayed.apparent_unit, displayed.decimals)
-
-    async def _identification(self) -> str | None:
-        """The identification of the multiplexer, if it gives one."""
-        try:
-            return await self._query(b"V\r", parse_identification)
-        except (GaugeSilent, WrongAnswer):
-            return None

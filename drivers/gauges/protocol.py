@@ -6,10 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 
-from drivers.errors import GaugeSilent, WrongAnswer
 from hexacell.errors import DeviceError
 
-BIT_7 = 0x80
 TERMINATOR = b"\r"
 """Ends every request, and is the first line end of every answer."""
 INCH_DECIMALS = 5
@@ -59,36 +57,6 @@ class Probe:
     other_baud_rates: tuple[int, ...] = ()
     is_last: bool = False
     channel_of: Callable[[bytes], int | None] | None = None
-
-
-def silent_gauge(subject: str, port: str, timeout_s: float, *, echo: bool) -> GaugeSilent:
-    """The error for no answer; with ``echo``, only the request itself came back."""
-    if echo:
-        return GaugeSilent(
-            f"only the echo of the request comes back from port {port}",
-            subject=subject,
-            action="Switch the gauge on and check that the cable is not looped",
-        )
-    return GaugeSilent(
-        f"does not answer within {timeout_s:g} s on port {port}",
-        subject=subject,
-        action="Switch it on, check its cable, and port in the cell file",
-    )
-
-
-def unexpected_answer(subject: str, spec: ProtocolSpec, received: bytes) -> WrongAnswer:
-    """The error for repeated answers that are no frames of the protocol."""
-    if any(byte & BIT_7 for byte in received):
-        return WrongAnswer(
-            f"answers {received!r}, bytes with bit 7 set",
-            subject=subject,
-            action=f"Check parity settings and baud rate: {spec.protocol} uses {spec.line}",
-        )
-    return WrongAnswer(
-        f"answers {received!r} where protocol {spec.protocol} has answers like {spec.example!r}",
-        subject=subject,
-        action="Correct protocol or port in the cell file",
-    )
 
 
 class FrameRejected(Exception):

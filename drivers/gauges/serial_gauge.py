@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from typing import ClassVar, TypeVar
 
-from drivers.errors import GaugeAtEnd, GaugeUnsteady, WrongAnswer, WrongSetting, ZeroVoid
+from drivers.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongAnswer, WrongSetting, ZeroVoid
 from drivers.gauges.plausibility import DisplayHistory
 from drivers.gauges.protocol import (
     TERMINATOR,
@@ -21,8 +21,6 @@ from drivers.gauges.protocol import (
     Probe,
     ProtocolSpec,
     Unit,
-    silent_gauge,
-    unexpected_answer,
 )
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.serial.adapters import adapter_at
@@ -35,9 +33,12 @@ from hexacell.errors import DeviceError, FileError
 MAX_READINGS = 12  # enough for an oscillating ball to come to rest
 MAX_REQUESTS = 3
 MORE_STATES = 2  # the settings are asked for so often again before something is wrong with them
+BIT_7 = 0x80
+INCH = ("answers in inch", "Press its in/mm key")
 
 Parsed = TypeVar("Parsed")
 Stated = TypeVar("Stated")
+ErrorT = TypeVar("ErrorT", bound=DeviceError)
 
 
 class SerialGauge(ABC):
@@ -134,19 +135,16 @@ class SerialGauge(ABC):
         readings = [await self._read_value()]
         in_step = readings[:]
         while len(readings) < MAX_READINGS:
-            surplus = self._open_port().surplus_count
+            surplus = self._open_port().line.surplus_count
             readings.append(await self._read_value())
-            if self._open_port().surplus_count != surplus:
+            if self._open_port().line.surplus_count != surplus:
                 in_step.clear()
             in_step.append(readings[-1])
             if (agreed := self._history.agreed(in_step)) is not None:
                 self._history.add(agreed)
                 return GaugeReading(agreed.value, agreed.text)
-        raise GaugeUnsteady(
-            f"readings do not agree{self._history.limit}: {', '.join(one.text for one in readings)}",
-            subject=self.subject,
-            action="Wait until it is still; if it is, check its cable",
-        )
+        problem = f"readings do not agree{self._history.limit}: {', '.join(one.text for one in readings)}"
+        raise self._error(GaugeUnsteady, problem, "Wait until it is still; if it is, check its cable")
 
     async def read_once(self) -> GaugeReading:
         """The value displayed at this moment, mm, from a single query."""
@@ -179,16 +177,15 @@ class SerialGauge(ABC):
     async def _connect(self) -> None:
         if self.settings.port is None:
             raise FileError("has no port", subject=self.subject, action="Name it in the cell file")
-        port = self._ports.acquire(
+        self._port = self._ports.acquire(
             self.settings.port,
             self.name,
             self._line_settings(),
             channel=self.channel,
             factory=self.port_factory,
         )
-        self._port = port
-        self._session = await port.open()
-        port.take_unsolicited()
+        self._session = await self._port.open()
+        self._port.take_unsolicited()
 
     def _line_settings(self) -> dict[str, object]:
         return {**asdict(self.spec.line), **self.settings.serial}
@@ -206,13 +203,13 @@ class SerialGauge(ABC):
         """The value in an answer, which is in mm and fits to those before; raises as ``_parse_value``."""
         shown = self._parse_value(frame)
         if shown.apparent_unit is Unit.INCH:
-            raise self._inch()
+            raise self._error(WrongSetting, *INCH)
         if reason := self._history.other_decimals(shown):
             action = "Press its in/mm key, or correct resolution_mm in the cell file"
-            raise ImplausibleValue(frame, self._wrong_setting(reason, action))
+            raise ImplausibleValue(frame, self._error(WrongSetting, reason, action))
         if reason := self._history.beyond_travel(shown):
             action = "Check its cable; if its zero or preset key was pressed, open it again"
-            raise ImplausibleValue(frame, WrongAnswer(reason, subject=self.subject, action=action))
+            raise ImplausibleValue(frame, self._error(WrongAnswer, reason, action))
         self._history.keep_decimals(shown)
         return shown
 
@@ -238,7 +235,12 @@ class SerialGauge(ABC):
             if beside_echo.strip() or is_lone_line_end:
                 raise FrameRejected(beside_echo) from missing
             self._log.warning("no answer to %r within %g s", request, self.settings.timeout_s)
-            raise silent_gauge(self.subject, port.url, self.settings.timeout_s, echo=echo) from missing
+            problem = f"does not answer within {self.settings.timeout_s:g} s on port {port.url}"
+            action = "Switch it on, check its cable, and port in the cell file"
+            if echo:
+                problem = f"only the echo of the request comes back from port {port.url}"
+                action = "Switch the gauge on and check that the cable is not looped"
+            raise self._error(GaugeSilent, problem, action) from missing
 
     def _require_silence(self) -> None:
         self._open_port().require_silence()
@@ -255,7 +257,17 @@ class SerialGauge(ABC):
         return self._garbled(next(one.frame for one in reversed(rejections) if one not in implausible))
 
     def _garbled(self, received: bytes) -> DeviceError:
-        return unexpected_answer(self.subject, self.spec, received)
+        """The error for repeated answers that are no frames of the protocol."""
+        protocol = self.spec.protocol
+        if any(byte & BIT_7 for byte in received):
+            problem = f"answers {received!r}, bytes with bit 7 set"
+            action = f"Check parity settings and baud rate: {protocol} uses {self.spec.line}"
+        else:
+            problem = (
+                f"answers {received!r} where protocol {protocol} has answers like {self.spec.example!r}"
+            )
+            action = "Correct protocol or port in the cell file"
+        return self._error(WrongAnswer, problem, action)
 
     def _require_usable(self, state: GaugeState) -> None:
         if error := self._unusable(state):
@@ -263,45 +275,41 @@ class SerialGauge(ABC):
 
     def _unusable(self, state: GaugeState) -> WrongSetting | None:
         """Why readings in these settings are wrong; None if they are right."""
-        if state.unit is Unit.INCH:
-            return self._inch()
-        if state.hold:
-            return self._wrong_setting("is on hold, its value is frozen", "Release hold")
-        if state.mode is not None and state.mode not in self.normal_modes:
-            return self._wrong_setting(f"is in mode {state.mode}", "Set it to normal measuring")
-        if state.scaling:
-            return self._wrong_setting("multiplies what it measures", "Switch its ratio off")
-        if state.battery_low:
-            return self._wrong_setting("has a low battery", "Change it, then zero the gauge again")
-        return None
+        is_odd_mode = state.mode is not None and state.mode not in self.normal_modes
+        checks = (
+            (state.unit is Unit.INCH, *INCH),
+            (state.hold, "is on hold, its value is frozen", "Release hold"),
+            (is_odd_mode, f"is in mode {state.mode}", "Set it to normal measuring"),
+            (state.scaling, "multiplies what it measures", "Switch its ratio off"),
+            (state.battery_low, "has a low battery", "Change it, then zero the gauge again"),
+        )
+        wrong = ((problem, action) for is_wrong, problem, action in checks if is_wrong)
+        return next((self._error(WrongSetting, *one) for one in wrong), None)
 
-    def _inch(self) -> WrongSetting:
-        return self._wrong_setting("answers in inch", "Press its in/mm key")
-
-    def _wrong_setting(self, problem: str, action: str) -> WrongSetting:
-        return WrongSetting(problem, subject=self.subject, action=action)
+    def _error(self, kind: type[ErrorT], problem: str, action: str | None = None) -> ErrorT:
+        return kind(problem, subject=self.subject, action=action)
 
     def _voided(self, problem: str) -> ZeroVoid:
         """The error to raise, now and by every later reading until it is opened again."""
         self._log.warning("%s: its zero is void", problem)
-        self._void = ZeroVoid(problem, subject=self.subject, action="Open it again and zero it again")
+        self._void = self._error(ZeroVoid, problem, "Open it again and zero it again")
         return self._void
 
     def _at_end(self, problem: str) -> GaugeAtEnd:
-        return GaugeAtEnd(problem, subject=self.subject, action="Move the gauge or the ball")
+        return self._error(GaugeAtEnd, problem, "Move the gauge or the ball")
 
     def _opened_state(self) -> GaugeState:
         self._open_port()
         if self._state is None:
-            raise DeviceError("is not open", subject=self.subject)
+            raise self._error(DeviceError, "is not open")
         return self._state
 
     def _open_port(self) -> SharedSerialPort:
         if self._port is None:
-            raise DeviceError("is not open", subject=self.subject)
+            raise self._error(DeviceError, "is not open")
         if self._void is not None:
             raise self._void
-        if self._port.open_count != self._session:
+        if self._port.line.open_count != self._session:
             raise self._voided("lost its port meanwhile")
         return self._port
 

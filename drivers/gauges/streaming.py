@@ -65,19 +65,19 @@ class StreamingGauge(ValueOnlyGauge):
 
     async def _connect(self) -> None:
         await super()._connect()
-        self._latest = self._open_port().log.count
+        self._latest = self._open_port().listened.log.count
         self._begin()
 
     def _begin(self) -> None:
-        self._fresh_from_s = self._open_port().now() + self._delay_s
+        self._fresh_from_s = self._open_port().listened.now() + self._delay_s
 
     async def _ask(self, _request: bytes) -> bytes:
         """The next fresh frame of this gauge."""
         port = self._open_port()
-        deadline_s = max(port.now(), self._fresh_from_s) + self.settings.timeout_s
+        deadline_s = max(port.listened.now(), self._fresh_from_s) + self.settings.timeout_s
         heard: dict[Origin, bytes] = {}
         while True:
-            for frame in port.log.after(self._latest):
+            for frame in port.listened.log.after(self._latest):
                 self._latest = frame.number
                 origin = self._origin(frame.data)
                 if frame.began_after_s < self._fresh_from_s:
@@ -85,7 +85,7 @@ class StreamingGauge(ValueOnlyGauge):
                 if origin is Origin.OWN:
                     return frame.data
                 heard[origin] = frame.data
-            if port.now() >= deadline_s:
+            if port.listened.now() >= deadline_s:
                 raise self._missing(heard)
             await port.listen()
             port = self._open_port()
@@ -96,16 +96,16 @@ class StreamingGauge(ValueOnlyGauge):
             return FrameRejected(heard[Origin.UNKNOWN])
         waited = f"sends nothing for {self.settings.timeout_s:g} s"
         if Origin.ANOTHER_GAUGE in heard:
-            return EmptyChannel(
+            return self._error(
+                EmptyChannel,
                 f"channel {self.channel} {waited}, others on port {self.settings.port} do",
-                subject=self.subject,
-                action="Switch its transmitter on, move its plunger off an end, or correct channel in the "
-                "cell file",
+                "Switch its transmitter on, move its plunger off an end, or correct channel in the cell "
+                "file",
             )
-        return GaugeSilent(
+        return self._error(
+            GaugeSilent,
             f"{waited} on port {self.settings.port}",
-            subject=self.subject,
-            action="Switch it on and have it send by itself, move its plunger off an end, check its cable, "
+            "Switch it on and have it send by itself, move its plunger off an end, check its cable, "
             "and port in the cell file",
         )
 

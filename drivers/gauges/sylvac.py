@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from enum import Enum
 from typing import ClassVar
 
 from drivers.errors import WrongAnswer
@@ -30,16 +29,7 @@ VALUE_FRAME = re.compile(rb"([+\- ])(\d{1,5}\.\d{1,6})[<=>]?\r")
 POWER_UP = re.compile(rb"(?<![A-Z])[A-Z]{2}\d{2,}[\w.]*\r")  # maker, instrument, options
 
 
-class SylvacError(Enum):
-    """The error frames of the instrument."""
-
-    SENSOR = b"ERR0\r"
-    COMMAND = b"ERR1\r"
-    PARITY = b"ERR2\r"
-    RANGE = b"ERR3\r"
-
-
-ERROR_FRAMES = frozenset(fault.value for fault in SylvacError)
+SENSOR, COMMAND, PARITY, RANGE = ERROR_FRAMES = (b"ERR0\r", b"ERR1\r", b"ERR2\r", b"ERR3\r")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +45,7 @@ class Query:
         Raises:
             FrameRejected: The frame is no answer to this request.
         """
-        if frame == SylvacError.COMMAND.value:
+        if frame == COMMAND:
             return None
         match = self.answer.fullmatch(frame)
         if match is None or frame in ERROR_FRAMES:
@@ -72,20 +62,6 @@ PRESET = Query(b"PRE?\r", re.compile(rb"(?:PRE ?)?([+\- ]?\d{1,5}\.\d{1,6})\r"))
 BATTERY = Query(b"BAT?\r", re.compile(rb"(?:BAT ?)?([01])\r"))
 
 
-def parse_value(frame: bytes) -> DisplayedValue | SylvacError:
-    """The value or the error in an answer to ``?``.
-
-    Raises:
-        FrameRejected: The frame is neither a value nor an error, to the last byte.
-    """
-    if match := VALUE_FRAME.fullmatch(frame):
-        return DisplayedValue.of(match[1], match[2], frame)
-    try:
-        return SylvacError(frame)
-    except ValueError:
-        raise FrameRejected(frame) from None
-
-
 class SylvacGauge(SerialGauge):
     """A dial indicator that speaks Sylvac's opto-RS duplex protocol."""
 
@@ -99,32 +75,31 @@ class SylvacGauge(SerialGauge):
     _previous = (b"", b"")
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
-        match parse_value(frame):
-            case DisplayedValue() as displayed:
-                return displayed
-            case SylvacError.RANGE:
-                raise self._at_end("plunger at its end (ERR3)")
-            case SylvacError.SENSOR:
-                raise self._voided("moved too fast or its sensor fails (ERR0)")
-            case _:  # the request was garbled
-                raise FrameRejected(frame)
+        if match := VALUE_FRAME.fullmatch(frame):
+            return DisplayedValue.of(match[1], match[2], frame)
+        if frame == RANGE:
+            raise self._at_end("plunger at its end (ERR3)")
+        if frame == SENSOR:
+            raise self._voided("moved too fast or its sensor fails (ERR0)")
+        raise FrameRejected(frame)  # also another error: the request was garbled
 
     async def _read_state(self) -> GaugeState:
-        unit = await self._query(UNIT.command, UNIT.parse)
+        unit = await self._setting(UNIT)
         if unit is None:
-            raise DeviceError(
-                "does not report its unit", subject=self.subject, action="Use an indicator that knows UNI?"
-            )
-        direction = await self._query(DIRECTION.command, DIRECTION.parse)
+            raise self._error(DeviceError, "does not report its unit", "Use an indicator that knows UNI?")
+        direction = await self._setting(DIRECTION)
         return GaugeState(
             unit=Unit.MM if unit == "MM" else Unit.INCH,
-            identification=await self._query(IDENTIFICATION.command, IDENTIFICATION.parse),
-            mode=await self._query(MODE.command, MODE.parse),
-            hold=_flag(await self._query(HOLD.command, HOLD.parse), "1"),
+            identification=await self._setting(IDENTIFICATION),
+            mode=await self._setting(MODE),
+            hold=_flag(await self._setting(HOLD), "1"),
             reversed=_flag(direction, "-"),
-            preset=await self._query(PRESET.command, PRESET.parse),
-            battery_low=_flag(await self._query(BATTERY.command, BATTERY.parse), "0"),
+            preset=await self._setting(PRESET),
+            battery_low=_flag(await self._setting(BATTERY), "0"),
         )
+
+    async def _setting(self, query: Query) -> str | None:
+        return await self._query(query.command, query.parse)
 
     async def _ask(self, request: bytes) -> bytes:
         before, self._previous = self._previous, (request, b"")
@@ -140,12 +115,9 @@ class SylvacGauge(SerialGauge):
         return frame
 
     def _garbled(self, received: bytes) -> DeviceError:
-        if received == SylvacError.PARITY.value:
-            return WrongAnswer(
-                "receives requests with wrong parity (ERR2)",
-                subject=self.subject,
-                action=f"Check parity settings: {self.spec.protocol} uses {self.spec.line}",
-            )
+        if received == PARITY:
+            action = f"Check parity settings: {self.spec.protocol} uses {self.spec.line}"
+            return self._error(WrongAnswer, "receives requests with wrong parity (ERR2)", action)
         return super()._garbled(received)
 
 

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import re
 import termios
-import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 from drivers.errors import PortLost, WrongSetting
@@ -31,9 +30,9 @@ from drivers.gauges.serial_gauge import SerialGauge
 from drivers.libraries import optional
 from drivers.serial.framing import FRAME_LIMIT
 from drivers.serial.opening import SLICE_S, lost_port
-from drivers.serial.request_port import WORST_LATENCY_S, NoAnswer, RequestPort
+from drivers.serial.request_port import NoAnswer, RequestPort
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.wire_trace import TraceRecorder, TrafficDirection
+from drivers.wire_trace import TrafficDirection
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
 
@@ -62,19 +61,13 @@ class VisaPort(RequestPort):
     messages: they are read with the time-out at once, and cleared after one.
     """
 
-    def __init__(
-        self,
-        url: str,
-        settings: Mapping[str, object],
-        closing: threading.Event,
-        recorder: TraceRecorder | None = None,
-        worst_latency_s: float = WORST_LATENCY_S,
-    ) -> None:
-        super().__init__(url, settings, closing, recorder, worst_latency_s)
-        self._is_stream = any(word in url.upper() for word in BYTE_STREAMS)
-        self._resource: Any = None
-        self._visa: Any = None
-        self._gap_s = SURPLUS_S
+    _resource: Any = None
+    _visa: Any = None
+    _gap_s = SURPLUS_S
+
+    @cached_property
+    def _is_stream(self) -> bool:
+        return any(word in self.url.upper() for word in BYTE_STREAMS)
 
     def open(self) -> int:
         """Open the resource unless it is open; how often it has been opened."""
@@ -124,14 +117,14 @@ class VisaPort(RequestPort):
 
     def _set_line(self, resource: Any) -> None:  # noqa: ANN401
         constants = self._visa.constants
+        given: dict[str, Any] = {**self._settings}
         for name, attribute in LINE_ATTRIBUTES.items():
-            if name in self._settings:
-                setattr(resource, attribute, self._settings[name])
-        if "parity" in self._settings:
-            resource.parity = constants.Parity[PARITIES[str(self._settings["parity"])]]
-        if "stopbits" in self._settings:
-            stop_bits: Any = self._settings["stopbits"]
-            resource.stop_bits = constants.StopBits[STOP_BITS[stop_bits]]
+            if name in given:
+                setattr(resource, attribute, given[name])
+        if "parity" in given:
+            resource.parity = constants.Parity[PARITIES[given["parity"]]]
+        if "stopbits" in given:
+            resource.stop_bits = constants.StopBits[STOP_BITS[given["stopbits"]]]
         resource.end_input = constants.SerialTermination.none
 
     def _answer(self, terminator: bytes, timeout_s: float) -> bytes:
@@ -218,7 +211,7 @@ class VisaGauge(SerialGauge):
             raise FrameRejected(frame)
         number = float(text)
         if abs(number) == NO_NUMBER:
-            raise DeviceError(f"has no value ({text})", subject=self.subject, action="Look at its display")
+            raise self._error(DeviceError, f"has no value ({text})", "Look at its display")
         if abs(number) >= INFINITE:
             raise self._at_end(f"is out of its range ({text})")
         return DisplayedValue(number * self._visa.mm_per_unit, self._decimals, Unit.MM, text)
@@ -234,9 +227,8 @@ class VisaGauge(SerialGauge):
     def _unusable(self, state: GaugeState) -> WrongSetting | None:
         if state.mode is None:
             return None
-        return self._wrong_setting(
-            f"answers {state.mode}", "Set the instrument, or correct expect in the cell file"
-        )
+        action = "Set the instrument, or correct expect in the cell file"
+        return self._error(WrongSetting, f"answers {state.mode}", action)
 
 
 def _text(frame: bytes) -> str:

@@ -9,16 +9,15 @@ from __future__ import annotations
 import logging
 import struct
 import termios
-import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
 from drivers.libraries import optional
 from drivers.serial.framing import is_copies
 from drivers.serial.opening import lost_port, opened_port
-from drivers.serial.request_port import WORST_LATENCY_S, NoAnswer, RequestPort
-from drivers.wire_trace import TraceRecorder, TrafficDirection
+from drivers.serial.request_port import NoAnswer, RequestPort
+from drivers.wire_trace import TrafficDirection
 from hexacell.errors import DeviceError
 
 EXTRA = "modbus"
@@ -53,31 +52,24 @@ class RefusedRequest(DeviceError):
 class ModbusPort(RequestPort):
     """One serial line with Modbus devices; ``settings`` are those of the line."""
 
-    def __init__(
-        self,
-        url: str,
-        settings: Mapping[str, object],
-        closing: threading.Event,
-        recorder: TraceRecorder | None = None,
-        worst_latency_s: float = WORST_LATENCY_S,
-    ) -> None:
-        super().__init__(url, settings, closing, recorder, worst_latency_s)
-        self._line: dict[str, Any] = {name: settings[name] for name in LINE_KEYS if name in settings}
-        self._client: Any = None
-        self._modbus: Any = None
-        self._received = self._frame = b""
+    _client: Any = None
+    _modbus: Any = None
+    _received = _frame = b""
 
     def open(self) -> int:
         """Open the line unless it is open; how often it has been opened."""
         self.require_not_closed()
         if self._client is None:
+            line: dict[str, Any] = {
+                name: self._settings[name] for name in LINE_KEYS if name in self._settings
+            }
             self._modbus = optional("pymodbus", EXTRA, self.subject)
             client = optional("pymodbus.client", EXTRA, self.subject).ModbusSerialClient(
-                self.url, retries=0, trace_packet=self._note, **self._line
+                self.url, retries=0, trace_packet=self._note, **line
             )
             # Not by its own connect(), which gives no cause and configures a pseudo-terminal twice.
             client.socket = opened_port(
-                self.url, self._line, self.subject, self._closing, client.inter_byte_timeout or None
+                self.url, line, self.subject, self._closing, client.inter_byte_timeout or None
             )
             self._client = client
             self.open_count += 1

@@ -6,7 +6,6 @@ import asyncio
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from drivers.serial.framing import FrameLog
 from drivers.serial.port import SerialPort
 from drivers.serial.request_port import WORST_LATENCY_S, RequestPort
 from drivers.wire_trace import TraceRecorder
@@ -21,7 +20,8 @@ class SharedSerialPort:
     which set those lines. Time-outs are set by this class.
 
     Exchanges run one after another. If a coroutine is cancelled, its exchange still ends in the thread
-    before the next one begins, so the line stays synchronized; a waiting exchange is dropped.
+    before the next one begins, so the line stays synchronized; a waiting exchange is dropped. ``line`` is
+    the port itself.
     """
 
     def __init__(
@@ -36,17 +36,7 @@ class SharedSerialPort:
         self._settings = settings
         self._channels: dict[str, int | None] = {}
         self._worker = WorkerThread(f"serial {url}")
-        self._port = factory(url, settings, self._worker.closing, trace, worst_latency_s)
-
-    @property
-    def open_count(self) -> int:
-        """How often the port has been opened; it grows with every reconnection."""
-        return self._port.open_count
-
-    @property
-    def surplus_count(self) -> int:
-        """How often bytes had come before a request, copies of answers included."""
-        return self._port.surplus_count
+        self.line = factory(url, settings, self._worker.closing, trace, worst_latency_s)
 
     def add_gauge(self, gauge: str, settings: Mapping[str, object], channel: int | None) -> None:
         """Let ``gauge`` use the port, alone or with a multiplexer's ``channel``.
@@ -77,53 +67,44 @@ class SharedSerialPort:
 
     async def open(self) -> int:
         """Open the port unless it is open and usable; how often it has been opened."""
-        return await self._run(self._port.open)
+        return await self._run(self.line.open)
 
     async def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
         """Send ``request``; the first complete frame after it, or ``NoAnswer``."""
-        return await self._run(partial(self._port.exchange, request, terminator, timeout_s))
+        return await self._run(partial(self.line.exchange, request, terminator, timeout_s))
 
     async def listen(self) -> None:
         """Take what comes within one slice of time, unasked, into ``log``."""
-        await self._run(self._serial_port.listen)
+        await self._run(self.listened.listen)
 
     @property
-    def log(self) -> FrameLog:
-        """The frames that came unasked, those of all gauges on the port."""
-        return self._serial_port.log
-
-    def now(self) -> float:
-        """The time, s, by which the frames in ``log`` are dated."""
-        return self._serial_port.now()
-
-    @property
-    def _serial_port(self) -> SerialPort:
-        """The port as one that can be listened to; others are only asked."""
-        if not isinstance(self._port, SerialPort):
+    def listened(self) -> SerialPort:
+        """The line as one that can be listened to; others are only asked."""
+        if not isinstance(self.line, SerialPort):
             raise TypeError(f"{self.url} is no serial port")
-        return self._port
+        return self.line
 
     def require_silence(self) -> None:
         """Wait for a short silence before the next exchange, after a garbled frame."""
         if not self._worker.closing.is_set():
-            self._worker.submit(self._port.require_silence)
+            self._worker.submit(self.line.require_silence)
 
     def take_unsolicited(self) -> bytes:
         """The bytes that came without a request or too late since the last call; the latest ones only."""
-        unsolicited = self._port.unsolicited
+        unsolicited = self.line.unsolicited
         return b"".join(unsolicited.popleft() for _ in range(len(unsolicited)))
 
     async def close(self) -> None:
         """Close the port and end its thread within 200 ms; closing twice is harmless."""
-        await self._worker.finish(self._port.close)
+        await self._worker.finish(self.line.close)
 
     async def _run(self, job: Callable[[], Result]) -> Result:
-        self._port.require_not_closed()
+        self.line.require_not_closed()
         return await self._worker.run(job)
 
     def _name_subject(self) -> None:
         names = sorted(self._channels)
-        self._port.subject = f"gauge {names[0]}" if len(names) == 1 else f"gauges {', '.join(names)}"
+        self.line.subject = f"gauge {names[0]}" if len(names) == 1 else f"gauges {', '.join(names)}"
 
 
 class SharedSerialPorts:

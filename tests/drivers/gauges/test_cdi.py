@@ -7,10 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid
-from drivers.gauges.cdi import CdiError, CdiGauge, Parameter, parse_parameter, parse_value
-from drivers.gauges.protocol import DisplayedValue, FrameRejected
+from drivers.gauges.cdi import CdiGauge, Parameter, parse_parameter
+from drivers.gauges.protocol import FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
+from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.indicators import Cdi
+from hexacell.cell.devices import GaugeSettings
 
 VALUE = b"+  2.1380, MM\r\n"
 PARAMETERS = {b"?p011\r": b"0\r\n", b"?p019\r": b"0\r\n", b"?p021\r": b"0\r\n", b"?p040\r": b"0\r\n"}
@@ -37,6 +39,8 @@ async def opened(dialogue, gauge):
 
 # Frames
 
+parse_value = CdiGauge(GaugeSettings(name="y", axis="y", protocol="cdi"), SharedSerialPorts())._parse_value
+
 
 @pytest.mark.parametrize(
     ("frame", "value", "unit"),
@@ -50,13 +54,12 @@ async def opened(dialogue, gauge):
 )
 def test_a_value_is_read_with_its_unit(frame, value, unit):
     shown = parse_value(frame)
-    assert isinstance(shown, DisplayedValue)
     assert (shown.value, shown.apparent_unit) == (value, unit)
 
 
-@pytest.mark.parametrize("refusal", CdiError)
-def test_an_error_answer_is_parsed(refusal):
-    assert parse_value(refusal.value) is refusal
+def test_a_plunger_at_its_end_is_known():
+    with pytest.raises(GaugeAtEnd):
+        parse_value(b"OUT OF BOUNDS\r")
 
 
 @pytest.mark.parametrize(
@@ -75,6 +78,9 @@ def test_an_error_answer_is_parsed(refusal):
         b"+  2.1380, MM",
         b"+  2.\xb1380, MM\r",
         b"SUCCESS\r",
+        b"NOT FOUND\r",
+        b"NO ACCESS\r",
+        b"NON NUMERIC\r",
         b"",
     ],
 )
@@ -86,7 +92,6 @@ def test_malformed_values_are_rejected(frame):
 @given(st.floats(-99, 99), st.booleans())
 def test_values_of_the_simulated_device_are_parsed(value, inch):
     shown = parse_value(Cdi.format_value(1, value, inch=inch).removesuffix(b"\n"))
-    assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-4)
     assert shown.unit == ("inch" if inch else "mm")
 
@@ -101,10 +106,9 @@ def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
         shown = parse_value(noise)
     except FrameRejected:
         return
-    if isinstance(shown, DisplayedValue):
-        assert re.fullmatch(rb"[+-] *[0-9]+\.[0-9]+ *, (IN|MM)\r", noise)
-        assert len(noise) == 14
-        assert abs(shown.value) == float(noise[1:9])
+    assert re.fullmatch(rb"[+-] *[0-9]+\.[0-9]+ *, (IN|MM)\r", noise)
+    assert len(noise) == 14
+    assert abs(shown.value) == float(noise[1:9])
 
 
 @pytest.mark.parametrize("frame", [b"1\r", b"p021=1\r", b"P021 = 1\r", b"p021=001\r"])

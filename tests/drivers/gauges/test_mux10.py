@@ -7,12 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid
+from drivers.errors import EmptyChannel, GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid
 from drivers.gauges import mux10
-from drivers.gauges.mux10 import MultiplexerError, Mux10Gauge, parse_identification, parse_value
+from drivers.gauges.mux10 import MultiplexerBusy, Mux10Gauge, parse_identification
 from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
+from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.indicators import Mux10
+from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, FileError
 
 VALUE = b"02A+0000.123\r"
@@ -41,6 +43,11 @@ def no_pause(monkeypatch):
 # Frames
 
 
+def parse_value(frame, channel=2):
+    settings = GaugeSettings(name="y", axis="y", protocol="mux10", channel=channel)
+    return Mux10Gauge(settings, SharedSerialPorts())._parse_value(frame)
+
+
 @pytest.mark.parametrize(
     ("frame", "value", "decimals"),
     [
@@ -51,12 +58,21 @@ def no_pause(monkeypatch):
     ],
 )
 def test_a_value_is_read(frame, value, decimals):
-    assert parse_value(frame, 2) == DisplayedValue(value, decimals, None, frame.decode().strip())
+    assert parse_value(frame) == DisplayedValue(value, decimals, None, frame.decode().strip())
 
 
-@pytest.mark.parametrize(("frame", "code"), [(b"911\r", 1), (b"918\r", 8), (b"912\r", 2), (b"921\r", 1)])
-def test_an_error_is_read(frame, code):
-    assert parse_value(frame, 2) == MultiplexerError(code)
+@pytest.mark.parametrize(
+    ("frame", "error"),
+    [
+        (b"911\r", EmptyChannel),
+        (b"918\r", MultiplexerBusy),
+        (b"912\r", GaugeAtEnd),
+        (b"921\r", EmptyChannel),
+    ],
+)
+def test_an_error_is_read(frame, error):
+    with pytest.raises(error):
+        parse_value(frame)
 
 
 @pytest.mark.parametrize(
@@ -79,13 +95,12 @@ def test_an_error_is_read(frame, code):
 )
 def test_malformed_values_are_rejected(frame):
     with pytest.raises(FrameRejected):
-        parse_value(frame, 2)
+        parse_value(frame)
 
 
 @given(st.integers(1, 99), st.floats(-99, 99), st.booleans())
 def test_values_of_the_simulated_device_are_parsed(channel, value, inch):
     shown = parse_value(Mux10.format_value(channel, value, inch=inch), channel)
-    assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
     assert (shown.apparent_unit == "inch") is inch
 
@@ -93,13 +108,12 @@ def test_values_of_the_simulated_device_are_parsed(channel, value, inch):
 @given(st.binary(max_size=15) | st.from_regex(rb"0[0-9]A[+\- ][0-9. ]{6,9}\r", fullmatch=True))
 def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
     try:
-        shown = parse_value(noise, 2)
-    except FrameRejected:
+        shown = parse_value(noise)
+    except (FrameRejected, DeviceError, MultiplexerBusy):
         return
-    if isinstance(shown, DisplayedValue):
-        assert re.fullmatch(rb"02A[+-][0-9]+\.[0-9]+\r", noise)
-        assert len(noise) == 13
-        assert shown.value == float(noise[3:])
+    assert re.fullmatch(rb"02A[+-][0-9]+\.[0-9]+\r", noise)
+    assert len(noise) == 13
+    assert shown.value == float(noise[3:])
 
 
 @given(st.floats(-99, 99), st.integers(0, 9), st.integers(0, 9))
@@ -108,7 +122,7 @@ def test_no_part_of_a_value_is_a_value(value, front, back):
     part = frame[front : len(frame) - back]
     if part != frame and not re.fullmatch(rb"9[12]\d\r", part):  # the last digits may be an error frame
         with pytest.raises(FrameRejected):
-            parse_value(part, 2)
+            parse_value(part)
 
 
 @pytest.mark.parametrize("frame", [b"911\r", b"01A+0000.123\r", b"\x80MUX\r", b"\r"])

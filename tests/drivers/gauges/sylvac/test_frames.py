@@ -6,9 +6,17 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from drivers.errors import GaugeAtEnd, ZeroVoid
 from drivers.gauges.protocol import DisplayedValue, FrameRejected
-from drivers.gauges.sylvac import BATTERY, IDENTIFICATION, PRESET, SylvacError, parse_value
+from drivers.gauges.sylvac import BATTERY, ERROR_FRAMES, IDENTIFICATION, PRESET, SylvacGauge
+from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.indicators import Sylvac
+from hexacell.cell.devices import GaugeSettings
+from hexacell.errors import DeviceError
+
+parse_value = SylvacGauge(
+    GaugeSettings(name="y", axis="y", protocol="sylvac"), SharedSerialPorts()
+)._parse_value
 
 
 @pytest.mark.parametrize(
@@ -29,9 +37,13 @@ def test_a_value_is_read(frame, value):
     )
 
 
-@pytest.mark.parametrize("fault", SylvacError)
-def test_an_error_frame_is_parsed(fault):
-    assert parse_value(fault.value) is fault
+@pytest.mark.parametrize(
+    ("frame", "error"),
+    list(zip(ERROR_FRAMES, (ZeroVoid, FrameRejected, FrameRejected, GaugeAtEnd), strict=True)),
+)
+def test_an_error_frame_is_an_error(frame, error):
+    with pytest.raises(error):
+        parse_value(frame)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +75,6 @@ def test_malformed_frames_are_rejected(frame):
 @given(st.floats(-999, 999), st.booleans())
 def test_values_of_the_simulated_device_are_parsed(value, inch):
     shown = parse_value(Sylvac.format_value(1, value, inch=inch))
-    assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
     assert (shown.apparent_unit == "inch") is inch
 
@@ -73,11 +84,10 @@ def test_values_of_the_simulated_device_are_parsed(value, inch):
 def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
     try:
         shown = parse_value(noise)
-    except FrameRejected:
+    except (FrameRejected, DeviceError):
         return
-    if isinstance(shown, DisplayedValue):
-        assert re.fullmatch(rb"[+\- ][0-9]+\.[0-9]+[<=>]?\r", noise)
-        assert shown.value == float(noise.strip(b" <=>\r"))
+    assert re.fullmatch(rb"[+\- ][0-9]+\.[0-9]+[<=>]?\r", noise)
+    assert shown.value == float(noise.strip(b" <=>\r"))
 
 
 @given(st.floats(-99, 99), st.integers(0, 6), st.integers(0, 6))

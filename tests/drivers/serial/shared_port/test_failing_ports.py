@@ -106,7 +106,7 @@ async def test_a_port_that_breaks_is_lost_until_it_is_opened_again(fake, broken)
     port.broken = None
     with pytest.raises(DeviceError, match="was lost"):
         await link.exchange(b"?\r", b"\r", LONG_S)
-    assert link.open_count == 1
+    assert link.line.open_count == 1
     assert await link.open() == 2
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
     await link.close()

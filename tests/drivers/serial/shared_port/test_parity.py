@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from drivers.errors import WrongAnswer
 from drivers.gauges.protocol import FrameRejected
-from drivers.gauges.sylvac import SylvacGauge, parse_value
+from drivers.gauges.sylvac import SylvacGauge
 from drivers.serial.parity import DAMAGED, ParityInBit7, in_software
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
@@ -34,8 +34,9 @@ def test_no_single_wrong_bit_of_a_value_is_accepted(value: float, place: int, bi
     sent[place % len(sent)] ^= 1 << bit
     received = parity.decode(bytes(sent))
     assert received.count(DAMAGED) == 1
+    gauge = SylvacGauge(GaugeSettings(name="y", axis="y", protocol="sylvac"), SharedSerialPorts())
     with pytest.raises(FrameRejected):
-        parse_value(received)
+        gauge._parse_value(received)
 
 
 def test_a_line_of_seven_bits_is_opened_with_eight() -> None:

@@ -39,12 +39,12 @@ async def test_gauges_on_one_port_share_it_until_the_last_releases_it(links, fak
     x = links.acquire("fake", "x", {"baudrate": 9600}, channel=1)
     y = links.acquire("fake", "y", {"baudrate": 9600}, channel=2)
     assert x is y
-    assert x._port.subject == "gauges x, y"
+    assert x.line.subject == "gauges x, y"
     await x.open()
     await links.release("fake", "x")
     await links.release("fake", "x")
     assert port.is_open
-    assert x._port.subject == "gauge y"
+    assert x.line.subject == "gauge y"
     await links.release("fake", "y")
     assert not port.is_open
     z = links.acquire("fake", "z", {"baudrate": 300})
@@ -66,7 +66,7 @@ async def test_conflicting_settings_and_channels_of_a_shared_port_are_refused(
     with pytest.raises(FileError, match=words) as caught:
         links.acquire("loop://", "y", settings, channel=channel)
     assert caught.value.subject == "gauge y"
-    assert first._port.subject == "gauge x"
+    assert first.line.subject == "gauge x"
 
 
 async def test_a_port_used_alone_is_not_shared(links):

@@ -16,9 +16,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from hexacell.campaign.decisions import Forecast
 from hexacell.cli.console import Console
 from hexacell.run_process.live_devices import RunDeviceWatch
-from hexacell.text.events import EventFormatter, activity
 from hexacell.text.layout import wrapped
-from hexacell.text.line_face import gauges_text, record_text, run_status_text
+from hexacell.text.line_face import EventFormatter, activity, gauges_text, record_text, run_status_text
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.state import RunState
 from procedures.steps import events

@@ -16,7 +16,7 @@ from hexacell.services.notify.notice import RunEnd, notice_of_end, notice_of_fai
 from hexacell.services.notify.outbox import notify_all
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.services.schedule.unattended_runs import local_now, refuse_quiet_hours, refused_start
-from hexacell.text.notices import NEXT_TIME, notify_line
+from hexacell.text.operation import NEXT_TIME, notify_line
 from hexacell.text.run import next_try_text
 from procedures.steps import events
 

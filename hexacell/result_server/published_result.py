@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -51,17 +52,15 @@ SEVERITIES = {
 
 @dataclass(frozen=True, slots=True)
 class PublishedResult:
-    """A run that has ended. Lengths in mm; NaN where nothing was found.
+    """A run that has ended, its values in the order of the server's fields. NaN where nothing was found.
 
-    Attributes:
-        result_id: of this run and no other.
-        details: how it ended, in words.
+    ``details`` is how it ended, in words.
     """
 
     result_id: str
-    created: datetime
     is_simulated: bool
     state: ResultState
+    created: datetime
     evaluation: ResultEvaluation
     details: str
     mode: str
@@ -76,21 +75,18 @@ def published_result(cell: str, run: PastRun, *, is_simulated: bool) -> Publishe
     summary = run.summary
     if not summary.is_over or summary.ended is None:
         return None
-    verdict, accuracy = summary.verdict, summary.accuracy
-    position = None if accuracy is None else accuracy.position
-    nothing = float("nan")
+    verdict, position = summary.verdict, summary.position
+    numbers = (math.nan,) * 3 if position is None else (position.value, position.expanded, position.limit)
     return PublishedResult(
-        result_id=f"{cell}/{run.name}",
-        created=summary.ended,
-        is_simulated=is_simulated,
-        state=ResultState.ABORTED if verdict is None else ResultState.COMPLETED,
-        evaluation=ResultEvaluation.UNDEFINED if verdict is None else EVALUATIONS[verdict],
-        details=summary.line,
-        mode=summary.mode,
-        verdict="" if verdict is None else verdict.value,
-        position_mm=nothing if position is None else position.value,
-        expanded_mm=nothing if position is None else position.expanded,
-        limit_mm=nothing if position is None else position.limit,
+        f"{cell}/{run.name}",
+        is_simulated,
+        ResultState.ABORTED if verdict is None else ResultState.COMPLETED,
+        summary.ended,
+        ResultEvaluation.UNDEFINED if verdict is None else EVALUATIONS[verdict],
+        summary.line,
+        summary.mode,
+        "" if verdict is None else verdict.value,
+        *numbers,
     )
 
 

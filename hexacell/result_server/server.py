@@ -1,33 +1,82 @@
-"""The server: results that are there when it begins, then an event for each new one."""
+"""The server of a cell's results by OPC UA: those there are when it begins, then an event for each new one.
+
+Names, meanings and values are those of OPC 40001-101 (Machinery, Result Transfer), 1.00: ResultManagement
+with its Results, ResultMetaData, ResultReadyEventType. They are in a namespace of their own, because the
+types of that specification, its structured data types and its methods among them, are not all here.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import hmac
 import logging
-from collections.abc import Callable
+import os
+from collections import deque
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from asyncua import ua
+from asyncua.crypto import cert_gen
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.server import Server
+from cryptography import x509
+from cryptography.hazmat.primitives.serialization import Encoding
+from cryptography.x509.oid import ExtendedKeyUsageOID
 
+from hexacell.cell.fields import LONGEST_TEXT, Password, Section
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import OpcUaSettings
-from hexacell.errors import DeviceError
-from hexacell.result_server.address_space import MOST_RESULTS, ResultNodes
-from hexacell.result_server.credentials import Reader, allowed_reader, ensure_certificate
-from hexacell.result_server.published_result import NewResults
+from hexacell.cell.passwords import private_content
+from hexacell.errors import DeviceError, UsageError
+from hexacell.result_server.published_result import SEVERITIES, NewResults, PublishedResult
+from hexacell.storage import atomic_files
+
+if TYPE_CHECKING:
+    from asyncua.common.node import Node
+    from asyncua.server.event_generator import EventGenerator
 
 URI = "urn:hexacell:result-server"
+NAMESPACE = "urn:hexacell:results"
+MOST_RESULTS = 10
+"""Results of a cell in the address space; older ones are in its run folders."""
+
+FIELDS = (
+    ("ResultId", ua.VariantType.String),
+    ("IsSimulated", ua.VariantType.Boolean),
+    ("ResultState", ua.VariantType.Int32),
+    ("CreationTime", ua.VariantType.DateTime),
+    ("ResultEvaluation", ua.VariantType.Int32),
+    ("ResultEvaluationDetails", ua.VariantType.String),
+    ("Mode", ua.VariantType.String),
+    ("Verdict", ua.VariantType.String),
+    ("PositionErrorMm", ua.VariantType.Double),
+    ("ExpandedUncertaintyMm", ua.VariantType.Double),
+    ("LimitMm", ua.VariantType.Double),
+)
+META_DATA = 6
+"""The first fields are those of ResultMetaData, the others those of ResultContent."""
+
+USER_VARIABLE, PASSWORD_VARIABLE = "HEXACELL_OPCUA_USER", "HEXACELL_OPCUA_PASSWORD"
+CERTIFICATE, KEY = "certificate.der", "private-key.pem"
+VALID_DAYS = 3650
 
 
-class _Readers:
-    """Lets the reader in, who can change nothing."""
+class ReaderFile(Section):
+    """The content of the server's ``password_file``."""
 
-    def __init__(self, reader: Reader) -> None:
-        self._reader = reader
+    user: Password
+    password: Password
+
+
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """Who may read; anybody if there is no name."""
+
+    user: str = field(default="", repr=False)
+    password: str = field(default="", repr=False)
 
     def get_user(
         self,
@@ -36,9 +85,115 @@ class _Readers:
         password: str | bytes | None = None,
         certificate: object = None,  # noqa: ARG002 - likewise
     ) -> User | None:
-        """The user; None for whoever is refused."""
-        text = password.decode("utf-8", "replace") if isinstance(password, bytes) else password
-        return User(role=UserRole.User) if self._reader.is_this(username, text) else None
+        """Whoever logs in, who can change nothing; None if refused, as slowly for any wrong password."""
+        given = password if isinstance(password, bytes) else (password or "").encode()
+        same_user = hmac.compare_digest((username or "").encode(), self.user.encode())
+        same_password = hmac.compare_digest(given, self.password.encode())
+        is_reader = same_user and same_password if self.user else username is None
+        return User(role=UserRole.User) if is_reader else None
+
+
+def allowed_reader(
+    settings: OpcUaSettings, folder: Path, environment: Mapping[str, str] = os.environ
+) -> Reader:
+    """Who may read; ``folder`` has the cell file.
+
+    Raises:
+        FileError: the password file cannot be read, or others can read or change it.
+        UsageError: nobody is named, and the cell file does not let anybody in.
+    """
+    given = [environment.get(variable, "") for variable in (USER_VARIABLE, PASSWORD_VARIABLE)]
+    if all(given) and max(map(len, given)) <= LONGEST_TEXT:
+        return Reader(*given)
+    if settings.password_file is not None:
+        content = private_content(folder / settings.password_file, ReaderFile)
+        return Reader(content.user.get_secret_value(), content.password.get_secret_value())
+    if settings.anonymous:
+        return Reader()
+    raise UsageError(
+        "nobody may read the results",
+        subject="[opcua]",
+        action=f"Name a password_file, or set {USER_VARIABLE} and {PASSWORD_VARIABLE}",
+    )
+
+
+def ensure_certificate(folder: Path, uri: str, host: str) -> tuple[Path, Path]:
+    """The server's certificate and private key, made where absent; only the owner can read the key.
+
+    Raises:
+        FileError: they cannot be written.
+    """
+    certificate, key = folder / CERTIFICATE, folder / KEY
+    if not (certificate.is_file() and key.is_file()):
+        atomic_files.create_folder_durably(folder)
+        made_certificate, made_key = _made_certificate(uri, host)
+        try:
+            key.unlink(missing_ok=True)
+            with os.fdopen(os.open(key, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
+                stream.write(made_key)
+        except OSError as error:
+            raise atomic_files.os_error_to_file_error("cannot be written", key, error) from error
+        atomic_files.write_atomically(certificate, made_certificate)
+    return certificate, key
+
+
+def _made_certificate(uri: str, host: str) -> tuple[bytes, bytes]:
+    """A certificate signed by itself, as OPC 10000-6, 6.2.2 has it (DER), and its key (PEM)."""
+    key = cert_gen.generate_private_key()
+    certificate = cert_gen.generate_self_signed_app_certificate(
+        key,
+        "hexacell",
+        {},
+        [x509.UniformResourceIdentifier(uri), x509.DNSName(host)],
+        extended=[ExtendedKeyUsageOID.SERVER_AUTH],
+        days=VALID_DAYS,
+    )
+    return certificate.public_bytes(Encoding.DER), cert_gen.dump_private_key_as_pem(key)
+
+
+class ResultNodes:
+    """The results of one cell in the address space of a server."""
+
+    def __init__(self, namespace: int, management: Node, results: Node, event: EventGenerator) -> None:
+        self._namespace = namespace
+        self._management = management
+        self._results = results
+        self._event = event
+        self._shown: deque[Node] = deque()
+
+    @classmethod
+    async def of(cls, server: Server, cell: str) -> ResultNodes:
+        """Make the nodes of a cell: Objects / its name / ResultManagement / Results."""
+        namespace = await server.register_namespace(NAMESPACE)
+        event_type = await server.create_custom_event_type(
+            namespace, "ResultReadyEventType", properties=list(FIELDS)
+        )
+        of_cell = await server.nodes.objects.add_object(namespace, cell)
+        management = await of_cell.add_object(namespace, "ResultManagement")
+        results = await management.add_folder(namespace, "Results")
+        event = await server.get_event_generator(event_type, emitting_node=management.nodeid)
+        return cls(namespace, management, results, event)
+
+    async def show(self, result: PublishedResult) -> None:
+        """Add a result as the newest; the oldest goes where there are too many."""
+        node = await self._results.add_object(self._namespace, result.result_id)
+        meta = await node.add_object(self._namespace, "ResultMetaData")
+        content = await node.add_object(self._namespace, "ResultContent")
+        for number, ((name, kind), value) in enumerate(zip(FIELDS, astuple(result), strict=True)):
+            parent = meta if number < META_DATA else content
+            await parent.add_variable(self._namespace, name, value, varianttype=kind)
+        self._shown.append(node)
+        while len(self._shown) > MOST_RESULTS:
+            oldest = ua.DeleteNodesItem(self._shown.popleft().nodeid, DeleteTargetReferences=True)
+            await self._event.isession.delete_nodes(ua.DeleteNodesParameters([oldest]))
+
+    async def notify(self, result: PublishedResult) -> None:
+        """Raise the event of a result that is ready."""
+        event = self._event.event
+        event.Severity = SEVERITIES[result.evaluation]
+        for (name, _), value in zip(FIELDS, astuple(result), strict=True):
+            setattr(event, name, value)
+        await self._event.trigger(message=result.details)
 
 
 async def serve_results(
@@ -75,7 +230,7 @@ async def serve_results(
 async def _server(settings: OpcUaSettings, reader: Reader, folder: Path) -> Server:
     logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # it reports each refused client at length
     certificate, key = ensure_certificate(folder, URI, settings.host)
-    server = Server(user_manager=_Readers(reader))  # type: ignore[arg-type]  # it needs the one method
+    server = Server(user_manager=reader)  # type: ignore[arg-type]  # it needs the one method
     await server.init()
     server.set_endpoint(f"opc.tcp://{settings.host}:{settings.port}/hexacell/")
     server.set_server_name("hexacell results")

@@ -1,6 +1,7 @@
-"""Text for a plain terminal: what to type and what it means, where a run is, and what happened in it.
+"""Text for a plain terminal: what to type and what it means, where a run is, and what happens in it.
 
-A question takes exactly what it offers; motion and changes begin only on an explicit answer.
+A question takes exactly what it offers; motion and changes begin only on an explicit answer. A step and its
+events have their own words (:mod:`procedures.steps`); those whose text is more than a line have it here.
 """
 
 from __future__ import annotations
@@ -8,15 +9,22 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from hexacell.campaign.decisions import Forecast
-from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot
-from hexacell.text.events import EventFormatter
 from hexacell.text.layout import COLUMNS, duration, wrapped
+from hexacell.text.measured_noise import measured_noise_text
+from hexacell.text.planning import quick_accuracy_text, quick_start_text, run_forecast_line
+from hexacell.text.verdict import check_start_text, check_text, length_text, verification_text
 from procedures.journal.line_format import Entry
+from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import PLACED, Question, QuestionKind
 from procedures.run.state import RunState, apply
 from procedures.steps import events
+from procedures.steps.move import Move
+
+if TYPE_CHECKING:
+    from hexacell.run_process.messages import GaugeSnapshot, LiveSnapshot
 
 YES, NO = ("yes", "y"), ("no", "n")
 
@@ -41,9 +49,13 @@ def run_status_text(
     lines = [
         f"Now: {doing or 'connecting'}",
         f"Done: {state.completed} of {max(expected, state.completed)} records and closings of points",
-        *([] if last is None else [f"Last record: {record_text(last)}"]),
-        *([] if forecast is None else [_forecast_text(forecast)]),
     ]
+    if last is not None:
+        lines.append(f"Last record: {record_text(last)}")
+    if forecast is not None:
+        left = f", {duration(forecast.minutes)} left" if forecast.minutes > 0.0 else ""
+        errors = f"{forecast.now_mm:.3f} mm now, {forecast.end_mm:.3f} at the end"
+        lines.append(f"Predicted error at the task: {errors}{left}")
     return "\n".join(wrapped(line, indent=2) for line in lines)
 
 
@@ -78,13 +90,6 @@ def _gauge_text(gauge: GaugeSnapshot) -> str:
     return f"{shown}; {beside:+.2f} from mid travel ({gauge.travel_mm:g} {gauge.unit})"
 
 
-def _forecast_text(forecast: Forecast) -> str:
-    left = f", {duration(forecast.minutes)} left" if forecast.minutes > 0.0 else ""
-    return (
-        f"Predicted error at the task: {forecast.now_mm:.3f} mm now, {forecast.end_mm:.3f} at the end{left}"
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class TypedAnswer:
     """An answer to a question; ``value`` is None where the person declines."""
@@ -99,16 +104,13 @@ def typed_answer(typed: str, question: Question, person: str) -> TypedAnswer | N
         case QuestionKind.PLACE_GAUGES:
             return None if line else TypedAnswer(PLACED)
         case QuestionKind.APPROVE_CHANGE | QuestionKind.KEEP_RESULT:
-            return _consent_in(line.lower(), question.consent.lower(), person)
+            answer, consent = line.lower(), question.consent.lower()
+            if answer == consent or (consent == YES[0] and answer in YES):
+                return TypedAnswer(person)
+            return TypedAnswer(None) if answer in NO else None
         case QuestionKind.CHOOSE_RECOVERY | QuestionKind.START_UP:
             chosen = matching_choice(line, question)
             return None if chosen is None else TypedAnswer(chosen)
-
-
-def _consent_in(line: str, consent: str, person: str) -> TypedAnswer | None:
-    if line == consent or (consent == YES[0] and line in YES):
-        return TypedAnswer(person)
-    return TypedAnswer(None) if line in NO else None
 
 
 def matching_choice(typed: str, question: Question) -> str | None:
@@ -130,6 +132,59 @@ def request_text(question: Question) -> str:
     return f"Type the cell's name, {question.consent}, to take the responsibility, or no: "
 
 
+class EventFormatter:
+    """Turns the events of one run, in their order, into lines of text."""
+
+    def __init__(self) -> None:
+        self._forecast: Forecast | None = None
+
+    def lines(self, event: events.Event, state: RunState) -> list[str]:
+        """Text of an event; ``state`` includes the event. Empty where there is nothing to report."""
+        return [text for text in (event_text(event, state), self._forecast_line(event)) if text]
+
+    def _forecast_line(self, event: events.Event) -> str | None:
+        """The predicted error, once the set whose last move predicted it is closed."""
+        match event:
+            case events.StepBegun(step=Move(expected=expected)) if expected is not None:
+                self._forecast = expected.forecast
+            case events.SetClosed(at=SetKey(phase=Phase.IDENTIFY)) if self._forecast is not None:
+                return run_forecast_line(self._forecast)
+        return None
+
+
+def activity(event: events.Event) -> str | None:
+    """A few words on what the run does from this event on; None where that does not change."""
+    return event.step.activity() if isinstance(event, events.StepBegun) else None
+
+
+def event_text(event: events.Event, state: RunState) -> str | None:
+    """What an event reports, if anything; ``state`` includes the event."""
+    match event:
+        case events.RunStarted(mode=mode, accepted=accepted):
+            start = quick_start_text if mode == "quick" else check_start_text
+            return None if mode == "optimise" else start(accepted)
+        case events.NoiseMeasured():
+            noise = measured_noise_text(event.noise, with_averaging=True)
+            pilots = len(state.set(event.at).pilots)
+            meanwhile = f"meanwhile {pilots} pilot poses were read, by which the next ones are chosen"
+            return f"{noise}\n{wrapped(meanwhile, indent=2)}" if pilots else noise
+        case events.Identified(quick=quick):
+            return None if quick is None else quick_accuracy_text(quick)
+        case events.ResultValidated():
+            return _verdict_text(event)
+    text = event.text(state)
+    return None if text is None else "\n".join(wrapped(line, indent=2) for line in text.splitlines())
+
+
+def _verdict_text(judged: events.ResultValidated) -> str | None:
+    """The verdict of a calibration, of a length check, or of a check."""
+    if judged.verification is not None:
+        return verification_text(judged.verification)
+    if judged.length is not None:
+        return length_text(judged.length)
+    return None if judged.check is None else check_text(judged.check)
+
+
 def run_story(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:
     """The events that are worth telling a person, each with its text, which may have several lines."""
     formatter, state = EventFormatter(), RunState()
@@ -142,8 +197,7 @@ def run_story(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:
 
 def story_text(entries: Iterable[Entry]) -> str:
     """What happened in a run, each line with its time, UTC."""
-    lines = (f"{entry.at:%H:%M:%S}  {_indented(text)}" for entry, text in run_story(entries))
-    return "\n".join(lines)
+    return "\n".join(f"{entry.at:%H:%M:%S}  {_indented(text)}" for entry, text in run_story(entries))
 
 
 def _own_words(event: events.Event) -> list[str]:
@@ -157,8 +211,7 @@ def _own_words(event: events.Event) -> list[str]:
             return [f"interrupted: {reason}"]
         case events.Ended(line=line):
             return [line]
-        case _:
-            return []
+    return []
 
 
 def _indented(text: str) -> str:

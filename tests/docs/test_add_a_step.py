@@ -22,7 +22,7 @@ from pathlib import Path
 import pytest
 from drivers.interfaces import ControllerStatus
 from hexacell.errors import Interruption
-from hexacell.text.events import activity, event_text
+from hexacell.text.line_face import activity, event_text
 from procedures.engine.commands import Abort
 from procedures.guards import rules
 from procedures.guards.polling import DevicePoller, PolledDevices

@@ -9,7 +9,7 @@ from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.services.notify.notice import notice_of_test
 from hexacell.services.notify.outbox import notify_test, send_waiting, waiting_notices
-from hexacell.text.notices import notifications_document, notifications_text, notify_document, notify_text
+from hexacell.text.operation import notifications_document, notifications_text, notify_document, notify_text
 
 
 def main(options: argparse.Namespace) -> ExitCode:

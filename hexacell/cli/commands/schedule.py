@@ -17,7 +17,7 @@ from hexacell.services.schedule.schedules import (
     write_schedule,
 )
 from hexacell.text.documents import schedule_document
-from hexacell.text.schedules import (
+from hexacell.text.operation import (
     crontab_text,
     present_schedule_text,
     removed_schedule_text,

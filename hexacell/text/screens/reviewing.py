@@ -8,8 +8,8 @@ import numpy as np
 
 from hexacell.cell.model import CellSettings
 from hexacell.services.history.run_index import PastRun
-from hexacell.text.events import event_text
 from hexacell.text.history import NO_RUNS, history_head, history_line
+from hexacell.text.line_face import event_text
 from hexacell.text.parameters import parameter_table, rows_of_run
 from hexacell.text.screens.measuring import accuracy_plot
 from hexacell.text.screens.questions import PERSON, approval_refusal

@@ -25,9 +25,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import OpcUaSettings
 from hexacell.errors import DeviceError, FileError, UsageError
-from hexacell.result_server.address_space import MOST_RESULTS, NAMESPACE
-from hexacell.result_server.credentials import ensure_certificate
-from hexacell.result_server.server import serve_results
+from hexacell.result_server.server import MOST_RESULTS, NAMESPACE, ensure_certificate, serve_results
 from hexacell.runs.run_folder import runs_folder
 from hexacell.verdict.decision import Verdict
 from tests.hexacell.services.notify.local_servers import closed_port

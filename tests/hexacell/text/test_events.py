@@ -8,7 +8,7 @@ import pytest
 
 from hexacell.campaign.decisions import Forecast
 from hexacell.cell.recovery import Action, FailureKind
-from hexacell.text.events import (
+from hexacell.text.line_face import (
     EventFormatter,
     activity,
     event_text,

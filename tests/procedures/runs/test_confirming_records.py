@@ -8,7 +8,7 @@ import pytest
 
 from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
-from hexacell.text.events import event_text
+from hexacell.text.line_face import event_text
 from hexacell.verdict import model_evidence
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.held_out_poses import HeldOutPoses

@@ -20,7 +20,7 @@ from hexacell.config.receipt import Receipt
 from hexacell.errors import ExitCode, Interruption
 from hexacell.kinematics.pose import Pose
 from hexacell.services.run.calibration_run import calibration_of_run
-from hexacell.text.events import event_text
+from hexacell.text.line_face import event_text
 from procedures.calibration.calibration import Mode
 from procedures.engine.commands import Abort, Stop
 from procedures.engine.recovery import RecoveryPolicy

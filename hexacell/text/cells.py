@@ -14,8 +14,8 @@ from hexacell.services.history.cell_status import (
     FleetCell,
     FleetRun,
     UnreadableCell,
+    summary_of,
 )
-from hexacell.services.history.run_index import PastRun, RunSummary
 from hexacell.text.history import legs_text
 from hexacell.text.layout import error_with_u, figure_with_u, iso, minute, verdict_word
 from hexacell.verdict.decision import Verdict
@@ -76,7 +76,7 @@ def metrics_text(found: Sequence[CellStatus]) -> str:
 
 
 def _lines(one: CellStatus) -> Iterator[str]:
-    judged, latest = _summary(one.judged), one.latest
+    judged, latest = summary_of(one.judged), one.latest
     verdict, error = verdict_word(judged.verdict), error_with_u(judged.accuracy)
     when, used = minute(judged.ended), "no" if one.in_use_by is None else f"by {one.in_use_by}"
     yield f"{one.cell.settings.name[:LONGEST_NAME]:{LONGEST_NAME}} {verdict:17} {error:16} {when:17} {used}"
@@ -95,7 +95,7 @@ def _lines(one: CellStatus) -> Iterator[str]:
 
 
 def _document(one: CellStatus) -> dict[str, Any]:
-    judged, worst = _summary(one.judged), one.worst_share
+    judged, worst = summary_of(one.judged), one.worst_share
     position = judged.position
     return {
         "cell": str(one.cell.path),
@@ -115,11 +115,6 @@ def _document(one: CellStatus) -> dict[str, Any]:
     }
 
 
-def _summary(run: PastRun | None) -> RunSummary:
-    """What a run was; without one, that nothing is known."""
-    return RunSummary() if run is None else run.summary
-
-
 def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
     yield "hexacell_in_use", {}, _flag(one.in_use_by is not None)
     yield "hexacell_open_proposal", {}, _flag(one.proposal is not None)
@@ -127,9 +122,9 @@ def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
     if one.latest is not None:
         yield "hexacell_last_run_begun", {}, _flag(one.latest.summary.has_begun)
     times = {
-        "hexacell_last_run_timestamp_seconds": _summary(one.latest).ended,
+        "hexacell_last_run_timestamp_seconds": summary_of(one.latest).ended,
         "hexacell_last_pass_timestamp_seconds": one.passed_at,
-        "hexacell_calibration_timestamp_seconds": _summary(one.in_force).ended,
+        "hexacell_calibration_timestamp_seconds": summary_of(one.in_force).ended,
         "hexacell_calibration_due_timestamp_seconds": one.due_at,
     }
     yield from ((name, {}, repr(at.timestamp())) for name, at in times.items() if at is not None)

@@ -6,7 +6,8 @@ Each cell that shares an archive puts this there, and any computer can read of a
 from __future__ import annotations
 
 import socket
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -33,9 +34,6 @@ CLOCKS_DIFFER = timedelta(minutes=5)
 
 Model = TypeVar("Model", bound=Frozen)
 
-OF_THE_CELL = ""
-"""Stands for a run's name where a document is of the cell itself."""
-
 
 @dataclass(frozen=True, slots=True)
 class CellStatus:
@@ -44,11 +42,9 @@ class CellStatus:
     Attributes:
         in_use_by: who holds its lock, in words; None if nobody does.
         latest: the run that ended last, and ``judged`` the last one with a verdict.
-        passed_at: when a run passed last.
         in_force: the run whose config the controller has; None where it was never calibrated, or edited.
         due_at: when the next calibration is due, where the cell file says how long one is valid.
         proposal: the newest run whose proposal waits for a person.
-        drift: the watch over all runs.
     """
 
     cell: Cell
@@ -111,16 +107,10 @@ def next_calibration_due(cell: Cell, in_force: PastRun | None) -> datetime | Non
 
 
 class FleetCell(Frozen):
-    """How a cell was when it was seen last. Errors in mm.
+    """How a cell was when it put this into the archive (UTC): its :class:`CellStatus` for others.
 
-    Attributes:
-        host, cell: the computer it is run from, and its cell file there.
-        seen_at: when it put this into the archive, UTC.
-        latest_run, latest_at, mode: of the run that ended last.
-        verdict, position_mm, expanded_mm, judged_at: of the last one with a verdict.
-        due_at: when the next calibration is due, where its cell file says how long one is valid.
-        proposal: the newest run whose proposal waits for a person.
-        changes: of the robot, that the watch over all runs found.
+    ``latest_run``, ``latest_at`` and ``mode`` are of the run that ended last, ``verdict`` to ``judged_at``
+    of the last one with a verdict. ``cell`` is its file on ``host``, ``changes`` how many the watch found.
     """
 
     name: Name
@@ -147,17 +137,12 @@ class FleetCell(Frozen):
 
 @dataclass(frozen=True, slots=True)
 class FleetRun:
-    """One run of one of the cells; ``place`` is the computer and folder of its runs."""
+    """One run of one of the cells; ``host`` is the computer it was run from."""
 
     cell: str
-    place: str
+    host: str
     name: str
     summary: RunSummary
-
-    @property
-    def host(self) -> str:
-        """The computer it was run from."""
-        return self.place.partition(":")[0]
 
 
 def publish_status(status: CellStatus) -> None:
@@ -171,32 +156,34 @@ def publish_status(status: CellStatus) -> None:
         return
     from hexacell.runs.archive import Archive  # noqa: PLC0415 - SQLAlchemy only where it is used
 
-    content = fleet_cell(status).model_dump_json().encode()
-    with closing(Archive(runs_folder(cell), cell.settings.name, cell.settings.archive.url)) as archive:
-        archive.store(DocumentKind.CELL, {OF_THE_CELL: StampedDocument(OF_THE_CELL, content)})
-
-
-def fleet_cell(status: CellStatus) -> FleetCell:
-    """The status of a cell as an archive has it."""
-    latest, judged = status.latest, status.judged
-    accuracy = None if judged is None else judged.summary.accuracy
-    return FleetCell(
-        name=status.cell.settings.name,
+    latest, judged = summary_of(status.latest), summary_of(status.judged)
+    position = judged.position
+    shown = FleetCell(
+        name=cell.settings.name,
         host=socket.gethostname(),
-        cell=str(status.cell.path.absolute()),
+        cell=str(cell.path.absolute()),
         seen_at=datetime.now(UTC),
-        latest_run=None if latest is None else latest.name,
-        latest_at=None if latest is None else latest.summary.ended,
-        mode="" if latest is None else latest.summary.mode,
-        verdict=None if judged is None else judged.summary.verdict,
-        position_mm=None if accuracy is None else accuracy.position.value,
-        expanded_mm=None if accuracy is None else accuracy.position.expanded,
-        judged_at=None if judged is None else judged.summary.ended,
+        latest_run=status.latest and status.latest.name,
+        latest_at=latest.ended,
+        mode=latest.mode,
+        verdict=judged.verdict,
+        position_mm=position and position.value,
+        expanded_mm=position and position.expanded,
+        judged_at=judged.ended,
         passed_at=status.passed_at,
         due_at=status.due_at,
-        proposal=None if status.proposal is None else status.proposal.name,
+        proposal=status.proposal and status.proposal.name,
         changes=len(status.drift.changes),
     )
+    # The document is of the cell itself, and so has no run's name.
+    document = StampedDocument("", shown.model_dump_json().encode())
+    with closing(Archive(runs_folder(cell), cell.settings.name, cell.settings.archive.url)) as archive:
+        archive.store(DocumentKind.CELL, {"": document})
+
+
+def summary_of(run: PastRun | None) -> RunSummary:
+    """What a run was; without one, that nothing is known."""
+    return RunSummary() if run is None else run.summary
 
 
 def fleet_cells(url: str) -> tuple[FleetCell, ...]:
@@ -205,9 +192,7 @@ def fleet_cells(url: str) -> tuple[FleetCell, ...]:
     Raises:
         ArchiveUnavailable: it cannot be read.
     """
-    documents = _shared_documents(url, DocumentKind.CELL)
-    found = (_read(FleetCell, one) for one in documents)
-    return tuple(one for one in found if one is not None)
+    return tuple(cell for _, cell in _shared(url, DocumentKind.CELL, FleetCell))
 
 
 def fleet_runs(url: str) -> tuple[FleetRun, ...]:
@@ -216,29 +201,20 @@ def fleet_runs(url: str) -> tuple[FleetRun, ...]:
     Raises:
         ArchiveUnavailable: it cannot be read.
     """
-    documents = _shared_documents(url, DocumentKind.SUMMARY)
     found = [
-        FleetRun(one.cell, one.place, one.run, summary)
-        for one in documents
-        if (summary := _read(RunSummary, one)) is not None
+        FleetRun(one.cell, one.place.partition(":")[0], one.run, summary)
+        for one, summary in _shared(url, DocumentKind.SUMMARY, RunSummary)
     ]
-    return tuple(sorted(found, key=_recency, reverse=True))
+    never = datetime.min.replace(tzinfo=UTC)
+    return tuple(
+        sorted(found, key=lambda run: (run.summary.ended or never, run.cell, run.name), reverse=True)
+    )
 
 
-def _recency(run: FleetRun) -> tuple[float, str, str]:
-    ended = run.summary.ended
-    return 0.0 if ended is None else ended.timestamp(), run.cell, run.name
-
-
-def _shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]:
+def _shared(url: str, kind: DocumentKind, model: type[Model]) -> Iterator[tuple[SharedDocument, Model]]:
+    """What the cells of an archive share, without what a newer program has written."""
     from hexacell.runs.archive import shared_documents  # noqa: PLC0415 - SQLAlchemy only where used
 
-    return shared_documents(url, kind)
-
-
-def _read(model: type[Model], document: SharedDocument) -> Model | None:
-    """What a document holds; None where a newer program has written it."""
-    try:
-        return model.model_validate_json(document.content)
-    except ValidationError:
-        return None
+    for document in shared_documents(url, kind):
+        with suppress(ValidationError):
+            yield document, model.model_validate_json(document.content)

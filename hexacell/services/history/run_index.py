@@ -109,13 +109,8 @@ class EvidenceDocument(Frozen):
     def of(cls, at: datetime, celsius: float | None, free: int, evidence: RunEvidence) -> Self:
         """The document of an evidence."""
         upper = evidence.information[np.triu_indices(len(evidence.weighted))]
-        return cls(
-            at=at,
-            celsius=celsius,
-            free=free,
-            information=_base64(upper),
-            weighted=_base64(evidence.weighted),
-        )
+        information, weighted = _base64(upper), _base64(evidence.weighted)
+        return cls(at=at, celsius=celsius, free=free, information=information, weighted=weighted)
 
     @property
     def evidence(self) -> RunEvidence:
@@ -184,19 +179,18 @@ class RunIndex:
             known = archive.documents(kind)
             archive.forget([name for name in known if name not in stamps])
         except ArchiveUnavailable as error:
-            self._warn_once(error)
+            self._give_up(error)
             return {}
         return known
 
     def _keep(self, archive: Archive, kind: DocumentKind, documents: Mapping[str, StampedDocument]) -> None:
-        if self._has_warned:
-            return
-        try:
-            archive.store(kind, documents)
-        except ArchiveUnavailable as error:
-            self._warn_once(error)
+        if not self._has_warned:
+            try:
+                archive.store(kind, documents)
+            except ArchiveUnavailable as error:
+                self._give_up(error)
 
-    def _warn_once(self, error: ArchiveUnavailable) -> None:
+    def _give_up(self, error: ArchiveUnavailable) -> None:
         self._has_warned = True
         self._warn(str(error))
 

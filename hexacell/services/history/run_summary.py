@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 from hexacell.config.receipt import RECEIPT, Receipt
 from hexacell.errors import HexacellError, UsageError
 from hexacell.results.result import IdentificationResult
-from hexacell.runs.run_folder import RunFolder, StartAttempts, read_attempts
+from hexacell.runs.run_folder import RunFolder, read_attempts
 from hexacell.services.history.run_index import RunSummary
 from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import VerifiedAccuracy
@@ -21,13 +22,25 @@ def run_summary(folder: RunFolder) -> RunSummary:
     """The summary of a run, by its folder alone; why it cannot be read, where it cannot."""
     try:
         if not folder.journal.is_file() and (attempts := read_attempts(folder)) is not None:
-            return _summary_of_attempts(attempts)
+            first, last = attempts.attempts[0].at, attempts.last.at
+            return RunSummary(
+                began=first,
+                ended=last,
+                mode=attempts.mode,
+                line=attempts.line,
+                is_over=True,
+                has_begun=False,
+            )
         entries = read_entries(folder.journal)
     except HexacellError as error:
         return RunSummary(line=str(error))
     if not entries:
         return RunSummary(line="its journal is empty")
     state = fold(entry.event for entry in entries)
+    written_sha256 = None
+    with suppress(HexacellError):
+        written_sha256 = Receipt.of(folder.path).sha256_after
+    is_applied = (state.committed is not None and not state.rolled_back) or is_applied_later(folder)
     return RunSummary(
         began=entries[0].at,
         ended=entries[-1].at,
@@ -38,17 +51,9 @@ def run_summary(folder: RunFolder) -> RunSummary:
         line=_last_line(entries, state),
         has_result=result_of_its_own(state) is not None,
         is_over=state.ended is not None,
-        written_sha256=_written_sha256(folder),
+        written_sha256=written_sha256,
         has_written=(folder.path / RECEIPT).is_file(),
-        has_proposal=_has_open_proposal(folder, state),
-    )
-
-
-def _summary_of_attempts(refused: StartAttempts) -> RunSummary:
-    """Summary of a run that never began."""
-    first, last = refused.attempts[0].at, refused.last.at
-    return RunSummary(
-        began=first, ended=last, mode=refused.mode, line=refused.line, is_over=True, has_begun=False
+        has_proposal=state.proposed is not None and folder.proposal.is_file() and not is_applied,
     )
 
 
@@ -102,17 +107,3 @@ def _last_line(entries: Sequence[Entry], state: RunState) -> str:
     last = entries[-1].event
     reason = last.reason if isinstance(last, events.Interrupted) else "it is going on, or was killed"
     return f"not over: {reason}"
-
-
-def _has_open_proposal(folder: RunFolder, state: RunState) -> bool:
-    """Whether what a run proposed was not written, or undone by the run itself."""
-    is_in_use = state.committed is not None and not state.rolled_back
-    is_applied = is_in_use or is_applied_later(folder)
-    return state.proposed is not None and folder.proposal.is_file() and not is_applied
-
-
-def _written_sha256(folder: RunFolder) -> str | None:
-    try:
-        return Receipt.of(folder.path).sha256_after
-    except HexacellError:
-        return None

@@ -29,8 +29,7 @@ from procedures.devices.device_set import Devices
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, CommandQueue, Pause, Stop
 from procedures.engine.engine import Engine
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import now
+from procedures.journal.journal import now, read_entries
 from procedures.run.questions import Question
 from procedures.run.state import RunState
 from procedures.steps import events

@@ -21,8 +21,7 @@ from hexacell.kinematics.parameters import JointUnit
 from hexacell.run_process.messages import ControllerSnapshot, EncoderSnapshot, GaugeSnapshot, LiveSnapshot
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.services.devices.device_setup import device_addresses, devices_of
-from procedures.devices.device_set import Devices, poll_for_screens
-from procedures.devices.live_values import SAMPLE_PERIOD_S, LiveValue, LiveValues
+from procedures.devices.device_set import SAMPLE_PERIOD_S, Devices, LiveValue, LiveValues, poll_for_screens
 from procedures.engine.command_loop import Status
 from procedures.engine.engine import Engine
 from procedures.run.cancellation import cancel_and_wait

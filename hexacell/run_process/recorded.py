@@ -20,12 +20,11 @@ from hexacell.run_process.messages import (
 from hexacell.runs.run_folder import RunFolder
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import Entry
+from procedures.journal.journal import Entry, read_entries
 from procedures.run.questions import ask_placement
 from procedures.run.state import fold
 from procedures.steps import events
-from procedures.steps.place import Place
+from procedures.steps.sample import Place
 
 LONGEST_WAIT_S = 60.0
 """Longest wait between two events, s of recorded time: nobody waits for a run resumed the next day."""

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from hexacell.services.write_back.config_history import ConfigHistory, ConfigWrite
     from hexacell.services.write_back.config_rollback import ConfigRollback
     from hexacell.services.write_back.proposals import AppliedProposal
-    from procedures.journal.line_format import Entry
-    from procedures.replay.comparison import ReplayReport
+    from procedures.journal.journal import Entry
+    from procedures.replay.replayer import ReplayReport
     from procedures.run.state import RunState
     from procedures.steps import events
 

@@ -16,7 +16,7 @@ from hexacell.text.layout import COLUMNS, duration, wrapped
 from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.planning import quick_accuracy_text, quick_start_text, run_forecast_line
 from hexacell.text.verdict import check_start_text, check_text, length_text, verification_text
-from procedures.journal.line_format import Entry
+from procedures.journal.journal import Entry
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import PLACED, Question, QuestionKind
 from procedures.run.state import RunState, apply

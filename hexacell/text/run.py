@@ -14,7 +14,7 @@ from hexacell.text.layout import duration, wrapped
 from hexacell.text.line_face import request_text
 from hexacell.text.verdict import teaching_line, teaching_sentence
 from procedures.calibration.calibration import Mode
-from procedures.replay.comparison import Aspect, Difference, ReplayReport
+from procedures.replay.replayer import Aspect, Difference, ReplayReport
 from procedures.run.questions import (
     GaugePlacement,
     PendingChange,

@@ -10,9 +10,14 @@ from hexacell.errors import ExitCode, HexacellError, Interruption, OutOfTime
 from hexacell.verdict.decision import Verdict
 from procedures.engine.command_loop import CommandLoop, Status, StepCancelled
 from procedures.engine.commands import Command, CommandQueue, QuestionBroker, UnattendedOperator
-from procedures.engine.recovery import GIVE_UP, Recovery, RecoveryPolicy
-from procedures.engine.reversal import Reversal, revert_at_end, revert_unrecorded
-from procedures.engine.step_executor import StepExecutor
+from procedures.engine.recovery import (
+    GIVE_UP,
+    Recovery,
+    RecoveryPolicy,
+    Reversal,
+    revert_at_end,
+    revert_unrecorded,
+)
 from procedures.journal.journal import Journal
 from procedures.run.cancellation import shielded
 from procedures.run.keys import Phase
@@ -21,6 +26,7 @@ from procedures.run.state import RunState, apply, fold
 from procedures.run.trips import GuardTripped, RobotNotStopped, may_still_move
 from procedures.steps import events
 from procedures.steps.registry import Step
+from procedures.workflow.next_step import StepExecutor
 
 Listener = Callable[[events.Event, RunState], None]
 

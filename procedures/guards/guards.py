@@ -27,11 +27,15 @@ from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.stated_limits import gauge_travel_of
 from procedures.devices.device_set import Devices, MountedGauge
-from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
+from procedures.guards.polling import (
+    DevicePoller,
+    GaugeDeviation,
+    LineActivity,
+    PolledDevices,
+    WatchedController,
+)
 from procedures.guards.position_check import PositionCheck, PositionReports, PositionSource
-from procedures.guards.rules.after_a_move import following_error, stuck_gauge
-from procedures.guards.rules.base import GuardLimits
-from procedures.guards.rules.controller_frozen import WatchedController
+from procedures.guards.rules import GuardLimits, following_error, stuck_gauge
 from procedures.guards.supervision import MotionSupervisor, Supervised
 from procedures.run.keys import ThreeNumbers
 from procedures.run.trips import Trip, WatchedSet

@@ -27,7 +27,7 @@ from hexacell.errors import HexacellError
 from hexacell.storage import atomic_files
 from procedures.guards import rules
 from procedures.guards.polling import PolledDevices
-from procedures.guards.rules.base import GuardLimits
+from procedures.guards.rules import GuardLimits
 from procedures.run.cancellation import cancel_and_wait, shielded
 from procedures.run.trips import Guard, GuardTripped, Trip
 

@@ -28,18 +28,20 @@ from hexacell.kinematics.rotations import Array
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.calibration import Calibration
 from procedures.devices.device_set import Devices
-from procedures.engine.step_executor import StepExecutor
 from procedures.guards.guards import Guards
 from procedures.guards.position_check import PositionReports
 from procedures.guards.supervision import Supervised
-from procedures.replay.comparison import TOLERANCE
 from procedures.run.questions import Question
 from procedures.run.readings import Reading, ReadingSeries
 from procedures.run.state import RunState
 from procedures.run.trips import WatchedSet
 from procedures.steps import events
+from procedures.workflow.next_step import StepExecutor
 
 PROTOCOL = "recorded"
+
+TOLERANCE = 1e-9
+"""Largest difference that counts as rounding: absolute in the field's unit, above 1 relative."""
 
 Result = TypeVar("Result")
 

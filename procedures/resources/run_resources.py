@@ -26,8 +26,7 @@ from procedures.devices.device_set import Devices, Thermometers, gather_errors
 from procedures.devices.settling import DeviceSnapshot, Settled, read_series, settle, trimmed_mean
 from procedures.guards.guards import Guards
 from procedures.guards.position_check import PositionReports
-from procedures.resources.config_changes import ConfigChanges, ConfigEdits
-from procedures.resources.startup import Startup
+from procedures.resources.controller_config import ConfigChanges, ConfigEdits, Startup
 from procedures.run.cancellation import in_thread
 from procedures.run.keys import SixNumbers
 from procedures.run.questions import Operator, Question

@@ -1,90 +1,233 @@
-"""The events of a run, as the journal keeps them; everything else is derived from them."""
+"""The events of a run, as the journal keeps them; everything else is derived from them.
+
+Here are those that are no outcome of a step: how a run begins, is interrupted, and ends. The others are
+imported, so that this is the namespace in which other packages name all of them.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Union
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Literal, Self, Union
 
 from pydantic import Field
 
-from procedures.steps import course, registry
-from procedures.steps.accept import ResultAccepted
-from procedures.steps.assess_noise import NoiseMeasured
+from drivers.interfaces import DeviceIdentity
+from hexacell.cell.fields import GeometryDocument
+from hexacell.cell.recovery import Action, FailureKind
+from hexacell.config.interface import ControllerLimits
+from hexacell.kinematics.mechanism import Branch
+from hexacell.results.result import AcceptedResult
+from hexacell.results.written_geometry import TaskDisplacement
+from procedures.run.keys import Phase, SetKey
+from procedures.run.state import RunState, place_of
+from procedures.run.trips import Guard, Trip
 from procedures.steps.base import BaseEvent
-from procedures.steps.close import SetClosed
-from procedures.steps.commit import Committed
-from procedures.steps.course import (
-    CommandRejected,
-    Ended,
-    Failed,
-    Interrupted,
-    Paused,
-    RecordDiscarded,
-    Resumed,
-    RunRecalled,
-    RunStarted,
-    StepBegun,
-    Tripped,
-)
+from procedures.steps.gauge_trial import GaugesProbed, GaugesTried
 from procedures.steps.identify import Identified
 from procedures.steps.judge import ConfirmationPlanned, ResultValidated
-from procedures.steps.lend import ProvisionalApplied
-from procedures.steps.locate import Located
-from procedures.steps.move import Arrived, PoseExcluded
-from procedures.steps.pilot import PilotTaken
-from procedures.steps.place import GaugesPlaced
-from procedures.steps.probe import GaugesProbed
-from procedures.steps.propose import Proposed
-from procedures.steps.repeat import ReferenceRepeated
-from procedures.steps.revisit import ReferenceConfirmed, SetInvalidated
-from procedures.steps.roll_back import RolledBack
-from procedures.steps.sample import RecordRejected, RecordTaken
-from procedures.steps.standstill import StandstillRead
-from procedures.steps.take_back import ProvisionalReverted
-from procedures.steps.try_gauges import GaugesTried
+from procedures.steps.move import Arrived, Located, Move, PoseExcluded
+from procedures.steps.noise import NoiseMeasured, PilotTaken, ReferenceRepeated, StandstillRead
+from procedures.steps.provisional import ProvisionalApplied, ProvisionalReverted
+from procedures.steps.reference import ReferenceConfirmed, SetClosed, SetInvalidated
+from procedures.steps.registry import STEPS, Step
+from procedures.steps.sample import GaugesPlaced, RecordRejected, RecordTaken
+from procedures.steps.write_back import Committed, Proposed, ResultAccepted, RolledBack
 
-__all__ = [  # the namespace in which other packages name them
-    "EVENTS",
-    "Arrived",
-    "CommandRejected",
-    "Committed",
-    "ConfirmationPlanned",
-    "Ended",
-    "Event",
-    "Failed",
-    "GaugesPlaced",
-    "GaugesProbed",
-    "GaugesTried",
-    "Identified",
-    "Interrupted",
-    "Located",
-    "NoiseMeasured",
-    "Paused",
-    "PilotTaken",
-    "PoseExcluded",
-    "Proposed",
-    "ProvisionalApplied",
-    "ProvisionalReverted",
-    "RecordDiscarded",
-    "RecordRejected",
-    "RecordTaken",
-    "ReferenceConfirmed",
-    "ReferenceRepeated",
-    "ResultAccepted",
-    "ResultValidated",
-    "Resumed",
-    "RolledBack",
-    "RunRecalled",
-    "RunStarted",
-    "SetClosed",
-    "SetInvalidated",
-    "StandstillRead",
-    "StepBegun",
-    "Tripped",
-]
 
-EVENTS: tuple[type[BaseEvent], ...] = tuple(
-    dict.fromkeys([*course.COURSE, *(event for step in registry.STEPS for event in step.outcomes)])
+class RunStarted(BaseEvent):
+    """The first event of a run.
+
+    ``taught`` is the geometry with which the robot was taught last, in frames of its own. ``accepted`` is
+    the result that a check, the quick level or a length check starts from, if there is one.
+    ``length_check`` is whether a calibration has one.
+    ``joint_ranges`` are those of cell file and config together, mm; ``limits`` are what the controller's
+    config and its INI file state.
+    ``expired`` are the instruments whose certificate had expired on the day it began.
+    ``config`` is the controller's config or its first file, ``further_configs`` are the others, and
+    ``config_sha256`` is the fingerprint of all.
+    """
+
+    kind: Literal["started"] = "started"
+    software: str
+    cell: str
+    cell_text: str
+    mode: Literal["check", "quick", "optimise", "length"]
+    config: str
+    config_sha256: str
+    controller: GeometryDocument
+    branch: Branch
+    devices: tuple[DeviceIdentity, ...]
+    pose_list: str | None = None
+    taught: GeometryDocument
+    accepted: AcceptedResult | None = None
+    length_check: bool = False
+    joint_ranges: tuple[tuple[float, float], ...]
+    limits: ControllerLimits
+    expired: tuple[str, ...] = ()
+    further_configs: tuple[str, ...] = ()
+
+    def applied_to(self, state: RunState) -> RunState:
+        return replace(state, started=self, position_unknown=True)
+
+
+class StepBegun(BaseEvent):
+    """A step was decided and is being executed."""
+
+    kind: Literal["begun"] = "begun"
+    step: Step
+
+    def applied_to(self, state: RunState) -> RunState:
+        return self.step.begun_in(state)
+
+
+class Tripped(BaseEvent):
+    """A guard stopped the robot, or kept it from moving: which, why, and the next action."""
+
+    kind: Literal["tripped"] = "tripped"
+    guard: Guard
+    device: str
+    problem: str
+    action: str
+
+    @classmethod
+    def of(cls, trip: Trip) -> Self:
+        """The event of a trip."""
+        if trip.stop_failure:
+            problem = f"the robot could not be stopped: {trip.stop_failure}. Before that: {trip.problem}"
+            return cls(
+                guard=trip.guard, device=trip.device, problem=problem, action="Press the emergency stop"
+            )
+        return cls(guard=trip.guard, device=trip.device, problem=trip.problem, action=trip.action)
+
+    def applied_to(self, state: RunState) -> RunState:
+        """An emergency stop lasts until the robot has moved again."""
+        return replace(state, is_in_estop=True) if self.guard is Guard.EMERGENCY_STOP else state
+
+
+class Paused(BaseEvent):
+    """The run is paused; ``at_once``: motion was stopped in place, within a step."""
+
+    kind: Literal["paused"] = "paused"
+    at_once: bool = False
+
+    def applied_to(self, state: RunState) -> RunState:
+        """A robot that was stopped in place is somewhere, with its gauges."""
+        return state.without_position().unverified() if self.at_once else state
+
+    def text(self, state: RunState) -> str:
+        return self.kind
+
+
+class Resumed(BaseEvent):
+    """The run continues after a pause."""
+
+    kind: Literal["resumed"] = "resumed"
+
+    def text(self, state: RunState) -> str:
+        return self.kind
+
+
+class RunRecalled(BaseEvent):
+    """The run is to end at the reference of the set in which the robot is, and why."""
+
+    kind: Literal["recalled"] = "recalled"
+    reason: str
+
+    def applied_to(self, state: RunState) -> RunState:
+        return replace(state, recalled=self.reason)
+
+    def text(self, state: RunState) -> str:
+        return f"the run is to end: {self.reason}; back to the reference"
+
+
+class RecordDiscarded(BaseEvent):
+    """A record no longer counts and is taken again at the same pose. It stays in the journal."""
+
+    kind: Literal["undone"] = "undone"
+    at: SetKey
+    orientation: int
+
+    def applied_to(self, state: RunState) -> RunState:
+        return state.with_set(self.at, state.set(self.at).without(self.orientation))
+
+    def text(self, state: RunState) -> str:
+        return f"{self.at.name}, orientation {self.orientation} is measured again"
+
+
+class Failed(BaseEvent):
+    """A step, or deciding on one, failed; motion was stopped.
+
+    ``failure`` is its kind, ``attempt`` counts failures of this kind at this set or step since the
+    run was begun or resumed, and ``action`` is the reaction; ``asked`` is whether a person chose it.
+    """
+
+    kind: Literal["failed"] = "failed"
+    step: Step | None
+    failure: FailureKind
+    attempt: int
+    reason: str
+    action: Action
+    asked: bool = False
+
+    def applied_to(self, state: RunState) -> RunState:
+        """A ball that left its plate on the way to a chosen pose is a rejected record."""
+        where = (self.failure, place_of(self.step))
+        failures = {**state.failures, where: self.attempt}
+        counted = replace(state, failures=failures).without_position()
+        is_off_plate = self.failure is FailureKind.GAUGE_AT_END and self.action is not Action.REDO_SET
+        match self.step:
+            case Move(at=at, orientation=orientation) if is_off_plate and at.phase is Phase.IDENTIFY:
+                counted = counted.with_set(at, counted.set(at).with_rejection(orientation))
+        return counted.unverified() if self.action is Action.MEASURE_AGAIN else counted
+
+    def text(self, state: RunState) -> str:
+        return f"{self.reason}\n  attempt {self.attempt}: {self.action.value}"
+
+
+class CommandRejected(BaseEvent):
+    """A command was refused, and why."""
+
+    kind: Literal["declined"] = "declined"
+    command: str
+    reason: str
+
+    def text(self, state: RunState) -> str:
+        return f"{self.command}: {self.reason}"
+
+
+class Interrupted(BaseEvent):
+    """The run ended early: by a person, a failure, or because an answer is missing."""
+
+    kind: Literal["interrupted"] = "interrupted"
+    reason: str
+    exit_code: int
+
+    def applied_to(self, state: RunState) -> RunState:
+        return replace(state, failures={}, recalled=None).without_position().unverified()
+
+
+class Ended(BaseEvent):
+    """The run is over; ``displacement`` is that of the new geometry, if it stays in the controller."""
+
+    kind: Literal["ended"] = "ended"
+    exit_code: int
+    line: str
+    displacement: TaskDisplacement | None = None
+
+    def applied_to(self, state: RunState) -> RunState:
+        return replace(state, ended=self)
+
+
+_COURSE: tuple[type[BaseEvent], ...] = (
+    RunStarted,
+    StepBegun,
+    RecordDiscarded,
+    Paused,
+    Resumed,
+    RunRecalled,
 )
+_COURSE += (Failed, CommandRejected, Tripped, Interrupted, Ended)
+EVENTS = tuple(dict.fromkeys([*_COURSE, *(event for step in STEPS for event in step.outcomes)]))
 
 if TYPE_CHECKING:
     Event = BaseEvent

@@ -17,11 +17,9 @@ from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
-from procedures.steps.locate import Locate
-from procedures.steps.move import Move
+from procedures.steps.move import Locate, Move
 from procedures.steps.registry import Step
-from procedures.workflow.paths import NoSafePath
-from procedures.workflow.sets import SetSteps, TravelError, reference_pose
+from procedures.workflow.sets import NoSafePath, SetSteps, TravelError, reference_pose
 from procedures.workflow.trial import TrialSteps
 
 BESIDE_MM = np.array([1.0, -0.8, 0.6])

@@ -8,27 +8,41 @@ the verdict on a calibration, measures two seats (:mod:`~procedures.workflow.len
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Calibration, Mode
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase
 from procedures.run.state import RunState
-from procedures.steps.accept import Accept
-from procedures.steps.base import BaseStep
-from procedures.steps.commit import Commit
+from procedures.steps.base import BaseEvent, BaseStep
 from procedures.steps.identify import Identify
 from procedures.steps.judge import Judge, ResultValidated
-from procedures.steps.propose import Propose
-from procedures.steps.roll_back import RollBack
-from procedures.steps.take_back import TakeBack
+from procedures.steps.provisional import TakeBack
+from procedures.steps.write_back import Accept, Commit, Propose, RollBack
 from procedures.workflow.held_out import HeldOutSteps
 from procedures.workflow.length import LengthSteps
-from procedures.workflow.noise import NoiseSteps
-from procedures.workflow.points import IdentificationSteps
+from procedures.workflow.points import IdentificationSteps, NoiseSteps
 from procedures.workflow.sets import SetSteps
 from procedures.workflow.trial import TrialSteps
+
+
+@dataclass(frozen=True, eq=False)
+class StepExecutor(RunResources):
+    """The resources of a run, with which its steps are carried out."""
+
+    def next_step(self, state: RunState) -> BaseStep | None:
+        """The step to carry out; None if the run is over. Raises ``HexacellError`` if none is possible."""
+        return next_step(self.calibration, state)
+
+    async def perform(self, step: BaseStep, state: RunState) -> BaseEvent:
+        """Carry out one step; raises ``HexacellError``."""
+        if not step.moves_nothing:
+            await self.require_unedited_config(state)
+        return await step.perform(self, state)
 
 
 def next_step(calibration: Calibration, state: RunState) -> BaseStep | None:

@@ -1,33 +1,169 @@
-"""The steps within one set of poses, whatever it is measured for, and the verification of its reference."""
+"""The steps within one set of poses, whatever it is measured for, and the moves between its poses.
+
+A move follows checked straight lines from wherever the robot is, or is not made (:mod:`hexacell.motion`).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from hexacell.campaign.decisions import MeasurePose
-from hexacell.campaign.pilots import pilot_number
+from hexacell.campaign.pilots import pilot_number, with_pilots
 from hexacell.design.predicted_records import GaugeZero
-from hexacell.errors import LimitError
+from hexacell.errors import HexacellError, LimitError
 from hexacell.identification.belief import RobotBelief
+from hexacell.identification.estimator import estimate_online
+from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
+from hexacell.motion.path_check import ball_position
+from hexacell.motion.paths import PathPlanner, find_route, next_return_move
 from hexacell.robot.model import Robot
 from procedures.run.keys import Phase, SetKey, SixNumbers
 from procedures.run.state import RunState
-from procedures.steps.close import CloseSet
 from procedures.steps.move import Expectation, Move
-from procedures.steps.place import Place
+from procedures.steps.reference import CloseSet, Revisit
 from procedures.steps.registry import Step
-from procedures.steps.revisit import Revisit
-from procedures.steps.sample import Sample
-from procedures.workflow.paths import NoSafePath, RunPathPlanner
+from procedures.steps.sample import Place, Sample
 
 Known = tuple[RobotBelief, GaugeZero]
 """What is known of the robot, and where the ball was when a set's gauges were zeroed."""
 
+ELSEWHERE = 3.0
+"""The gauges are surely not at a ball that is farther from their zero than so many times their room."""
+
 
 class TravelError(LimitError):
     """A plunger is at an end of its travel where the gauges must be read."""
+
+
+class NoSafePath(LimitError):
+    """No checked straight line starts at the robot's position; nothing moved."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunPathPlanner:
+    """Plans the moves of one robot."""
+
+    robot: Robot
+
+    def is_in_order(self, state: RunState, key: SetKey) -> bool:
+        """Whether the robot came by the set's own moves, each of which was checked when it was chosen."""
+        return not state.off_plan and (state.at_pose is None or state.at_pose[0] == key)
+
+    def towards(self, state: RunState, goal: Move, reference: Array | None = None) -> Move:
+        """The next move towards ``goal``: ``goal`` itself if the straight line to it is clear.
+
+        See :meth:`_next_move`. After an interruption the robot may be far from the set's gauges.
+
+        Raises:
+            NoSafePath: there is no path.
+        """
+        if state.target is None:
+            return goal
+        start = self._command(state.target)
+        belief = self._belief(state).zeroed_at(state.zero_shown(goal.at))
+        move = self._next_move(state, goal, belief, reference)
+        if reference is None or _is_inside(belief, start, reference, ELSEWHERE):
+            return move
+        return move.model_copy(update={"from_elsewhere": True})
+
+    def _next_move(self, state: RunState, goal: Move, belief: RobotBelief, reference: Array | None) -> Move:
+        """The next move towards ``goal`` from where the robot was commanded or located last.
+
+        With gauges zeroed where the ball was at ``reference`` (3,), mm, the ball stays inside their
+        travel on the path, unless it is outside already. Intermediate poses are level ones, poses that
+        the set has visited, and waypoints.
+
+        Raises:
+            NoSafePath: there is no path.
+        """
+        assert state.target is not None  # noqa: S101 - otherwise there is nothing to plan from
+        via = self._intermediate(state, goal)
+        start, end = self._command(state.target), self._command(goal.pose)
+        if reference is not None and not _is_inside(belief, start, reference):
+            reference = None
+        route = find_route(belief, start, end, [self._command(pose) for _, pose in via], reference)
+        if route:
+            orientation, pose = via[route[0]]
+            return Move(at=goal.at, orientation=orientation, pose=pose)
+        if route is not None:
+            return goal
+        paths = [] if reference is None else PathPlanner(belief, start, None, reference).plan(end)
+        for path in paths:
+            if path is not None:
+                return self._waypoint(goal.at, path.waypoints[0])
+        raise _no_safe_path(state.target, goal)
+
+    def back(
+        self, state: RunState, key: SetKey, known: tuple[RobotBelief, GaugeZero] | None
+    ) -> Move | None:
+        """The next move back to a set's reference, the gauges being there.
+
+        See :func:`hexacell.motion.paths.next_return_move`. Where nothing is ``known`` the robot
+        returns by the path on which it came. None if it did not come from the reference.
+        """
+        visited = state.path_from_reference
+        if len(visited) < 2 or state.target != visited[-1][1] or visited[0][1] != state.set(key).pose(1):
+            return None
+        moves = [Move(at=key, orientation=orientation, pose=pose) for orientation, pose in visited[:-1]]
+        if known is None or len(moves) == 1:
+            return moves[-1]
+        belief, zero = known
+        commands = self.robot.from_commands(Pose(*pose) for _, pose in visited)
+        departure = max(row for row, (orientation, _) in enumerate(visited) if orientation)
+        move = next_return_move(belief, zero.reference, commands, departure)
+        return moves[move] if isinstance(move, int) else self._waypoint(key, move)
+
+    def ball_at(self, state: RunState, pose: SixNumbers) -> Array | None:
+        """The estimated position (3,), mm, of the ball at a commanded pose."""
+        return ball_position(self._belief(state), self._command(pose))
+
+    def _waypoint(self, key: SetKey, command: Pose) -> Move:
+        """A move to a pose in the convention's frames at which nothing is measured."""
+        return Move(at=key, orientation=0, pose=self.robot.to_command(command).as_tuple())
+
+    def _intermediate(self, state: RunState, goal: Move) -> list[tuple[int, SixNumbers]]:
+        """Poses that a route may use as waypoints, with their orientations; 0 where nothing is measured."""
+        samples = state.set(goal.at).samples
+        visited = [(s.orientation, s.pose) for s in samples if s.orientation != goal.orientation]
+        ends = (Pose(*pose) for pose in (state.target, goal.pose) if pose is not None)
+        return [*((0, pose.level.as_tuple()) for pose in ends), *visited]
+
+    def _command(self, pose: SixNumbers) -> PoseBatch:
+        return self.robot.from_commands([Pose(*pose)])
+
+    def _belief(self, state: RunState) -> RobotBelief:
+        """What is known by now."""
+        if state.identified is None:
+            return self._by_records(state)
+        geometry = state.identified.result.identified(self.robot.mechanism.parameters)
+        free = self.robot.mechanism.convention.free_parameters(geometry)
+        return replace(self.robot.belief(), free=np.asarray(free))
+
+    def _by_records(self, state: RunState) -> RobotBelief:
+        measurements = with_pilots(state.measurements(), state.pilots)
+        if not len(measurements):
+            return self.robot.belief()
+        try:
+            return self.robot.belief(estimate_online(self.robot.problem(measurements)))
+        except HexacellError:
+            return self.robot.belief()
+
+
+def _is_inside(belief: RobotBelief, command: PoseBatch, reference: Array, share: float = 1.0) -> bool:
+    ball = ball_position(belief, command)
+    return ball is not None and bool(belief.limits.within_travel(ball - reference, share=share))
+
+
+def _no_safe_path(here: SixNumbers, goal: Move) -> NoSafePath:
+    return NoSafePath(
+        f"{goal.at}: the robot is at {Pose(*here)}, and no straight line within the limits "
+        f"leads from there to {goal.target}; it was not moved",
+        action="Bring it near that pose with its own controller, then continue",
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,8 +48,8 @@ from hexacell.verdict.decision import Verdict
 from hexacell.verdict.outcome import outcome_line
 from hexacell.verdict.verification import verify
 from procedures.calibration.calibration import Calibration, Mode
-from procedures.journal import line_format
-from procedures.journal.line_format import Entry, encode
+from procedures.journal import journal as line_format
+from procedures.journal.journal import Entry, encode
 from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Reading
 from procedures.run.state import RunState, apply, fold

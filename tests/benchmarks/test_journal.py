@@ -11,9 +11,8 @@ from statistics import median
 
 import pytest
 
-from procedures.journal import line_format
-from procedures.journal.journal import Journal, read_journal
-from procedures.journal.line_format import Entry, encode
+from procedures.journal import journal as line_format
+from procedures.journal.journal import Entry, Journal, encode, read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Reading
 from procedures.run.state import fold

@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from hexacell.verdict.decision import Verdict
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import encode
+from procedures.journal.journal import encode, read_entries
 from procedures.steps import events
 
 

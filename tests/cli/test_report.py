@@ -10,8 +10,7 @@ from html import unescape
 
 import pytest
 
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import encode
+from procedures.journal.journal import encode, read_entries
 from procedures.steps import events
 from tests.mutations.journals import with_checksum
 

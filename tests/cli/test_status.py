@@ -12,8 +12,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from hexacell.cell.loader import load_cell
 from hexacell.runs.cell_lock import cell_lock
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import encode
+from procedures.journal.journal import encode, read_entries
 from tests.hexacell.services.recorded_nights import Nights
 
 

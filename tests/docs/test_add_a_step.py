@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "add-a-step.md").read_text()
-FILES = ("procedures/steps/read_temperatures.py", "procedures/guards/rules/controller_hot.py")
+FILES = ("procedures/steps/read_temperatures.py",)
 
 RUN = """
 import asyncio, json, sys

@@ -18,7 +18,7 @@ import pytest
 from hexacell.config.receipt import AFTER
 from hexacell.runs.run_folder import RunFolder
 from procedures.journal.journal import read_journal
-from procedures.resources.config_changes import PROVISIONAL_FOLDER
+from procedures.resources.controller_config import PROVISIONAL_FOLDER
 from procedures.steps import events
 from tests.faults.cell import MEASURED, NEVER_GOOD_ENOUGH, PROVISIONAL, Site, make_site
 from tests.faults.driver import UNEXPECTED, Order

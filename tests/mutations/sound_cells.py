@@ -17,8 +17,7 @@ from hexacell.cell.loader import dump, load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.cell.operation import NotificationSettings, OpcUaSettings, ReportSettings, UnattendedSettings
 from hexacell.cli.app import main
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import encode
+from procedures.journal.journal import encode, read_entries
 from procedures.steps import events
 from tests.mutations.trials import CELL, CONFIG, RECORDS, RUN, Templates
 from tests.small_cell import SMALL, changed, choose_among_few

@@ -26,9 +26,9 @@ from procedures.calibration.calibration import Calibration, Mode
 from procedures.engine.commands import QuestionBroker
 from procedures.engine.engine import Engine, Listener
 from procedures.engine.recovery import GIVE_UP, RecoveryPolicy
-from procedures.engine.step_executor import StepExecutor
 from procedures.journal.journal import Journal
 from procedures.steps import events
+from procedures.workflow.next_step import StepExecutor
 from tests.native_config import NATIVE
 from tests.procedures.fakes import Approver, Bench
 from tests.small_cell import FEW_CHOICES, SMALL, changed, history_until

@@ -11,7 +11,7 @@ from hexacell.services.history.run_export import export_run
 from hexacell.services.run.replay_run import replay
 from hexacell.text.documents import replay_document
 from hexacell.text.run import replay_report
-from procedures.replay.comparison import TOLERANCE
+from procedures.replay.recorded_executor import TOLERANCE
 from procedures.replay.replayer import Scope
 
 

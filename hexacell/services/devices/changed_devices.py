@@ -14,7 +14,7 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.cell.loader import Cell
 from hexacell.errors import HexacellError
 from hexacell.runs.run_folder import run_folders
-from procedures.journal.line_format import decode
+from procedures.journal.journal import decode
 from procedures.steps import events
 
 COMPARED = {

@@ -17,7 +17,7 @@ from hexacell.runs.run_folder import CELL_FILE, MEASUREMENTS, RESULT, RunFolder
 from hexacell.storage import atomic_files
 from hexacell.storage.secrets import with_lines_masked, without_secrets
 from procedures.journal.journal import read_entries
-from procedures.resources.config_changes import PROVISIONAL_FOLDER
+from procedures.resources.controller_config import PROVISIONAL_FOLDER
 
 _CONFIG = re.compile(f"({BEFORE}|{AFTER})(-[0-9]+)?")
 """A file of a config, as it was or as it was written."""

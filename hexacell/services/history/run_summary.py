@@ -12,8 +12,7 @@ from hexacell.runs.run_folder import RunFolder, read_attempts
 from hexacell.services.history.run_index import RunSummary
 from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import VerifiedAccuracy
-from procedures.journal.journal import read_entries, read_journal
-from procedures.journal.line_format import Entry
+from procedures.journal.journal import Entry, read_entries, read_journal
 from procedures.run.state import RunState, fold
 from procedures.steps import events
 

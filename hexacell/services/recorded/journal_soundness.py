@@ -25,16 +25,14 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import AXES
 from hexacell.runs.run_folder import RunFolder
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import RESTORE, Entry
+from procedures.journal.journal import RESTORE, Entry, read_entries
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, apply
 from procedures.steps import events
 from procedures.steps.base import StepOfSet
 from procedures.steps.move import Move
-from procedures.steps.pilot import Pilot
-from procedures.steps.place import Place
-from procedures.steps.sample import Sample
+from procedures.steps.noise import Pilot
+from procedures.steps.sample import Place, Sample
 
 LARGEST_COUNT = 2**63 - 1
 LARGEST_VARIANCE = 1e12

@@ -26,9 +26,8 @@ from hexacell.robot.model import Robot, controller_geometry
 from hexacell.robot.stated_limits import stated_limits
 from hexacell.runs.run_folder import RunFolder, find_run, run_folders, runs_folder
 from hexacell.services.recorded.recorded_robot import started_robot
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import RESTORE
-from procedures.resources.config_changes import PROVISIONAL_FOLDER
+from procedures.journal.journal import RESTORE, read_entries
+from procedures.resources.controller_config import PROVISIONAL_FOLDER
 from procedures.run.keys import SixNumbers
 from procedures.run.state import RunState
 from procedures.steps import events

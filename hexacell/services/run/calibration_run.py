@@ -28,18 +28,17 @@ from hexacell.services.run.accepted_results import last_accepted_result
 from hexacell.services.write_back.config_rollback import require_no_provisional
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
 from procedures.calibration.calibration import Calibration, Mode
-from procedures.devices.device_set import Devices
-from procedures.devices.live_values import LiveValues
+from procedures.devices.device_set import Devices, LiveValues
 from procedures.devices.reconnection import require_known
 from procedures.engine.commands import CommandQueue, QuestionBroker
 from procedures.engine.engine import Engine, Listener
 from procedures.engine.recovery import RecoveryPolicy
-from procedures.engine.step_executor import StepExecutor
 from procedures.guards.position_check import PositionCheck
 from procedures.journal.journal import Journal, read_journal
 from procedures.run.questions import Operator
 from procedures.run.state import fold
 from procedures.steps import events
+from procedures.workflow.next_step import StepExecutor
 from procedures.workflow.preflight import (
     device_failures,
     plan_failures,

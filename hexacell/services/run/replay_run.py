@@ -19,11 +19,9 @@ from hexacell.errors import FileError, HexacellError
 from hexacell.runs.run_folder import CELL_FILE, RunFolder
 from hexacell.services.recorded.journal_soundness import require_sound
 from hexacell.services.run.calibration_run import calibration_of_run
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import RESTORE, Entry
-from procedures.replay.comparison import TOLERANCE, ReplayReport
-from procedures.replay.recorded_executor import RecordedStepExecutor
-from procedures.replay.replayer import Replayer, Scope
+from procedures.journal.journal import RESTORE, Entry, read_entries
+from procedures.replay.recorded_executor import TOLERANCE, RecordedStepExecutor
+from procedures.replay.replayer import Replayer, ReplayReport, Scope
 from procedures.steps.events import RunStarted
 
 CONFIG = "controller-config"

@@ -26,11 +26,10 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.write_back.config_rollback import receipts_of
 from hexacell.services.write_back.proposals import later_approval
 from hexacell.verdict.decision import Verdict
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import Entry
+from procedures.journal.journal import Entry, read_entries
 from procedures.run.state import RunState, apply
 from procedures.steps import events
-from procedures.steps.roll_back import reason_to_take_back
+from procedures.steps.write_back import reason_to_take_back
 
 _OF_THE_RESULT = (WriteKind.RESULT, WriteKind.APPLIED, WriteKind.TAKEN_BACK)
 """Writes that the verdict of the run is about."""

@@ -23,8 +23,8 @@ from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import find_run, run_folders, runs_folder
 from hexacell.services.write_back.proposals import COMMAND
-from procedures.journal.line_format import RESTORE
-from procedures.resources.config_changes import holds_provisional
+from procedures.journal.journal import RESTORE
+from procedures.resources.controller_config import holds_provisional
 
 
 @dataclass(frozen=True, slots=True)

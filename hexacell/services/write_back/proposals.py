@@ -22,9 +22,8 @@ from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
-from procedures.journal.journal import read_journal
-from procedures.journal.line_format import RESTORE, now
-from procedures.resources.config_changes import holds_provisional
+from procedures.journal.journal import RESTORE, now, read_journal
+from procedures.resources.controller_config import holds_provisional
 from procedures.run.questions import Operator, Question, ask_approval
 from procedures.run.state import RunState, fold
 from procedures.steps import events

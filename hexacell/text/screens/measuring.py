@@ -18,7 +18,7 @@ from procedures.run.state import RunState
 from procedures.steps import events
 from procedures.steps.base import BaseStep, StepOfSet
 from procedures.steps.move import Expectation, Move
-from procedures.steps.place import Place
+from procedures.steps.sample import Place
 
 NO_RUN = Guidance(
     now="no run is being measured here",

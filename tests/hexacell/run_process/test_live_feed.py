@@ -8,7 +8,7 @@ from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
 from hexacell.run_process.live_devices import NOISE_READINGS, LiveFeed
-from procedures.devices.live_values import LiveValues
+from procedures.devices.device_set import LiveValues
 from tests.procedures.fakes import ManualClock
 
 GAUGE = GaugeSettings(name="left", axis="y", sign=-1, protocol="sylvac", travel_mm=10.0, middle_mm=5.0)

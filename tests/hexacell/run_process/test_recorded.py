@@ -25,10 +25,10 @@ from hexacell.run_process.recorded import LONGEST_WAIT_S, RecordedRun
 from hexacell.runs.run_folder import RunFolder
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Undo
-from procedures.journal.line_format import Entry, encode
+from procedures.journal.journal import Entry, encode
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
-from procedures.steps.place import Place
+from procedures.steps.sample import Place
 from tests.procedures.fakes import ManualClock
 from tests.procedures.story import Story
 

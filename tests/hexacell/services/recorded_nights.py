@@ -21,7 +21,7 @@ from hexacell.robot.model import Robot, robot_of
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.verdict.decision import Verdict
-from procedures.journal.line_format import Entry, encode
+from procedures.journal.journal import Entry, encode
 from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Reading, Temperature
 from procedures.steps import events

@@ -16,10 +16,8 @@ from hexacell.errors import ExitCode, FileError, HexacellError
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.run.calibration_run import calibrate
 from hexacell.services.run.replay_run import replay
-from procedures.journal.journal import read_entries, read_journal
-from procedures.journal.line_format import Entry, encode
-from procedures.replay.comparison import Aspect
-from procedures.replay.replayer import Scope
+from procedures.journal.journal import Entry, encode, read_entries, read_journal
+from procedures.replay.replayer import Aspect, Scope
 from procedures.steps import events
 from tests.hexacell.services.conftest import order_of
 

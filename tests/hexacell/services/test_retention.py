@@ -15,8 +15,7 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.retention import LEAVING, KeptFor, delete_runs, retention
 from hexacell.text.history import retention_text
-from procedures.journal.journal import read_journal
-from procedures.journal.line_format import Entry, encode
+from procedures.journal.journal import Entry, encode, read_journal
 from tests.hexacell.services.proposed_runs import a_cell, propose_run
 from tests.hexacell.services.recorded_nights import Nights
 

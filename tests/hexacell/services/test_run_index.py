@@ -15,8 +15,7 @@ from hexacell.runs.archived_documents import DocumentKind, StampedDocument
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.run_index import PastRun, RunIndex
-from procedures.journal.journal import Journal, read_entries
-from procedures.journal.line_format import Entry
+from procedures.journal.journal import Entry, Journal, read_entries
 from procedures.steps import events
 from tests.hexacell.services.proposed_runs import a_cell, propose_run
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 
 from hexacell.text.line_face import run_story, story_text
-from procedures.journal.line_format import Entry
+from procedures.journal.journal import Entry
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
 from tests.procedures.story import Story

@@ -13,8 +13,8 @@ from procedures.journal.journal import read_journal
 from procedures.run.state import fold
 from procedures.steps import events
 from procedures.steps.move import Move
-from procedures.workflow import paths as path_planning
-from procedures.workflow.paths import NoSafePath
+from procedures.workflow import sets as path_planning
+from procedures.workflow.sets import NoSafePath
 from tests.procedures.story import located, next_step
 
 ELSEWHERE = (-60.0, 80.0, 520.0, 12.0, -8.0, 5.0)

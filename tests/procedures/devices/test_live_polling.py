@@ -7,8 +7,7 @@ from dataclasses import replace
 
 from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError
-from procedures.devices.device_set import poll_for_screens
-from procedures.devices.live_values import LiveValues
+from procedures.devices.device_set import LiveValues, poll_for_screens
 from tests.waiting import until
 
 

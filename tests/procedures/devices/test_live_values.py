@@ -11,13 +11,12 @@ import pytest
 from drivers.interfaces import ControllerStatus
 from hexacell.cell.measuring import TimingSettings
 from hexacell.errors import DeviceError
-from procedures.devices.device_set import Devices
-from procedures.devices.live_values import LiveValues
+from procedures.devices.device_set import Devices, LiveValues
 from procedures.devices.settling import settle
 from procedures.guards.guards import Guards
 from procedures.run.state import fold
 from procedures.steps import events
-from procedures.steps.commit import Commit
+from procedures.steps.write_back import Commit
 
 
 @pytest.fixture

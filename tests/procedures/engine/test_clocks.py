@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from procedures.calibration.calibration import Mode
-from procedures.journal import line_format
+from procedures.journal import journal as line_format
 from procedures.journal.journal import read_entries
 from procedures.steps import events
 
@@ -37,7 +37,7 @@ MAY_LOOK = {
     "hexacell/services/notify/outbox.py": "gives up notices that were tried and are days old",
     "hexacell/config/write_record.py": "dates what was written into a config",
     "hexacell/runs/cell_lock.py": "says since when somebody holds a cell",
-    "procedures/journal/line_format.py": "dates a record",
+    "procedures/journal/journal.py": "dates a record",
     "drivers/wire_trace.py": "dates what went over a wire",
 }
 

@@ -7,14 +7,13 @@ from typing import Any
 import pytest
 
 from hexacell.errors import DeviceError, Interruption
-from procedures.engine.reversal import Reversal, revert_at_end, revert_unrecorded
+from procedures.engine.recovery import Reversal, revert_at_end, revert_unrecorded
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events
 from procedures.steps.base import BaseStep
-from procedures.steps.lend import Lend
-from procedures.steps.roll_back import RollBack
-from procedures.steps.take_back import TakeBack
+from procedures.steps.provisional import Lend, TakeBack
+from procedures.steps.write_back import RollBack
 
 ROLL_BACK, TAKE_BACK = RollBack(), TakeBack()
 ZERO = (0.0, 0.0, 0.0)

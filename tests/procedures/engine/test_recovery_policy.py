@@ -38,8 +38,7 @@ from procedures.run.state import RunState, fold
 from procedures.run.trips import DriftTripped, Guard, Trip
 from procedures.steps import events
 from procedures.steps.sample import Sample
-from procedures.workflow.paths import NoSafePath
-from procedures.workflow.sets import TravelError
+from procedures.workflow.sets import NoSafePath, TravelError
 from tests.procedures.engine.injected_failures import ATTENDED, UNATTENDED
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)

@@ -14,7 +14,7 @@ from hexacell.config.write_back import commit
 from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
 from procedures.journal.journal import read_journal
-from procedures.resources import config_changes
+from procedures.resources import controller_config as config_changes
 from procedures.run.state import RunState, fold
 from procedures.steps import events
 

@@ -10,7 +10,7 @@ from drivers.interfaces import StartupAction, StartupActions
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, Interruption
 from procedures.engine.commands import UnattendedOperator
 from procedures.guards.guards import Guards
-from procedures.resources.startup import Startup
+from procedures.resources.controller_config import Startup
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, apply, fold
 from procedures.run.trips import Guard, GuardTripped

@@ -11,8 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hexacell.errors import FileError
-from procedures.journal.journal import Journal, read_journal
-from procedures.journal.line_format import VERSION
+from procedures.journal.journal import VERSION, Journal, read_journal
 from tests.procedures.journal.told import TOLD, checked, write_told
 
 

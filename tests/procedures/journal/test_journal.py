@@ -20,7 +20,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hexacell.errors import CellBusy, FileError
-from procedures.journal import line_format
+from procedures.journal import journal as line_format
 from procedures.journal.journal import Journal, read_entries, read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 import pytest
 from pydantic import BaseModel
 
-from procedures.journal.line_format import VERSION
+from procedures.journal.journal import VERSION
 from procedures.steps.events import Event
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "journal.md"

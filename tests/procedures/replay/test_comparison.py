@@ -11,8 +11,8 @@ import pytest
 
 from hexacell.cell.fields import Frozen
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from procedures.journal.line_format import decode
-from procedures.replay.comparison import Aspect, Change, Difference, changes, is_wording
+from procedures.journal.journal import decode
+from procedures.replay.replayer import Aspect, Change, Difference, changes, is_wording
 from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Reading
 from procedures.steps import events

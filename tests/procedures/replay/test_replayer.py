@@ -19,11 +19,9 @@ from hexacell.errors import HexacellError, LimitError
 from hexacell.services.run.calibration_run import calibration_of_run
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Mode
-from procedures.journal.journal import read_journal
-from procedures.journal.line_format import Entry
-from procedures.replay.comparison import Aspect, ReplayReport
+from procedures.journal.journal import Entry, read_journal
 from procedures.replay.recorded_executor import RecordedStepExecutor
-from procedures.replay.replayer import Replayer, Scope
+from procedures.replay.replayer import Aspect, Replayer, ReplayReport, Scope
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
 from procedures.steps import events

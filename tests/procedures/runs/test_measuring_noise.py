@@ -25,17 +25,13 @@ from procedures.calibration.calibration import Mode
 from procedures.engine.commands import Abort, Stop
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
-from procedures.replay.comparison import ReplayReport
 from procedures.replay.recorded_executor import RecordedStepExecutor
-from procedures.replay.replayer import Replayer
+from procedures.replay.replayer import Replayer, ReplayReport
 from procedures.run.keys import Phase, SetKey, SixNumbers
 from procedures.run.state import RunState, fold
 from procedures.steps import events
-from procedures.steps.assess_noise import AssessNoise
 from procedures.steps.move import Move
-from procedures.steps.pilot import Pilot
-from procedures.steps.repeat import Repeat
-from procedures.steps.standstill import Standstill
+from procedures.steps.noise import AssessNoise, Pilot, Repeat, Standstill
 from tests.procedures.replay.test_replayer import numbered
 from tests.procedures.rig import MakeRig, Rig, new_rig
 from tests.procedures.runs.listening import happened, on

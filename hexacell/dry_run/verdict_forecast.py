@@ -1,20 +1,14 @@
 """The probability of each verdict on a healthy machine: one that is as stated, calibrated as planned.
 
 The verification will state the error of the written geometry by an estimate that has the held-out records
-as well. If the model is right, that differs from the identification by
-
-    d,   covariance  C - C',      C, C' the covariances before and after the held-out records,
-
-and by what the systematic effects do to the one and not to the other. With zeros alone, that are written as
-G of the estimate, what is held errs as its tolerances say, with their covariance C0, and is seen to err by
+as well. If the model is right, that differs from the identification by d of covariance C - C' (before and
+after the held-out records), and by what the systematic effects do to the one and not to the other. With
+zeros alone, that are written as G of the estimate, what is held is seen to err by
 
     d - H (x - h),    covariance  (C - C') + H (C0 - C) H^T,    H = 1 - G,
 
-x the identification and h what is held (the errors of Bayesian estimates do not depend on them).
-
-Machines are drawn: what is stated of each is the largest error J d over the task poses, and its U is the
-95 % quantile by draws of all that is not known of it, as in a run. The decision rule gives the verdict. The
-tests of the model fail a healthy machine with a probability of 0.1 % each.
+x the identification, h what is held and C0 the covariance of its tolerances. Machines are drawn: each has
+the largest error J d over the task poses and its U by draws, as in a run (``docs/method.md``).
 """
 
 from __future__ import annotations

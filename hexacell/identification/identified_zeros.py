@@ -1,8 +1,7 @@
 """A first level of identification: the zeros of the encoders alone, all else as the controller has it.
 
 The zeros z change the free parameters by ``D z``. All parameters are estimated as ever: by that estimate x
-the data and the model are tested, and the verdict judges by it what is written. Those zeros are taken with
-which the poses of the records err least, however the frames are chosen:
+the data and the model are tested. Those zeros are taken with which the poses of the records err least:
 
     minimize  |J (x0 + D z - x)|,    x0 + D z = x0 + G (x - x0),    G = D (J D)^+ J,
 
@@ -10,12 +9,10 @@ with the controller's geometry x0, and the derivatives J of positions and turns 
 radius) by the parameters, less what changes of the frames explain. With the covariance C of x, and C0 of
 the tolerances, which say how wrong the held parameters may be, the result errs by
 
-    G C G^T + H C0 H^T + G C H^T + H C G^T,    H = 1 - G
+    G C G^T + H C0 H^T + G C H^T + H C G^T,    H = 1 - G.
 
-(the error of a Bayesian estimate does not depend on the estimate). So a parameter that is not identified
-keeps its tolerance for its uncertainty. This is a Schmidt-Kalman filter with another gain (Jazwinski,
-Stochastic Processes and Filtering Theory, 1970). Least squares of the residuals with all else held, as
-other programs have it, explain joints that are 2 mm off by zeros that are 18 mm off, and serve no pose.
+This is a Schmidt-Kalman filter with another gain (Jazwinski, Stochastic Processes and Filtering Theory,
+1970). Least squares with all else held explain joints that are 2 mm off by zeros that are 18 mm off.
 """
 
 from __future__ import annotations

@@ -1,20 +1,15 @@
 """Scatter between approaches: one pose visited again and again from different directions.
 
-At every visit the gauges see where the ball is, and the encoders where the joints are. What the encoders
-see of the ball's motion is no error of the model. The rest is, for each visit less their mean,
+What the encoders see of the ball's motion is no error of the model. The rest is, for each visit less
+their mean, ``r = d - G q`` with ``G = dP/dq``, whose covariance follows from the noise of encoders and
+gauges that is stated for a record. Whether there is more is a chi-square test. Where it comes from, ball
+and joints show
+together: with stops s of the joints, play p, and errors e and g of encoders and gauges,
 
-    r = d - G q,      G = dP/dq,      covariance  G diag(s_q^2) G^T + diag(s_d^2)
+    q = s + e,      d = G (s + p) + g.
 
-with the noise of encoders and gauges that is stated for a record. Whether there is more is a chi-square
-test. Where it comes from, ball and joints show together. With stops s of the joints that differ from
-visit to visit, play p between their encoders and joints, and errors e and g of encoders and gauges,
-
-    q = s + e,      d = G (s + p) + g,
-
-so that play moves the ball and not the encoders, an error of the encoders the encoders and not the ball,
-and an error of one gauge that gauge alone. For each source one variance more is estimated by restricted
-maximum likelihood, with that of the stops. The likeliest source is named; a single instrument only where
-it is ten times as likely as all joints or all encoders.
+For each source one variance more is estimated by restricted maximum likelihood, with that of the stops
+(``docs/method.md``, Noise).
 """
 
 from __future__ import annotations

@@ -1,14 +1,12 @@
 """Whether three gauges answer as they are mounted, by what they showed after small known moves.
 
-The ball is moved along each base axis in turn. What the gauges showed per length of these moves is a
-matrix: the identity for gauges as they should be on a perfect robot. On one that is not calibrated yet the
-ball goes elsewhere, next to a singularity several times as far. But all gauges together hardly ever
-follow other axes better than their own, so that no threshold on directions is needed: of all assignments
-of gauges to axes, with either sign, the one is taken whose axes the gauges followed best. Next to a
+What the gauges showed per length of a move along each base axis is a matrix, the identity for gauges as
+they should be on a perfect robot. Of all assignments of gauges to axes, with either sign, the one is
+taken whose axes the gauges followed best, so that no threshold on directions is needed. Next to a
 singularity, where the ball may go at 45 degrees to its command, a healthy set resembles one with two
-gauges exchanged and one of them reversed. Two mistakes at once must therefore be followed distinctly
-better. At 3,929 references of robots drawn within tolerances of 7 mm, by gauges two degrees off their
-axes, the right assignment was then ahead by 0.39 and more, where 3 is the most.
+gauges exchanged and one of them reversed: two mistakes at once must be followed distinctly better. At
+3,929 references of robots drawn within tolerances of 7 mm the right assignment was then ahead by 0.39 and
+more, where 3 is the most.
 """
 
 from __future__ import annotations

@@ -1,12 +1,9 @@
 """From a series at standstill and visits of one pose to the noise that a run counts with.
 
-The stated noise is that of a record, of everything that differs from record to record. A standstill shows
-the part from reading to reading alone, so that it is a lower limit: it replaces what is stated only where
-it is significantly larger. The visits show the whole. What they show beyond the stated noise is added to
-its source. Where the cell file allows it, less than stated counts as well, by the upper limit of what the
-visits show.
-
-The mean of more readings is better in the part from reading to reading, and in no other.
+A standstill shows the part from reading to reading alone: it replaces what is stated of a record only
+where it is significantly larger. What the visits show beyond the stated noise is added to its source.
+Where the cell file allows it, less than stated counts as well, by the upper limit of what the visits
+show. The mean of more readings is better in the part from reading to reading, and in no other.
 """
 
 from __future__ import annotations

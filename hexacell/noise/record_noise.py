@@ -1,25 +1,20 @@
 """The noise that the records of a calibration show: repeatability, and the shares of encoders and gauges.
 
-Repeatability is the scatter of deviations where the same pose was commanded more than once. It needs no
-geometry: all visits of a commanded pose at a point have the same deviation, except for the scatter of the
-machine, which no calibration can remove.
+Repeatability is the scatter of deviations where the same pose was commanded more than once.
 
 Variance components are estimated from the residuals. A record's covariance is ``V = s1 Q1 + s2 Q2``: the
 variance s1 of the encoders, propagated through the machine, ``Q1 = Gq Gq^T``, and the variance s2 of the
-gauges, ``Q2 = I``. Where encoders or gauges are not alike, the ratios of their noise are known. Both
-variances are separable because Gq changes from pose to pose and differs in x, y and z. Restricted maximum
-likelihood (REML) requires for both
+gauges, ``Q2 = I``. They are separable because Gq changes from pose to pose and differs in x, y and z.
+Restricted maximum likelihood (REML) requires for both
 
     r^T W Qk W r = tr(P Qk),    P = W - W X C X^T W,
 
-with the residuals r, their weights W = V^-1, the Jacobian X of the unknowns and their covariance C. Both
-sides are sums over the records and need only the diagonal blocks of P, so a step costs as much as a step
-of the identification. The steps are Fisher scoring of the logarithms, so that the variances stay
-positive. The information matrix is computed from the same blocks and scaled so that the total noise has
-the standard error of its degrees of freedom; with 55 records that is within 5 % of the exact one.
+with the residuals r, their weights W = V^-1, the Jacobian X of the unknowns and their covariance C. Only
+the diagonal blocks of P are needed. The steps are Fisher scoring of the logarithms, so that the variances
+stay positive. The information matrix is computed from the same blocks and scaled so that the total noise
+has the standard error of its degrees of freedom; with 55 records that is within 5 % of the exact one.
 
-Source of the equation: Patterson and Thompson 1971; its fixed point is that of the almost unbiased
-iteration ``s_k <- s_k r^T W Qk W r / tr(P Qk)`` (Horn, Horn and Duncan 1975).
+Sources: Patterson and Thompson 1971; Horn, Horn and Duncan 1975 (the fixed point).
 """
 
 from __future__ import annotations

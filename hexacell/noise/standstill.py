@@ -1,14 +1,9 @@
 """Noise of one instrument from a series of its readings while nothing moves.
 
-What a series shows is noise from reading to reading, and nothing else: errors that are the same as long as
-the robot stands (interpolation of an encoder, friction of a plunger, play) are not in it. The noise is
-therefore a lower limit of the scatter of a record.
-
-A drift is not noise. A line is fitted and subtracted; whether its slope is significant is a t-test. Single
-false readings are found by the generalized extreme studentized deviate test. The correlation of successive
-readings decides what the mean of several is worth: with correlation c they count as (1 - c) / (1 + c) of
-as many independent ones (first-order autoregression). A series that shows less scatter than the steps of
-the display has the standard deviation of rounding, step / sqrt(12).
+It is noise from reading to reading alone, a lower limit of the scatter of a record. A line is fitted and
+subtracted, whose slope is tested (t-test); false readings are found by the generalized extreme studentized
+deviate test; successive readings may be correlated (first-order autoregression). A series that shows less
+scatter than the steps of the display has the standard deviation of rounding, step / sqrt(12).
 
 Sources: Rosner, Technometrics 25 (1983) 165-172; JCGM 100, F.2.2.1.
 """

@@ -1,15 +1,12 @@
 """The uncertainty budget of the errors at the task poses: a line for the noise, and one for each effect.
 
-A line is the error that one standard deviation of an effect makes at the task pose where it is largest. The
-lines are independent, so that their squares are added at each pose; the standard uncertainty is the
-largest root over the poses. U is the 95 % quantile of the largest error over all task poses, as every one
-of them counts (:mod:`~hexacell.uncertainty.statement`).
+A line is the error that one standard deviation of an effect makes at the task pose where it is largest.
+The lines are independent, so that their squares are added at each pose (JCGM 100). U is the 95 % quantile
+of the largest error over all task poses (:mod:`~hexacell.uncertainty.statement`).
 
-Where a length check measured the scale common to all encoders, what that makes at the task is known, and
-only the check's own uncertainty is left. The check errs by the noise of the estimate and by the other
-effects as well: what these do at the task, and what they do by the scale that is measured, is one line.
-
-Source: JCGM 100 (Guide to the expression of uncertainty in measurement).
+Where a length check measured the scale common to all encoders, what that makes at the task is known. The
+check errs by the noise of the estimate and by the other effects as well: what these do at the task, and
+what they do by the scale that is measured, is one line.
 """
 
 from __future__ import annotations

@@ -1,11 +1,9 @@
 """The kinds of systematic effects: of encoders, gauges and ball, guides, temperature and load.
 
-Encoders have errors of their scales, and stops that they do not see. The kinematic model has all rails
-straight and parallel. A displacement of a slider across its rail moves its joint, and the legs on the
-same rail have the same guide; the effects of a mechanism without rails have no columns. A temperature
-that differs from that of the measuring changes every length of a part by its coefficient of expansion;
-the encoders' scales expand with the base that they are fixed to. A force on the tool that was not there
-while measuring shortens the legs, each by its share of the force and its compliance.
+The kinematic model has all rails straight and parallel; legs on the same rail have the same guide, and
+the effects of rails have no columns in a mechanism without rails. Another temperature than that of the
+measuring changes every length of a part by its coefficient of expansion, and the encoders' scales with
+the base.
 """
 
 from __future__ import annotations

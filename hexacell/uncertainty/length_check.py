@@ -1,21 +1,14 @@
 """The length check: the machine's unit of length against a certified distance.
 
-A scale error that all encoders have in common goes into the identified geometry as a machine that is larger
-by the same share. No gauge that stays at its point shows it. With the gauges mounted in two seats whose
-distance L is known, each record r has the place of its seat,
+With the gauges mounted in two seats whose distance L is known, each record r has the place of its seat,
 
     P_r - d_r = z_seat + errors,
 
-with P_r by the forward kinematics of the judged geometry at the joint variables shown. ``|z_2 - z_1|`` is
-the length by the robot; what it is longer than L shows the scale of the encoders. All errors are propagated
-to first order: noise of the readings, seating of the gauges, their alignment, covariance of the geometry,
-and systematic effects, which also moved the geometry. They give the covariance V of all records, and
-generalized least squares the places z (Aitken 1936). The weighted residuals have a chi-square distribution
-with 3 n - 6 degrees of freedom: a fixture that moved, or gauges that were zeroed in between, do not agree
-with it.
-
-How much of a scale error the geometry took up is known from the identification; without that, all of it. A
-length along which all joints move alike needs no geometry: for a Hexaglide along its rails.
+with P_r by the forward kinematics of the judged geometry at the joint variables shown. What ``|z_2 -
+z_1|`` is longer than L shows the scale of the encoders. All errors, propagated to first order, give the
+covariance of all records, and generalized least squares the places z. The weighted residuals have a
+chi-square distribution with 3 n - 6 degrees of freedom: a fixture that moved, or gauges that were zeroed
+in between, do not agree with it. ``docs/method.md`` (Length check) has more.
 """
 
 from __future__ import annotations

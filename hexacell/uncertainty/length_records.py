@@ -1,10 +1,8 @@
 """Records of a length check, the same ball in two parallel seats of a fixture, and their errors by source.
 
 The gauges are zeroed once, in the first seat, and mounted in the two seats in turn. Where the gauges of a
-mounting would show zero, the ball's centre is in the place of that seat; the places of the two seats are
-the certified distance apart. Some causes of errors are shared with the geometry that is judged: its
-covariance, and constant effects such as the scale of each encoder. All others act on the records of the
-check alone.
+mounting would show zero, the ball's centre is in the place of that seat. Some causes of errors are shared
+with the judged geometry: its covariance, and constant effects. All others act on these records alone.
 """
 
 from __future__ import annotations

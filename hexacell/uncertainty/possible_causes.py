@@ -1,18 +1,15 @@
 """What may be wrong with a machine whose residuals are too large, where no cause is proven.
 
-Each cause has the share of the excess that it would explain, by score tests of added columns. A cause adds
-columns Z to the residuals that its size per unit makes to first order, and unknowns b. Its score statistic
+Each cause adds columns Z to the residuals, and has the score statistic
 
-    gain = r^T M Z (Z^T M Z)^-1 Z^T M r
+    gain = r^T M Z (Z^T M Z)^-1 Z^T M r,
 
-is the decrease of the chi-square that it would give, with M the weights less what stations and parameters
-absorb. A direction of Z that these absorb explains nothing and does not count. A cause with many unknowns
-explains some of any residuals; therefore the mean squares per degree of freedom are compared, s^2 before
-and after, and the share of the excess that is explained is ``(s0^2 - s1^2) / (s0^2 - 1)``. Several causes
-may explain the same residuals, so that the shares are no probabilities and have no sum.
+with M the weights less what stations and parameters absorb; a direction of Z that these absorb does not
+count. A cause with many unknowns explains some of any residuals; therefore the mean squares per degree of
+freedom are compared, s^2 before and after, and the share of the excess that is explained is
+``(s0^2 - s1^2) / (s0^2 - 1)``. Several causes may explain the same residuals: the shares have no sum.
 
-Sources: Rao 1948 (score test); Theil, Economic Forecasts and Policy, 1961 (adjusted coefficient of
-determination).
+Sources: Rao 1948 (score test); Theil 1961 (adjusted coefficient of determination).
 """
 
 from __future__ import annotations

@@ -1,26 +1,15 @@
 """First-order propagation of effects: through the estimator, and directly at the task poses.
 
-An effect that moves the ball by e in the records is taken for a deviation. The estimate, at a minimum of
-the weighted squares with the stations' unknowns eliminated, then errs by
+An effect that moves the ball by e in the records is taken for a deviation. The estimate then errs by
 
-    dp = C J~^T W e,
+    dp = C (J~^T W e + L dp'),
 
-with C the covariance of the estimate and J~ the centred Jacobian
-(:class:`~hexacell.identification.solver.measurement_model.NuisanceElimination`; e needs no centring,
-because J~^T W contains it). A controller with that geometry sets joint variables at which the robot is
-``D e' - H dp`` beside the commanded pose: the effect itself, less what the estimate had taken up of it.
-Base and platform frames are fitted to both over the workspace
-(:mod:`hexacell.identification.diagnostics.frame_alignment`).
-
-An estimate whose prior is an earlier one errs by that as well: with L the precision of the prior and dp'
-the error of the earlier estimate,
-
-    dp = C (J~^T W e + L dp').
-
-Constant causes are the same in both, so that their columns are added, never averaged away.
-
-What an effect adds to the chi-square is ``e^T M e``, with M the weights less what stations and parameters
-absorb (:mod:`hexacell.identification.solver.linear_model`).
+with C the covariance of the estimate, J~ the centred Jacobian, L the precision of the prior, and dp' the
+error of the earlier estimate if that is the prior. A controller with that geometry sets joint variables
+at which the robot is ``D e' - H dp`` beside the commanded pose: the effect itself, less what the estimate
+had taken up of it, with base and platform frames fitted to both over the workspace. Constant causes are
+the same in both, so that their columns are added, never averaged away. What an effect adds to the
+chi-square is ``e^T M e``, with M the weights less what stations and parameters absorb.
 """
 
 from __future__ import annotations

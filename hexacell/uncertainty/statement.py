@@ -1,10 +1,8 @@
 """The statement of accuracy: the largest error over the task poses, with its expanded uncertainty.
 
-The errors of the task poses are estimated, and what is not known of them is a number of independent
-effects with one standard deviation each: those of the noise, through the covariance of the identified
-parameters, and the systematic ones. The largest error over the poses is not a linear function of them.
-Its uncertainty is therefore computed by drawing the effects, as JCGM 101 (Propagation of distributions
-using a Monte Carlo method) does: U is the half-width about the stated value that holds 95 % of the draws.
+The largest error over the poses is not a linear function of the independent effects that are not known.
+Its uncertainty is therefore computed by drawing them (JCGM 101, Propagation of distributions using a
+Monte Carlo method): U is the half-width about the stated value that holds 95 % of the draws.
 """
 
 from __future__ import annotations

@@ -1,15 +1,12 @@
-"""The decision on a stated error: a rule with a guard band w.
+"""The decision on a stated error: a rule with a guard band w (``docs/method.md``, The verdict).
 
     value + w <= limit           pass
     value <= limit < value + w   conditional pass
     value - w <= limit < value   conditional fail
     limit < value - w            fail
 
-The guard band is the expanded uncertainty U times a factor. A machine just beyond its limit passes with a
-probability below 2.5 % with U itself, and below 0.16 % with 1.5 U, if its stated error is large against U.
-Of a small one the true error can lie on either side, and these probabilities are doubled. A limit below w
-can be failed, but not passed: then nothing is decided, as without evidence that the model is right.
-Source: ILAC-G8:09/2019, Guidelines on decision rules and statements of conformity.
+The guard band is the expanded uncertainty U times a factor. A limit below w can be failed, but not passed:
+then nothing is decided. Source: ILAC-G8:09/2019, Guidelines on decision rules and statements of conformity.
 """
 
 from __future__ import annotations

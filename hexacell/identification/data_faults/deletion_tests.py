@@ -5,19 +5,10 @@ One that agrees is readmitted. Of one that does not, the simplest cause is looke
 variable is off, a gauge fault, one wrong gauge, or several.
 
 What proves a fault is that the rest of the records, without it, agrees with the stated noise
-(:func:`proven_faults`). A machine whose model leaves something out has residuals with longer tails than the
-noise, and the worst of them looks like a gross error. It is one only if the others are what the noise makes
-them. The less they are, the further beyond its critical value the statistic of a fault must be:
-
-- the rest agrees well without a single fault: 1.3 times;
-- the rest agrees, or agrees well without several faults, of which the most significant counts: 4 times;
-- the rest disagrees: 10 times, by the scatter that the records really have. No imperfect machine does that.
-
-The agreement of the rest is evidence only with equations to spare (:attr:`.Problem.is_overdetermined`).
-What is not proven stays in the fit, and no cause is named.
-
-The factors separate the worlds of ``tests/benchmarks/worlds``: the largest statistic of an imperfect
-machine is 4.1 critical values, and that of a reading off by 0.5 mm in a good one at least 4.8.
+(:func:`proven_faults`; ``docs/method.md``, Proof): the less it does, the further beyond its critical value
+the statistic of the fault must be. What is not proven stays in the fit, and no cause is named. The factors
+separate the worlds of ``tests/benchmarks/worlds``: the largest statistic of an imperfect machine is 4.1
+critical values, and that of a reading off by 0.5 mm in a good one at least 4.8.
 """
 
 from __future__ import annotations

@@ -1,23 +1,18 @@
 """Score tests of data faults: by how much one more unknown would lower the chi-square.
 
-An unknown b that adds ``Z b`` to the residuals r of a linear model has, next to the parameters, the
-estimate and the gain
+An unknown b that adds ``Z b`` to the residuals r of a linear model has the estimate and the gain
 
     b = (Z^T M Z)^-1 Z^T M r,    gain = r^T M Z b,
 
-with M of :class:`.LinearizedModel`. No second fit is needed, and of M
-only the blocks of the records concerned. Three choices of Z:
+with M of :class:`.LinearizedModel`, of which only the blocks of the records concerned are needed. Z is
 
-- one record, along one gauge or in any direction: a gross error. The record is tested against what
-  the others predict (deletion residual), however strongly it pulls the solution.
-- one constant for a record and all later ones of its point: a shift of the gauges' zero.
-- a known change of the readings, with no unknown: a gauge fault. Readings d should have been T d,
-  so that the residuals change by ``z = -(T - 1) d`` and the chi-square by ``2 z^T M r + z^T M z``:
-  a likelihood ratio.
+- one record, along one gauge or in any direction: a gross error;
+- one constant for a record and all later ones of its point: a shift of the gauges' zero;
+- a known change of the readings, with no unknown: a gauge fault. Readings d should have been T d, so that
+  the residuals change by ``z = -(T - 1) d`` and the chi-square by ``2 z^T M r + z^T M z``.
 
-Sources: Rao, Large sample tests of statistical hypotheses, Proc. Cambridge Phil. Soc. 44, 1948 (score
-test); Baarda, A testing procedure for use in geodetic networks, 1968 (data snooping); Cook and
-Weisberg, Residuals and Influence in Regression, 1982.
+Sources: Rao, Proc. Cambridge Phil. Soc. 44, 1948 (score test); Baarda, A testing procedure for use in
+geodetic networks, 1968 (data snooping); Cook and Weisberg, Residuals and Influence in Regression, 1982.
 """
 
 from __future__ import annotations

@@ -1,29 +1,22 @@
 """Stepwise selection of data faults: forward by penalized score tests, backward by deletion tests.
 
-A fault hypothesis h adds k unknowns b to the linear model, ``r = r0 + J x + Z b``. Its gain, the decrease
-of the chi-square, is a score statistic that needs no second fit (:mod:`.score_tests`); its cost is ``c k
-- gain``, like Schwarz's criterion (BIC) with a constant c instead of log n. Starting with no fault at all
-(:func:`select_faults`):
+A fault hypothesis adds k unknowns to the linear model. Its gain, the decrease of the chi-square, needs no
+second fit (:mod:`.score_tests`); its cost is ``c k - gain``, like Schwarz's criterion with a constant c
+instead of log n. Starting with no fault at all (:func:`select_faults`):
 
-1. Forward (:func:`_forward`). Fit the records. Of all significant hypotheses take the one of lowest cost
-   that a refit of the corrected records confirms, and repeat. Where the fit is unreliable, first-order
-   tests around it are not valid: hypotheses are tried by refits instead (:mod:`.trial_fits`).
-2. Backward (:func:`_readmitted`). Test each rejected record against the final fit, in which it takes no
-   part, readmit those that agree, and go forward again.
+1. Forward (:func:`_forward`). Of all significant hypotheses take the one of lowest cost that a refit of the
+   corrected records confirms, and repeat. Where the fit is unreliable, hypotheses are tried by refits
+   instead (:mod:`.trial_fits`).
+2. Backward (:func:`_readmitted`). Readmit the rejected records that agree with the final fit, in which they
+   take no part, and go forward again.
 3. Proof (:func:`_only_proven`). Readmit those whose fault the rest of the records does not prove
    (:mod:`.deletion_tests`).
 
-Gross errors, and all records after a shift of a gauge's zero, are left out. Gauge faults are refused: their
-readings would have to be guessed, so a person has to check the machine or the file. With few records the
-residuals of a fit to a wrong minimum resemble a fault; before a fault is refused, other starts are tried
-(:func:`_other_minimum`). The search yields facts; :func:`screen` puts them into words at its end
-(:mod:`.messages`).
+Gross errors, and all records after a shift of a gauge's zero, are left out. Gauge faults are refused, after
+other starts of the solver were tried (:func:`_other_minimum`). :mod:`.messages` puts faults into words.
 
-Sources: Efroymson, Multiple Regression Analysis, in Mathematical Methods for Digital Computers, 1960
-(stepwise selection); Rao 1948 (score test); Baarda 1968 and Pope, The Statistics of Residuals and the
-Detection of Outliers, NOAA NOS 65 NGS 1, 1976 (data snooping, one outlier after another); Atkinson and
-Riani 2000 (several outliers, backward test by deletion); Schwarz, Estimating the Dimension of a Model,
-Annals of Statistics 6, 1978.
+Sources: Efroymson 1960 (stepwise selection); Rao 1948 (score test); Baarda 1968, Pope 1976 (data snooping);
+Atkinson and Riani 2000 (several outliers); Schwarz, Annals of Statistics 6, 1978.
 """
 
 from __future__ import annotations

@@ -11,9 +11,6 @@ tried (:func:`_candidates`):
 4. gauge faults around the fit without the deleted records, which they may have in common;
 5. the second and third of the lists of 1, and every gauge fault at all points.
 
-The first corrected fit that agrees with the noise, or nearly so and is incomparably better, is taken,
-else the best one if it is better by far.
-
 Source: Atkinson and Riani, Robust Diagnostic Regression Analysis, 2000, on masking: several outliers hide
 each other around a fit to all of them, and show around one that they did not influence.
 """

@@ -1,28 +1,21 @@
 """Base and platform frames: fitted before pose errors are compared, and chosen for a new geometry.
 
-The base frame and the rotation of the platform frame are conventions, set when a fixture or a tool is
-taught. Pose errors are therefore compared after both frames are fitted (:class:`FrameFit`). To first
-order a base frame shifted by t and rotated by f, and a platform frame rotated by p about the ball, change
-a pose (P, R) by
+Pose errors are compared after both frames are fitted (:class:`FrameFit`), as these are set by teaching. To
+first order a base frame shifted by t and rotated by f, and a platform frame rotated by p about the ball,
+change a pose (P, R) by
 
     dP = t + f x P,    dr = f + R p,
 
 with dr the rotation vector in the base frame. The best (t, f, p) minimize the sum of squares over poses
-that span the workspace, with rotations weighted by a length, the platform's radius. Not every controller
-can turn a work frame about every axis: f is restricted to the axes about which it can be taught.
+that span the workspace, with rotations weighted by a length, the platform's radius; f is restricted to the
+axes about which a work frame can be taught.
 
-An identification leaves the frames of a geometry open: the mechanism's parameters can express it in any
-of them (:class:`~hexacell.kinematics.mechanism.FrameFreedom`). The base frame is not turned all the same:
-the gauges measure along its axes, and stay where they are when a new geometry is written. Points, work
-frames and tool frames were taught with an earlier geometry. At the joint variables q of a taught pose X
-the new geometry has another pose Y, in frames of its own. The chosen change of frames c
-(:func:`choose_frames`) is the one with the smallest
-
-    sum over taught poses of |dP|^2 + (r |dw|)^2,    (dP, dw) = pose errors of c(Y) against X,
-
-with r the platform's radius. It is found by Gauss-Newton with the derivatives at X. They give the exact
-gradient of the sum: a small turn f moves c(Y) by f x c(Y) = f x X + f x dP, whose last term is normal to
-dP, and a small turn w changes the length of dw by ``w . dw / |dw|``, however large dw is.
+At the joint variables of a taught pose X a new geometry has another pose Y, in frames of its own. Its
+chosen frames c (:func:`choose_frames`) have the smallest sum over taught poses of ``|dP|^2 + (r |dw|)^2``,
+(dP, dw) the errors of c(Y) against X (``docs/method.md``, Frames of the written geometry). Gauss-Newton
+finds them with the derivatives at X, which give the exact gradient: a small turn f moves c(Y) by f x c(Y)
+= f x X + f x dP, whose last term is normal to dP, and a small turn w changes the length of dw by ``w . dw /
+|dw|``, however large dw is.
 """
 
 from __future__ import annotations

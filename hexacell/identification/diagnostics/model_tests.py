@@ -1,14 +1,10 @@
 """Tests of the model by records that it was not fitted to: held-out ones, and each point by the others.
 
 By how much more records raise the least cost is, if the model is right, distributed as the chi-square of as
-many degrees of freedom as they have measured coordinates, less the unknown constants of their points: it is
-the chi-square of these records against their covariance as predicted from the others. Both costs are
-linearized at the solution of all records, where the poses, and with them the weights, are known best. The
-systematic errors that are stated of the machine are in the covariance
-(:mod:`~hexacell.identification.solver.linear_model`).
+many degrees of freedom as they have measured coordinates, less the unknown constants of their points. Both
+costs are linearized at the solution of all records (:class:`.LinearCosts`).
 
-Sources: Gelb (ed.), Applied Optimal Estimation, 1974 (innovations); Cook and Weisberg, Residuals and
-Influence in Regression, 1982 (deletion).
+Sources: Gelb (ed.), Applied Optimal Estimation, 1974 (innovations); Cook and Weisberg 1982 (deletion).
 """
 
 from __future__ import annotations

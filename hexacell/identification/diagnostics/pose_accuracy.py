@@ -1,16 +1,10 @@
 """Predicted pose accuracy: the error of commanded poses before and after calibration.
 
-A controller with geometry c computes the joint variables of a commanded pose X under c. The machine
-with geometry m takes the pose that m has at these joint variables.
-
-Before: c is the controller's present geometry and m the estimate. The difference is computed without
-approximation, by continuation. After: c is the estimate and m the true geometry, which differs from it
-by a random error with the covariance C of the estimate. To first order the pose error is ``H dx`` with
-H the implicit derivative of the pose by the parameters, so its covariance is ``H C H^T``.
-
-In both, base and platform frames are fitted over the workspace
-(:mod:`~hexacell.identification.diagnostics.frame_alignment`), so the remaining errors cannot be removed
-by teaching. The repeatability of the machine is not included.
+Before: the controller has its present geometry and the machine the estimate; their difference is computed
+by continuation. After: the controller has the estimate, from which the machine differs by a random error
+of the covariance C. To first order the pose error is ``H dx`` with H the implicit derivative of the pose
+by the parameters, so its covariance is ``H C H^T``. In both, base and platform frames are fitted over the
+workspace, so that teaching cannot remove what is left. The repeatability of the machine is not included.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """Whether a robot can have been built as its drawing allows, and which joint was not.
 
-A shop checks the coordinates of all joints in the frames of the drawing. An identification does not see
-these frames: neither where the base's origin is, nor how the platform frame is turned, nor where the ball
-was mounted. A geometry is therefore outside the tolerances only if no robot within them, in any frames
-and with the ball anywhere allowed, explains it. The robot that agrees best (:class:`ToleranceFitter`) is
-the solution of
+An identification does not see the frames of the drawing, nor where the ball was mounted. A geometry is
+therefore outside the tolerances only if no robot within them, in any frames and with the ball anywhere
+allowed, explains it. The robot that agrees best (:class:`ToleranceFitter`) is the solution of
 
     minimize    T = |C^-1/2 (d + F c + B b - x)|^2    over c, b and x
     subject to  |x|_j <= w_j,    |b| <= ball tolerance,
@@ -12,16 +10,11 @@ the solution of
 with the differences d of the identified geometry from the drawing and their covariance C, the errors x
 with which the robot was built, the tolerances w, small changes of the frames c and an offset b of the
 ball. As frames are linear in small turns alone, it is solved again from the best frames until T no longer
-falls. Of several x that agree equally the smallest is taken. All is in units of the tolerances.
+falls. All is in units of the tolerances. The limit of T, a quantile of a chi-square, and how a joint is
+named are in ``docs/method.md`` (The solution).
 
-A robot within its tolerances, wherever between them, exceeds the quantile of a chi-square with at most
-the probability of the test, whose degrees of freedom are the number of tolerances that hold the solution,
-less what the frames could give way there (Cox and Shi, Simple Adaptive Size-Exact Testing for Full-Vector
-and Subvector Inference in Moment Inequality Models, Review of Economic Studies 90, 2023).
-
-The joint is named without whose tolerances a robot explains it best; where no single one does, another one
-is added, and so on (forward selection). Joints of which each alone explains it as well are named beside
-it. Small residuals prove nothing here: legs 13 mm too short can explain data perfectly.
+Source: Cox and Shi, Simple Adaptive Size-Exact Testing for Full-Vector and Subvector Inference in Moment
+Inequality Models, Review of Economic Studies 90, 2023.
 """
 
 from __future__ import annotations

@@ -1,12 +1,9 @@
 """Chi-square test: are the residuals as large as the stated noise makes them?
 
-The expected chi-square of the residuals is the number of measured coordinates, less the unknown
-constants of the stations, less the trace of C M for the parameters (C their covariance, M the
-information of the data). Where the data alone determine the parameters, that trace is their number
-and the expected chi-square the degrees of freedom. A parameter that the prior determines counts less.
-
-Source: Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2nd ed. 2009 (effective
-degrees of freedom of ridge regression, the trace of the hat matrix).
+The expected chi-square is the number of measured coordinates, less the unknown constants of the stations,
+less the trace of C M for the parameters (C their covariance, M the information of the data): the effective
+degrees of freedom of ridge regression (Hastie, Tibshirani and Friedman, The Elements of Statistical
+Learning, 2nd ed. 2009). A parameter that the prior determines counts less than one.
 """
 
 from __future__ import annotations

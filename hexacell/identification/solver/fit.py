@@ -4,38 +4,23 @@ The cost at free parameters p is
 
     F(p) = r~^T W r~ + (p - p0)^T L (p - p0),
 
-with the residuals r~ that are left once the unknowns of the stations have their best values, the weights W
-of the records, the centre p0 of the prior, and its precision L. One iteration (:func:`_advance`):
+with the residuals r~ that are left once the unknowns of the stations have their best values, the weights
+W of the records, the centre p0 of the prior, and its precision L. One iteration (:func:`_advance`)
+linearizes the model at p, eliminates the stations (rows J~), solves ``(N + m diag N) s = -g`` for the
+step s with ``N = J~^T J~ + L`` and ``g = J~^T r~ + L (p - p0)``, and finds the poses at p + s in the same
+assembly mode. If F falls, under the weights of p, the step is accepted, and the damping m follows the
+ratio of actual to predicted gain; otherwise it grows (Nielsen's rule). An accepted step changes the
+weights, so that at the end the gradient under the weights of the last iterate is zero.
 
-1. The model at p is linearized: residuals r, their Jacobian J, weights W (:func:`.predict`).
-2. The unknowns of the stations are eliminated (:class:`.NuisanceElimination`); whitened rows J~ are left.
-3. The step s solves ``(N + m diag N) s = -g`` with ``N = J~^T J~ + L``, ``g = J~^T r~ + L (p - p0)`` and
-   the damping m (:func:`_damped_step`).
-4. Forward kinematics gives the poses at p + s, in the same assembly mode (:func:`.evaluate_step`).
-5. If F falls, under the weights of p, the step is accepted, and the damping follows the ratio of actual to
-   predicted gain; otherwise it grows (Nielsen's rule: cubic decrease, doubling increase).
-
-An accepted step changes the weights. At the end the gradient under the weights of the last iterate is zero,
-which solves the weighted estimating equation.
-
-The functions, from the outermost to the innermost:
-
-- :func:`fit_regularized` solves twice. The prior keeps the first solution near the drawing and determines
-  what the data do not. In a direction that the data determine much better than the drawing does it would
-  only bias the result; there it is released in the second solution. The directions are the eigenvectors of
-  the data's information in coordinates in which the prior's covariance is the identity, as in truncated
-  Tikhonov regularization.
-- :func:`solve_around_singularities` sets records aside. On the way the pose of a record may come next to a
-  singularity although it is far from one at the start and at the solution, or a singularity lies between
-  the geometry that commanded the record and the start, so that it has no start pose. The other records are
-  solved, and the record is restored at their solution, where its pose is continued from the commanded one.
-  A record that cannot be restored is left out.
-- :func:`solve` iterates.
+:func:`fit_regularized` solves twice: the prior of the first solution is released for the second one in
+directions that the data determine much better, where it would only bias the result. These are eigenvectors
+of the data's information in coordinates in which the prior's covariance is the identity.
+:func:`solve_around_singularities` sets records aside that come next to a singularity on the way, or have no
+start pose, and restores them at the solution of the others. :func:`solve` iterates.
 
 Sources: Marquardt 1963; Nielsen, Damping Parameter in Marquardt's Method, IMM-REP-1999-05, 1999; Hansen,
-Rank-Deficient and Discrete Ill-Posed Problems, 1998 (release of the prior); Gosselin and Angeles,
-Singularity analysis of closed-loop kinematic chains, IEEE Transactions on Robotics and Automation 6,
-1990. Setting records aside is this program's own method.
+Rank-Deficient and Discrete Ill-Posed Problems, 1998 (release of the prior). Setting records aside is this
+program's own method.
 """
 
 from __future__ import annotations

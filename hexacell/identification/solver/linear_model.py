@@ -1,28 +1,20 @@
 """The measurement model linearized around a geometry, for tests of its residuals.
 
 :class:`LinearizedModel`: with residuals r, their Jacobian J and weights W, all with the stations'
-unknowns eliminated, the estimate of further unknowns b that add ``Z b`` to the residuals needs only ``M
-r`` and blocks of
+unknowns eliminated, the estimate of further unknowns b that add ``Z b`` to the residuals needs only ``M r``
+and blocks of ``M = W - W (A + J C J^T) W``, where A is what the stations and the gauges' scale absorb and C
+the covariance of the parameters. At a minimum ``M r = W r``.
 
-    M = W - W (A + J C J^T) W,
-
-where A is what the stations and the gauges' scale absorb and C the covariance of the parameters. At a
-minimum ``M r = W r``. Around any other geometry the residuals are those that remain after the linear
-problem's own step.
-
-:class:`LinearCosts`: least costs of some of the records. Unknown are the free parameters p, the constants
-of stations and gauges, and the causes b of systematic errors (:class:`.SystematicErrors`), which have
-unit variance:
+:class:`LinearCosts`: least costs of some of the records over the parameters p and the causes b of
+systematic errors (:class:`.SystematicErrors`), which have unit variance:
 
     cost = (r + J dp + Z b)^T W (r + J dp + Z b) + b^T b + (p - p0)^T L (p - p0),
 
-with the columns Z of the errors that records share, W the inverse of the records' covariance with the
-errors of each of its own, and L the precision of the prior. At the minimum over b the first two terms are
-the weighted squares under the full covariance ``W^-1 + Z Z^T``, so that nothing more need be estimated.
+with the columns Z of the errors that records share. At the minimum over b the first two terms are the
+weighted squares under the full covariance ``W^-1 + Z Z^T``.
 
-Sources: Cook and Weisberg, Residuals and Influence in Regression, 1982 (added variables); Aitken 1936;
-Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, section 2.7 (explicit basis
-functions).
+Sources: Cook and Weisberg, Residuals and Influence in Regression, 1982 (added variables); Rasmussen and
+Williams, Gaussian Processes for Machine Learning, 2006, section 2.7 (explicit basis functions).
 """
 
 from __future__ import annotations

@@ -1,22 +1,15 @@
 """The measurement model: residuals of every record, their derivatives and weights.
 
 A record predicts the ball's position P(p, q) by forward kinematics at the measured joint variables q
-(Abtahi et al. 2010, eq. 4). Its residual is P minus the measured deviation. The noise of the encoders
-reaches the residual through ``G = dP/dq``, so that, to first order, a record's covariance is
-
-    V = G diag(s_encoder^2) G^T + diag(s_gauge^2).
-
-Near a singularity the first term is large, and ordinary least squares (eq. 13) would weight such a record
-wrongly. The weight is the inverse of V (generalized least squares; Aitken 1936).
+(Abtahi et al. 2010, eq. 4). Its residual is P minus the measured deviation d. Its weight is the inverse
+of its covariance ``G diag(s_encoder^2) G^T + diag(s_gauge^2)``, with ``G = dP/dq`` (generalized least
+squares).
 
 A record satisfies ``P - d = c + w x d - k * d + noise``, with the position c of the ball when the point's
 gauges were zeroed, the small rotation w of the gauges against the base, and the scale errors k of the
 gauges, which are along their axes. All of them are linear, so for given weights their best values are
 computed and subtracted, and they never become parameters (variable projection; Golub and Pereyra 1973): c
-and w for each point, with a prior on w, and k once for all points, with a prior as well. With equal
-weights and without w and k this subtracts the mean of each point, which has the same minimum as all the
-pairs of eq. 5-8 of Abtahi et al. 2010, with 2/(k-1) of the rows. The cost is linear in the number of
-records.
+and w for each point, with a prior on w, and k once for all points, with a prior as well.
 """
 
 from __future__ import annotations

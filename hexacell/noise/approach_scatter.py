@@ -3,8 +3,7 @@
 What the encoders see of the ball's motion is no error of the model. The rest is, for each visit less
 their mean, ``r = d - G q`` with ``G = dP/dq``, whose covariance follows from the noise of encoders and
 gauges that is stated for a record. Whether there is more is a chi-square test. Where it comes from, ball
-and joints show
-together: with stops s of the joints, play p, and errors e and g of encoders and gauges,
+and joints show together: with stops s, play p, and errors e and g of encoders and gauges,
 
     q = s + e,      d = G (s + p) + g.
 

@@ -18,9 +18,9 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.kinematics.rotations import Array
-from hexacell.uncertainty.effect_kinds import COMMON_SCALE
+from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
 from hexacell.uncertainty.effects import Effect, Occurrence
-from hexacell.uncertainty.propagation import MeasuredScale, Propagation, ScaleObservation, compressed
+from hexacell.uncertainty.propagation import Propagation, ScaleObservation, compressed
 from hexacell.uncertainty.statement import TaskErrors, covariance_factor
 
 VISIBLE_SIGMAS = 4.0
@@ -90,9 +90,12 @@ class UncertaintyBudget:
         """
         found, zeros = propagation.found, propagation.zeros
         effects = tuple(_measured(effect, scale) for effect in effects)
-        measured = MeasuredScale.of(propagation, scale)
         covariance = (zeros or found).free_covariance * found.goodness.noise_factor**2
-        known = measured.known
+        known: Array = np.zeros(propagation.jacobian.shape[:2])
+        by_scale = None
+        if scale is not None:
+            by_scale = propagation.columns(common_encoder_scale(1.0)).combined[..., 0]
+            known = scale.farther_um_m * by_scale
         for effect in effects:
             if effect.is_estimated:
                 columns = effect.size * propagation.parameter_columns(effect)
@@ -100,10 +103,12 @@ class UncertaintyBudget:
             if effect.value:
                 known = known + effect.value * propagation.columns(effect).combined.sum(axis=-1)
         factor = covariance_factor(covariance)
-        noise = propagation.jacobian @ factor + measured.by_parameters(factor)
+        noise = propagation.jacobian @ factor
+        if scale is not None and by_scale is not None:
+            noise = noise + by_scale[..., None] * (scale.by_parameters @ factor)
         significant = VISIBLE_SIGMAS * np.sqrt(2.0 * found.goodness.expected)
         visible = significant / (HARMLESS_ERROR * _largest(noise)) ** 2
-        lines = (_line(propagation, effect, visible, measured) for effect in effects)
+        lines = (_line(propagation, effect, visible, scale, by_scale) for effect in effects)
         acting = tuple(line for line in lines if line.columns.shape[-1])
         return cls(propagation.jacobian, noise, acting, known, has_held=zeros is not None)
 
@@ -183,12 +188,23 @@ def _measured(effect: Effect, scale: ScaleObservation | None) -> Effect:
     return replace(effect, size=scale.sigma_um_m, source="length check")
 
 
-def _line(propagation: Propagation, effect: Effect, visible: float, measured: MeasuredScale) -> BudgetLine:
-    """The line of an effect, which is seen if an error comes with a chi-square of ``visible``, 1/mm^2."""
+def _line(
+    propagation: Propagation,
+    effect: Effect,
+    visible: float,
+    scale: ScaleObservation | None,
+    by_scale: Array | None,
+) -> BudgetLine:
+    """The line of an effect, which is seen if an error comes with a chi-square of ``visible``, 1/mm^2.
+
+    ``by_scale`` (t, 6) are the errors by 1 um/m of the measured ``scale``.
+    """
     task = propagation.columns(effect)
-    combined = measured.combined(effect, task)
+    combined, is_measured = task.combined, scale is not None and effect.name == COMMON_SCALE
+    if scale is not None and by_scale is not None and not is_measured:
+        # Less what of the effect the length check takes for a scale.
+        combined = combined - by_scale[..., None] * scale.by_effect(effect, combined.shape[-1])
     per_unit = _largest(combined)
-    is_measured = measured.scale is not None and effect.name == COMMON_SCALE
     return BudgetLine(
         effect=effect,
         through_mm=effect.size * _largest(task.through),

@@ -125,14 +125,9 @@ class LengthCheck:
     @cached_property
     def agreement(self) -> ChiSquareTest:
         """Whether all records agree with two places."""
-        residuals = self.residuals.ravel()
+        residuals = (self.records.places - self._places[self.records.seats]).ravel()
         chi2 = float(residuals @ np.linalg.solve(self._covariance, residuals))
         return ChiSquareTest(chi2, float(len(residuals) - 6))
-
-    @cached_property
-    def residuals(self) -> Array:
-        """(n, 3) of the records' places less that of their seat, mm."""
-        return np.asarray(self.records.places - self._places[self.records.seats])
 
     @property
     def closure_mm(self) -> Array:
@@ -159,14 +154,16 @@ class LengthCheck:
 
         A gauge is not a number where the ball hardly moved.
         """
-        placement = self.records.placement
-        along = placement.gauges
-        moved, shown = placement.poses.positions @ along, placement.deviations @ along
-        return {
-            number: _slope(moved[rows], shown[rows])
-            for number in np.unique(self.records.mountings).tolist()
-            for rows in [self.records.mountings == number]
-        }
+        placement, slopes = self.records.placement, {}
+        for number in np.unique(self.records.mountings).tolist():
+            rows = self.records.mountings == number
+            moved = placement.poses.positions[rows] @ placement.gauges
+            shown = placement.deviations[rows] @ placement.gauges
+            moved, shown = moved - moved.mean(axis=0), shown - shown.mean(axis=0)
+            squares, undefined = (moved**2).sum(axis=0), np.full(3, np.nan)
+            products, is_known = (moved * shown).sum(axis=0), squares > HARDLY_MM2
+            slopes[number] = np.divide(products, squares, out=undefined, where=is_known)
+        return slopes
 
     @property
     def observation(self) -> ScaleObservation:
@@ -202,12 +199,8 @@ class LengthCheck:
 
     def _share(self, length_mm: Array | float) -> Array:
         """The scale error of the encoders, um/m, that would make an error of the length."""
-        return np.asarray(length_mm) / self._by_long_encoders
-
-    @cached_property
-    def _by_long_encoders(self) -> float:
-        """Error of the length, mm, by 1 um/m; the sliders move less than such encoders show."""
-        return -float(self._to_length(self.by_scale)[0])
+        # The sliders move less than encoders that are 1 um/m too long show.
+        return np.asarray(length_mm) / -float(self._to_length(self.by_scale)[0])
 
     def _to_length(self, columns: Array) -> Array:
         """Errors (k,) of the length by errors (n, 3, k) of the places, mm."""
@@ -250,13 +243,3 @@ class LengthCheck:
             columns = error.columns.reshape(size, -1)
             together = together + columns @ columns.T
         return together
-
-
-def _slope(moved: Array, shown: Array) -> Array:
-    """Slope of each gauge (3,), by positions and readings (n, 3) along them."""
-    moved, shown = moved - moved.mean(axis=0), shown - shown.mean(axis=0)
-    squares = (moved**2).sum(axis=0)
-    undefined = np.full(3, np.nan)
-    return np.asarray(
-        np.divide((moved * shown).sum(axis=0), squares, out=undefined, where=squares > HARDLY_MM2)
-    )

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from hexacell.design.decorrelation import DecorrelatingPose
 from hexacell.identification.diagnostics.frame_alignment import PoseErrors
 from hexacell.identification.diagnostics.model_tests import contradicted_points
 from hexacell.noise.record_noise import NoiseLevels
@@ -39,7 +38,14 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
             {
                 "parameters": [pair.first, pair.second],
                 "correlation": pair.correlation,
-                "measure": pose and _decorrelating_pose(pose),
+                "measure": pose
+                and {
+                    "point": pose.point,
+                    "axis": pose.axis,
+                    "angle_deg": pose.degrees,
+                    "pose": asdict(pose.command),
+                    "correlation": pose.correlation,
+                },
             }
             for pair, pose in assessed.correlated
         ],
@@ -78,23 +84,8 @@ def _repeatability(assessed: Assessment) -> dict[str, Any] | None:
     scatter = assessed.repeatability
     if scatter is None:
         return None
-    return {
-        "per_axis_mm": list(scatter.per_axis_mm),
-        "distance_mm": scatter.distance_mm,
-        "degrees_of_freedom": scatter.degrees_of_freedom,
-        "poses": scatter.poses,
-        "recalibrating_helps": not assessed.does_not_repeat,
-    }
-
-
-def _decorrelating_pose(pose: DecorrelatingPose) -> dict[str, Any]:
-    return {
-        "point": pose.point,
-        "axis": pose.axis,
-        "angle_deg": pose.degrees,
-        "pose": asdict(pose.command),
-        "correlation": pose.correlation,
-    }
+    more = {"distance_mm": scatter.distance_mm, "recalibrating_helps": not assessed.does_not_repeat}
+    return asdict(scatter) | more
 
 
 def _accuracy(assessed: Assessment) -> dict[str, Any] | None:
@@ -111,28 +102,17 @@ def _accuracy(assessed: Assessment) -> dict[str, Any] | None:
 
 
 def _budget(budget: UncertaintyBudget) -> dict[str, Any]:
-    return {
-        "noise_mm": budget.noise_mm,
-        "systematic_mm": budget.systematic_mm,
-        "standard_mm": budget.standard_mm,
-        "expanded_mm": budget.expanded_mm,
-        "expanded_deg": budget.expanded_deg,
-        "lines": [_line(line) for line in budget.lines],
-    }
+    figures = ("noise_mm", "systematic_mm", "standard_mm", "expanded_mm", "expanded_deg")
+    lines = [_line(line) for line in budget.lines]
+    return {name: getattr(budget, name) for name in figures} | {"lines": lines}
 
 
 def _line(line: BudgetLine) -> dict[str, Any]:
-    effect = line.effect
+    effect, sizes = line.effect, ("through_mm", "direct_mm", "combined_mm", "per_unit_mm")
     return {
-        "name": effect.name,
-        "size": effect.size,
-        "unit": effect.unit,
-        "source": effect.source,
+        **{name: getattr(effect, name) for name in ("name", "size", "unit", "source")},
         "acts": effect.occurrence.value,
-        "through_mm": line.through_mm,
-        "direct_mm": line.direct_mm,
-        "combined_mm": line.combined_mm,
-        "per_unit_mm": line.per_unit_mm,
+        **{name: getattr(line, name) for name in sizes},
         "visible": line.is_visible,
         "estimated": effect.is_estimated,
         "parameter_columns": line.parameter_columns.T.tolist() if effect.size else [],
@@ -140,11 +120,9 @@ def _line(line: BudgetLine) -> dict[str, Any]:
 
 
 def _errors(errors: PoseErrors) -> dict[str, Any]:
+    names = ("position_rms_mm", "position_largest_mm", "orientation_rms_deg", "orientation_largest_deg")
     return {
-        "position_rms_mm": errors.position_rms_mm,
-        "position_largest_mm": errors.position_largest_mm,
-        "orientation_rms_deg": errors.orientation_rms_deg,
-        "orientation_largest_deg": errors.orientation_largest_deg,
+        **{name: getattr(errors, name) for name in names},
         "position_mm": errors.distances_mm.tolist(),
         "orientation_deg": np.degrees(errors.angles).tolist(),
     }

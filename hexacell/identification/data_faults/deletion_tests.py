@@ -75,10 +75,15 @@ class DeletionTest:
 
     @property
     def significance(self) -> float:
-        """The larger statistic of the record over its critical value; infinite without tests."""
-        if self.statistics is None:
+        """The larger statistic of the record over its critical value; infinite where it is certain."""
+        if self.statistics is None or self.is_certain:
             return float("inf")
         return float(self.statistics.threshold_ratio()[self.row])
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the record is false whatever the fit says, as joint variables of another command are."""
+        return self.statistics is None or self.kind is DataFaultKind.MISMATCHED_JOINTS
 
     def agrees(self, found_before: int = 0) -> bool:
         """Whether chance explains the difference, after some records that certainly disagree."""
@@ -181,7 +186,10 @@ def proven_faults(
     """The faults of a fit that the rest of its records proves; ``tests`` are those of the left-out ones."""
     rest = selected.fit.goodness
     can_prove = selected.fit.problem.is_overdetermined
-    records = {record: _significance(tests[record], can_prove) for record in selected.rejected}
+    records = {
+        record: tests[record].significance if can_prove or tests[record].is_certain else 0.0
+        for record in selected.rejected
+    }
     shifts = {shift: shift.significance for shift in selected.zero_shifts}
     significances = [*shifts.values(), *records.values()]
     required = required_significance(rest, len(significances))
@@ -199,10 +207,3 @@ def proven_faults(
             case _:
                 kept.append(fault)
     return tuple(kept)
-
-
-def _significance(test: DeletionTest, can_prove: bool) -> float:
-    """Joint variables that do not belong to the command are false, whatever the fit says."""
-    if test.statistics is None or test.kind is DataFaultKind.MISMATCHED_JOINTS:
-        return float("inf")
-    return test.significance if can_prove else 0.0

@@ -47,7 +47,6 @@ from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.fit import FINE, fit_regularized
 from hexacell.identification.solver.multistart import restarts
 from hexacell.identification.solver.result import GaugeFaultError, Identification
-from hexacell.measurements.records import RecordId
 
 CONFIRMED_SHARE = 0.5
 """Share of the first-order gain of a gauge fault that a refit must confirm."""
@@ -93,7 +92,10 @@ def select_faults(problem: Problem) -> CorrectedFit:
     uncorrected = CorrectedFit.uncorrected(problem)
     selected = _forward(uncorrected)
     if len(selected.rejected) > 1 or not selected.is_consistent:
-        _refuse_inches(uncorrected)
+        # Readings in inches resemble a machine that needs no calibration, with some gross errors.
+        in_mm = refitted(uncorrected, ALL_IN_INCHES)
+        if in_mm is not None and in_mm.is_consistent:
+            _require_correctable(uncorrected, in_mm)
     readmitted = _readmitted(selected)
     return _only_proven(selected if readmitted is None else _forward(readmitted))
 
@@ -104,19 +106,15 @@ def _forward(current: CorrectedFit) -> CorrectedFit:
         extended = None if current.is_reliable else search(current)
         if extended is None:
             current = current.converged()
-            extended = _most_likely(current) if current.is_reliable else None
+            # The hypothesis of lowest cost that is confirmed.
+            ranked = hypotheses_at_solution(current, len(current.rejected)) if current.is_reliable else ()
+            confirmed = (confirmed_by_refit(current, hypothesis) for hypothesis in ranked)
+            extended = next(filter(None, confirmed), None)
         if extended is None:
             break
         _require_correctable(current, extended)
         current = extended
     return current
-
-
-def _most_likely(current: CorrectedFit) -> CorrectedFit | None:
-    """The fit corrected for the hypothesis of lowest cost that is confirmed."""
-    ranked = hypotheses_at_solution(current, found_before=len(current.rejected))
-    confirmed = (confirmed_by_refit(current, hypothesis) for hypothesis in ranked)
-    return next((extended for extended in confirmed if extended), None)
 
 
 def confirmed_by_refit(current: CorrectedFit, hypothesis: FaultHypothesis) -> CorrectedFit | None:
@@ -149,13 +147,6 @@ def _require_correctable(current: CorrectedFit, extended: CorrectedFit) -> None:
             raise UncorrectableFaultError(fault, current, extended, left)
 
 
-def _refuse_inches(uncorrected: CorrectedFit) -> None:
-    """Readings in inches resemble a machine that needs no calibration, with some gross errors."""
-    in_mm = refitted(uncorrected, ALL_IN_INCHES)
-    if in_mm is not None and in_mm.is_consistent:
-        _require_correctable(uncorrected, in_mm)
-
-
 def _readmitted(selected: CorrectedFit) -> CorrectedFit | None:
     """The fit with the rejected records that agree with it; None if no record agrees, or it is unreliable.
 
@@ -172,16 +163,12 @@ def _readmitted(selected: CorrectedFit) -> CorrectedFit | None:
     if not solved.found.all():
         return None
     fit = fit_regularized(problem.starting_at(selected.fit.free, solved.poses, solved.found), FINE)
-    faults = tuple(_without(fault, agreeing) for fault in selected.faults)
+    faults = tuple(
+        fault.only(set(fault.records) - agreeing) if isinstance(fault, OutlierHypothesis) else fault
+        for fault in selected.faults
+    )
     readmitted = CorrectedFit(selected.original, problem, fit, faults)
     return readmitted if readmitted.is_reliable else None
-
-
-def _without(fault: FaultHypothesis, records: set[RecordId]) -> FaultHypothesis:
-    """A fault without the gross errors of some records."""
-    if not isinstance(fault, OutlierHypothesis):
-        return fault
-    return fault.only(set(fault.records) - records)
 
 
 def _only_proven(selected: CorrectedFit) -> CorrectedFit:

@@ -87,7 +87,9 @@ def error_jacobian(belief: RobotBelief, task: PoseBatch, workspace: PoseBatch) -
     Returns:
         (n, 6, p), mm and rad by mm.
     """
-    both = _derivatives(belief, PoseBatch.concatenate([task, workspace]))
+    poses = PoseBatch.concatenate([task, workspace])
+    joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
+    both = free_sensitivity(belief.mechanism, belief.estimate, poses, joints).free
     of_task, of_workspace = both[: len(task)], both[len(task) :]
     return teachable_frames(belief, workspace).remove_frame_motion(task, of_task, of_workspace)
 
@@ -107,9 +109,3 @@ def _reached(belief: RobotBelief, commanded: PoseBatch) -> tuple[PoseBatch, Mask
     actual = belief.commanded.actual_poses(commanded)
     corrected = belief.mechanism.inverse(belief.estimate, belief.branch, commanded)
     return actual.poses, actual.found & np.isfinite(corrected).all(axis=-1)
-
-
-def _derivatives(belief: RobotBelief, poses: PoseBatch) -> Array:
-    """Derivatives (n, 6, p) of the poses by the free parameters, at the estimate's joint variables."""
-    joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
-    return free_sensitivity(belief.mechanism, belief.estimate, poses, joints).free

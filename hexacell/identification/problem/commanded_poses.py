@@ -215,7 +215,13 @@ def _explained_by_tolerances(commands: CommandedPoses, prior: Prior) -> Array:
 
 
 def _advice(commands: CommandedPoses, measured: Array, explained: Array) -> str:
-    columns = _best_columns(commands, measured)
+    # The import takes a sixth of the start-up time, and only wrong columns need it.
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415
+
+    # The column that fits each leg's commands best.
+    reached = np.isfinite(commands.joints).all(axis=-1)
+    distance = np.abs(measured[reached][:, None, :] - commands.joints[reached][:, :, None])
+    columns = linear_sum_assignment(np.median(distance, axis=0))[1].tolist()
     difference = np.nan_to_num(np.abs(measured[:, columns] - commands.joints), nan=0.0)
     if not _is_small_share(difference > explained):
         return "Check that q1 to q6 are in the row of their pose, in mm, and which config commanded it"
@@ -225,14 +231,3 @@ def _advice(commands: CommandedPoses, measured: Array, explained: Array) -> str:
     )
     joint = commands.mechanism.words.joint
     return f"The columns {names} look like those of {sources}: check which encoder is on which {joint}"
-
-
-def _best_columns(commands: CommandedPoses, measured: Array) -> list[int]:
-    """The column (6,) that fits each leg's commands best: a linear assignment."""
-    # The import takes a sixth of the start-up time, and only wrong columns need it.
-    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415
-
-    reached = np.isfinite(commands.joints).all(axis=-1)
-    distance = np.abs(measured[reached][:, None, :] - commands.joints[reached][:, :, None])
-    _, columns = linear_sum_assignment(np.median(distance, axis=0))
-    return [int(column) for column in columns]

@@ -48,7 +48,10 @@ def require_rotation_diversity(problem: Problem) -> None:
     Raises:
         IdentifiabilityError: names the axis, and the rotations that are missing.
     """
-    rotation_vectors = _rotations(problem)
+    commanded = problem.commands.poses.rotations
+    first = problem.per_record(commanded[problem.first_rows])
+    # In the gauges' frame, from each point's first commanded orientation, rad.
+    rotation_vectors = rotations.to_vector(commanded @ np.swapaxes(first, -1, -2)) @ problem.gauges
     squares, axes = np.linalg.eigh(rotation_vectors.T @ rotation_vectors)
     if squares[-1] < len(rotation_vectors) * SMALLEST_ROTATION**2:
         raise IdentifiabilityError(
@@ -61,13 +64,6 @@ def require_rotation_diversity(problem: Problem) -> None:
             f"all orientations turn about {axis} only, and so they cannot determine all parameters",
             action=f"Measure orientations that {missing}",
         )
-
-
-def _rotations(problem: Problem) -> Array:
-    """Rotation vectors (n, 3), rad, in the gauges' frame, from each point's first commanded orientation."""
-    commanded = problem.commands.poses.rotations
-    first = problem.per_record(commanded[problem.first_rows])
-    return rotations.to_vector(commanded @ np.swapaxes(first, -1, -2)) @ problem.gauges
 
 
 def _axis_and_missing(direction: Array) -> tuple[str, str]:

@@ -109,30 +109,18 @@ def fit_regularized(problem: Problem, options: SolverOptions = COARSE) -> Identi
         The fit of the records that could be used.
     """
     kept, first = solve_around_singularities(problem, problem.prior.precision, options)
-    information = _noise_correction(kept, first) * first.information
-    active_prior = _unreleased_precision(information, problem.prior.covariance)
+    # Residuals below the stated noise justify more information than stated: without it, a prior would bias
+    # records with hardly any noise.
+    redundancy, correction = kept.coordinates - len(first.free), 1.0
+    if redundancy >= LEAST_REDUNDANCY:
+        correction = max(1.0, redundancy / max(first.chi2, SMALLEST_CHI2))
+    # The prior's precision stays in the directions that the data do not determine.
+    factor = np.linalg.cholesky(problem.prior.covariance)
+    ratios, directions = np.linalg.eigh(factor.T @ (correction * first.information) @ factor)
+    unreleased = np.linalg.solve(factor.T, directions[:, ratios < RELEASE_RATIO])
+    active_prior = unreleased @ unreleased.T
     second = solve(kept, active_prior, free=first.free, poses=first.prediction.poses, options=FINE)
     return Identification(kept, second, active_prior)
-
-
-def _noise_correction(problem: Problem, solution: Solution) -> float:
-    """The factor of the stated information that residuals below the stated noise justify; at least 1.
-
-    Without it, a prior would bias records with hardly any noise, which have far more information.
-    """
-    redundancy = problem.coordinates - len(solution.free)
-    if redundancy < LEAST_REDUNDANCY:
-        return 1.0
-    return max(1.0, redundancy / max(solution.chi2, SMALLEST_CHI2))
-
-
-def _unreleased_precision(information: Array, prior_covariance: Array) -> Array:
-    """The prior's precision in the directions that the data do not determine, zero in the others."""
-    factor = np.linalg.cholesky(prior_covariance)
-    ratios, directions = np.linalg.eigh(factor.T @ information @ factor)
-    undetermined = directions[:, ratios < RELEASE_RATIO]
-    back = np.linalg.solve(factor.T, undetermined)
-    return back @ back.T
 
 
 def solve_around_singularities(

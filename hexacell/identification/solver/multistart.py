@@ -30,7 +30,12 @@ def restarts(problem: Problem) -> Iterator[Problem]:
     """The problem with other start points, that of lowest cost first."""
     starts = problem.initial_parameters + tolerance_draws(problem)
     reached = list(_with_poses(problem, starts))
-    costs = np.array([_cost(problem, free, poses) for free, poses in reached])
+    costs = np.full(len(reached), np.inf)  # next to a singularity
+    for row, (free, poses) in enumerate(reached):
+        prediction = predict(problem, free, poses)
+        if not prediction.singular.any():
+            elimination = NuisanceElimination(problem, prediction.weights)
+            costs[row] = elimination.cost(prediction.residuals)
     order = np.argsort(costs, kind="stable")[:START_POINTS]
     for row in order[np.isfinite(costs[order])]:
         yield problem.starting_at(*reached[row])
@@ -57,11 +62,3 @@ def _with_poses(problem: Problem, starts: Array) -> Iterator[tuple[Array, PoseBa
         found = solved.found.reshape(len(some), records).all(axis=1)
         for start in np.flatnonzero(found):
             yield some[start], solved.poses[start * records + np.arange(records)]
-
-
-def _cost(problem: Problem, free: Array, poses: PoseBatch) -> float:
-    """The chi-square of the residuals; infinite next to a singularity."""
-    prediction = predict(problem, free, poses)
-    if prediction.singular.any():
-        return np.inf
-    return NuisanceElimination(problem, prediction.weights).cost(prediction.residuals)

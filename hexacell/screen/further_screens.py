@@ -13,8 +13,7 @@ from textual.screen import Screen
 from textual.widgets import Input
 
 from hexacell.screen.widgets import RowList, TextPanel
-from hexacell.text.screens.lines import ROWS, block_text
-from hexacell.text.screens.views import GaugeReadout, Urgency
+from hexacell.text.screens.views import ROWS, Urgency, block_text
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
@@ -45,21 +44,15 @@ class DigitsScreen(Screen[None]):
 
     def draw(self, model: ScreenModel) -> None:
         """Show the gauges."""
-        view = model.measure()
-        self.query_one("#digits-now", TextPanel).show(view.guidance.now)
+        self.query_one("#digits-now", TextPanel).show(model.guidance()["Now"])
         scale = 2 if self.size.height >= 2 * GAUGES * ROWS + OTHER_ROWS and self.size.width >= 120 else 1
-        for number, gauge in enumerate(view.live.gauges[:GAUGES]):
-            text = "\n".join(block_text(_figure(gauge), scale))
-            self.query_one(f"#digits-{number}", TextPanel).show(text or gauge.problem, gauge.urgency)
-        if self._records not in {-1, len(view.records)}:
+        for number, (figure, urgency) in enumerate(model.figures()[:GAUGES]):
+            text = "\n".join(block_text(figure, scale))
+            self.query_one(f"#digits-{number}", TextPanel).show(text, urgency)
+        records = len(model.records())
+        if self._records not in {-1, records}:
             self.app.bell()
-        self._records = len(view.records)
-
-
-def _figure(gauge: GaugeReadout) -> str:
-    if gauge.problem:
-        return f"{gauge.axis} - - -"
-    return f"{gauge.axis} {gauge.deviation or gauge.reading[:-1]}"
+        self._records = records
 
 
 class PlanScreen(Screen[None]):
@@ -81,9 +74,8 @@ class PlanScreen(Screen[None]):
 
     def draw(self, model: ScreenModel) -> None:
         """Show the poses."""
-        view = model.plan()
-        self.query_one("#plan-note", TextPanel).show(view.note)
-        self.query_one(RowList).show(view.rows)
+        self.query_one("#plan-note", TextPanel).show(model.plan_note())
+        self.query_one(RowList).show(model.plan_rows())
 
     async def on_option_list_option_selected(self) -> None:
         """Enter does the same."""
@@ -143,11 +135,12 @@ class AssistantScreen(Screen[bool]):
         self._show()
 
     def _show(self) -> None:
-        view, field = self._assistant.view(), self.query_one(Input)
-        self.query_one("#progress", TextPanel).show(view.progress)
-        self.query_one("#first-question", TextPanel).show(view.text)
-        self.query_one("#first-hint", TextPanel).show(view.hint)
-        self.query_one("#first-problem", TextPanel).show(view.problem, Urgency.ALARM)
-        if not view.problem:
-            field.value = view.answer
-            field.cursor_position = len(view.answer)
+        assistant, field = self._assistant, self.query_one(Input)
+        text, hint = assistant.question
+        self.query_one("#progress", TextPanel).show(assistant.progress)
+        self.query_one("#first-question", TextPanel).show(text)
+        self.query_one("#first-hint", TextPanel).show(hint)
+        self.query_one("#first-problem", TextPanel).show(assistant.problem, Urgency.ALARM)
+        if not assistant.problem:
+            field.value = assistant.suggestion
+            field.cursor_position = len(field.value)

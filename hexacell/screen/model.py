@@ -5,40 +5,59 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Awaitable, Callable
-from dataclasses import replace
 from functools import partial
 
 from hexacell.cell.loader import Cell, describe
 from hexacell.config.receipt import ConfigEditedSince
+from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import HexacellError, UsageError
+from hexacell.run_process.messages import LiveSnapshot
 from hexacell.run_process.recorded import RecordedRun
 from hexacell.screen.preferences import ONCE, ScreenAction
 from hexacell.screen.watching import DeviceWatcher, RunFollower
 from hexacell.screen.workplace import TriedPlan, Workplace
 from hexacell.text.config_changes import RELOAD, versions_text
-from hexacell.text.screens.live import RUNNING, STARTING, TRYING, checklist_view, live_view
-from hexacell.text.screens.measuring import fault_view, measure_view
-from hexacell.text.screens.planned_poses import exclusions_text, plan_view
+from hexacell.text.history import NO_RUNS, history_head
+from hexacell.text.screens.live import (
+    CHECKING,
+    PLAN_UNKNOWN,
+    PRESS_CHECK,
+    PRESS_LENGTH,
+    RUNNING,
+    STARTING,
+    TRYING,
+    device_lines,
+    gauge_figure,
+    live_items,
+    unchecked_items,
+    urgency_of,
+)
+from hexacell.text.screens.measuring import accuracy_plot, fault_view, guidance, record_lines
+from hexacell.text.screens.planned_poses import exclusions_text, plan_note, plan_rows
 from hexacell.text.screens.questions import PERSON, question_view
-from hexacell.text.screens.reviewing import PROPOSAL_WAITS, history_view, review_view, rollback_question
-from hexacell.text.screens.run_picture import header_view
+from hexacell.text.screens.reviewing import (
+    PROPOSAL_WAITS,
+    READING,
+    WHAT_TO_PRESS,
+    review_plots,
+    review_texts,
+    rollback_question,
+    verdict_urgency,
+)
+from hexacell.text.screens.run_picture import header_line
 from hexacell.text.screens.views import (
-    CellView,
     ChecklistItem,
-    ChecklistView,
     FaultView,
-    HeaderView,
     HistoryEntry,
-    HistoryView,
-    LiveView,
-    MeasureView,
-    PlanView,
+    Line,
+    PlotView,
     QuestionView,
-    ReviewView,
+    Urgency,
 )
 from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo
+from procedures.run.keys import ThreeNumbers
 
 OF_A_RUN = {
     ScreenAction.PAUSE,
@@ -78,7 +97,7 @@ class ScreenModel:
         self._tried: TriedPlan | None = None
         self._trial: asyncio.Future[TriedPlan] | None = None
         self._described: tuple[Cell | None, tuple[str, ...]] = (None, ())
-        self._reviewed: tuple[object, ReviewView] | None = None
+        self._reviewed: tuple[object, dict[str, str], tuple[PlotView, ...]] | None = None
         self._does: dict[ScreenAction, Callable[[str], Awaitable[str | None]]] = {
             ScreenAction.PAUSE: self._pause,
             ScreenAction.PAUSE_AT_ONCE: partial(self._give, Pause(at_once=True)),
@@ -162,63 +181,141 @@ class ScreenModel:
         """Whether a run goes on that has the devices."""
         return self._run.connection is not None and self._recording is None
 
-    def header(self) -> HeaderView:
-        """The first line of every screen."""
-        return header_view(self._workplace.cell.settings.name, self._run.picture)
+    @property
+    def cell(self) -> Cell:
+        """The cell as its file states it now."""
+        return self._workplace.cell
 
-    def cell(self) -> CellView:
-        """The cell and its devices."""
-        cell, live = self._workplace.cell, self._live()
-        if self._devices.problem and not live.gauges:
-            live = LiveView(note=self._devices.problem)
+    @property
+    def runs(self) -> tuple[HistoryEntry, ...] | None:
+        """The runs of the cell, the latest first; None until they are read."""
+        return self._entries
+
+    @property
+    def _planned(self) -> tuple[VisitedPose, ...]:
+        return () if self._tried is None else self._tried.poses
+
+    def header(self) -> tuple[str, str, Urgency]:
+        """The first line of every screen."""
+        return header_line(self.cell.settings.name, self._run.picture)
+
+    def devices(self) -> list[Line]:
+        """The devices as they show now."""
+        snapshot, later_s = self._live()
+        if self._devices.problem and snapshot is None:
+            return [(self._devices.problem, Urgency.CALM)]
+        return device_lines(snapshot, later_s)
+
+    def cell_lines(self) -> tuple[str, ...]:
+        """What is to be changed in the cell file, and what it says with the origin of each value."""
+        cell = self.cell
         if self._described[0] is not cell:
             self._described = (cell, tuple(describe(cell).splitlines()))
-        title = f"What {cell.path.name} says; behind each value its line in the file, or default"
-        return CellView(title, live, self._described[1], self._workplace.warnings)
+        return (*self._workplace.warnings, *self._described[1])
 
-    def _live(self) -> LiveView:
+    def _live(self) -> tuple[LiveSnapshot | None, float]:
+        """What the devices showed last, and how long ago, s."""
+        picture, watched = self._run.picture, self._devices
         if self._is_running:
-            return live_view(self._run.picture.live, self._now() - self._run.picture.live_at_s)
-        return live_view(self._devices.live, self._now() - self._devices.live_at_s)
+            return picture.live, self._now() - picture.live_at_s
+        return watched.live, self._now() - watched.live_at_s
 
-    def checklist(self) -> ChecklistView:
+    def _measured(self) -> tuple[LiveSnapshot | None, float, ThreeNumbers | None]:
+        """What the devices of the run showed last, how long ago, s, and the zero of its set.
+
+        Where no run has begun, these are the devices of the cell.
+        """
+        picture = self._run.picture
+        if self._run.connection is None and self._devices.live is not None:
+            return (*self._live(), None)
+        zero = None if picture.at is None else picture.state.zero_shown(picture.at)
+        return picture.live, self._now() - picture.live_at_s, zero
+
+    def instruction(self) -> str:
+        """What to press before a run, or why none can be started now."""
+        if self._is_checking:
+            return CHECKING
+        if self._is_running or self._is_starting:
+            return RUNNING if self._is_running else STARTING
+        has_fixture = self.cell.settings.length_check is not None
+        return f"{PRESS_CHECK} {PRESS_LENGTH}" if has_fixture else PRESS_CHECK
+
+    def checklist(self) -> list[str]:
         """Everything that must hold before motion."""
-        lines = () if self._tried is None else self._tried.lines
-        excluded = exclusions_text(self._workplace.cell.settings)
-        return checklist_view(
-            self._run.picture.live if self._is_running else self._devices.live,
-            self._checked,
-            tuple(filter(None, (excluded, *((TRYING,) if self._trial is not None else lines)))),
-            is_checking=self._is_checking,
-            refusal=RUNNING if self._is_running else STARTING if self._is_starting else "",
-            has_fixture=self._workplace.cell.settings.length_check is not None,
+        checked = self._checked
+        if checked is None:
+            checked = unchecked_items(is_checking=self._is_checking)
+        return [line for item in (*live_items(self._live()[0]), *checked) for line in item.lines]
+
+    def plan_lines(self) -> list[str]:
+        """What the plan is expected to give."""
+        tried = () if self._tried is None else self._tried.lines
+        lines = (exclusions_text(self.cell.settings), *((TRYING,) if self._trial is not None else tried))
+        return list(filter(None, lines)) or [PLAN_UNKNOWN]
+
+    def plan_note(self) -> str:
+        """Where the planned poses come from."""
+        return plan_note(self._planned, is_trying=self._trial is not None)
+
+    def plan_rows(self) -> list[tuple[str, str]]:
+        """What the cell file excludes, and the poses of the plan."""
+        return plan_rows(self.cell.settings, self._planned)
+
+    def guidance(self) -> dict[str, str]:
+        """What happens now, what is next, how long it takes, and how to stop."""
+        return guidance(self._run.picture, self.cell.settings)
+
+    def run_devices(self, *, for_mounting: bool = False) -> list[Line]:
+        """The devices of the run; or how each gauge is to be moved."""
+        return device_lines(
+            *self._measured(), self.cell.settings.stations.mounting_mm if for_mounting else None
         )
 
-    def plan(self) -> PlanView:
-        """The poses of the plan, and what the cell file excludes."""
-        poses = () if self._tried is None else self._tried.poses
-        return plan_view(self._workplace.cell.settings, poses, is_trying=self._trial is not None)
+    def figures(self) -> list[Line]:
+        """The figure of each gauge that is to be read across the room."""
+        snapshot, _, zero = self._measured()
+        gauges = () if snapshot is None else snapshot.gauges
+        return [(gauge_figure(one, zero), urgency_of(one.problem)) for one in gauges]
 
-    def measure(self) -> MeasureView:
-        """The run that is being measured; its devices are shown even where none has begun."""
-        view = measure_view(self._run.picture, self._workplace.cell.settings, self._now())
-        is_shown_live = self._run.connection is not None or self._devices.live is None
-        return view if is_shown_live else replace(view, live=self._live())
+    def records(self) -> tuple[str, ...]:
+        """A line for each record of the run."""
+        return record_lines(self._run.picture)
 
-    def review(self) -> ReviewView:
-        """The result; made again where something has changed beside the live values."""
-        picture = self._run.picture
-        if self._reviewed is None or self._reviewed[0] != (id(picture.state), id(picture.question)):
-            view = review_view(picture, self._workplace.cell.settings)
-            self._reviewed = ((id(picture.state), id(picture.question)), view)
-        shown = self._reviewed[1]
+    def accuracy(self) -> PlotView:
+        """The predicted error against the records."""
+        return accuracy_plot(self._run.picture, self.cell.settings.identification.target_mm)
+
+    def review(self) -> dict[str, str]:
+        """The texts of the result; made again where something has changed beside the live values."""
+        shown = self._result()[0]
         if not self.proposing_run:
             return shown
-        return replace(shown, approval=f"{shown.approval} {PROPOSAL_WAITS}")
+        return {**shown, "approval": f"{shown['approval']} {PROPOSAL_WAITS}"}
 
-    def history(self) -> HistoryView:
-        """The runs of the cell."""
-        return history_view(self._entries, self._compared)
+    def review_plots(self) -> tuple[PlotView, ...]:
+        """The pictures of the result."""
+        return self._result()[1]
+
+    def verdict_urgency(self) -> Urgency:
+        """How much attention the verdict needs."""
+        return verdict_urgency(self._run.picture.state)
+
+    def _result(self) -> tuple[dict[str, str], tuple[PlotView, ...]]:
+        picture = self._run.picture
+        shown = (id(picture.state), id(picture.question))
+        if self._reviewed is None or self._reviewed[0] != shown:
+            self._reviewed = (shown, review_texts(picture, self.cell.settings), review_plots(picture))
+        return self._reviewed[1:]
+
+    def history_title(self) -> str:
+        """The header of the list of runs, or why there is no list."""
+        if self._entries:
+            return history_head()
+        return READING if self._entries is None else NO_RUNS
+
+    def comparison(self) -> tuple[str, ...]:
+        """What may be asked about a run, and what was asked last."""
+        return () if self._entries is None else (*WHAT_TO_PRESS, "", *self._compared)
 
     def question(self) -> QuestionView | None:
         """The question that waits, if one does and may be answered here."""
@@ -330,7 +427,7 @@ class ScreenModel:
             trial.cancel()
 
     async def _exclude(self, name: str) -> None:
-        await self._workplace.toggle_exclusion(name, () if self._tried is None else self._tried.poses)
+        await self._workplace.toggle_exclusion(name, self._planned)
         await self._preview("")
 
     async def _compare(self, run: str) -> None:

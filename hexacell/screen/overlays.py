@@ -58,7 +58,7 @@ class AnswerOverlay(ModalScreen[ScreenResultType]):
             with VerticalScroll(id="question-text"):
                 yield TextPanel("\n\n".join(view.paragraphs))
             if view.shows_gauges:
-                yield DevicePanel(id="mounting", for_mounting=True)
+                yield DevicePanel(id="mounting")
             if view.refusal:
                 yield TextPanel(view.refusal, id="refusal")
             yield TextPanel(view.instruction, id="instruction")
@@ -133,7 +133,7 @@ class QuestionOverlay(AnswerOverlay[None]):
     def draw(self, model: ScreenModel) -> None:
         """Show the gauges as they are now."""
         if self.view.shows_gauges:
-            self.query_one(DevicePanel).show(model.measure().live)
+            self.query_one(DevicePanel).show(model.run_devices(for_mounting=True))
 
 
 class FaultOverlay(ModalScreen[None]):

@@ -22,7 +22,7 @@ from hexacell.screen.widgets import (
     TextPanel,
     TopLine,
 )
-from hexacell.text.screens.lines import checklist_lines
+from hexacell.text.screens.views import Urgency
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
@@ -50,7 +50,7 @@ class TabScreen(Screen[None]):
 
     def draw(self, model: ScreenModel) -> None:
         """Show what is so now."""
-        self.query_one(TopLine).show(model.header())
+        self.query_one(TopLine).show(*model.header())
         self.draw_body(model)
         self.query_one(KeyLine).show(model.allows)
 
@@ -73,10 +73,10 @@ class CellScreen(TabScreen):
 
     def draw_body(self, model: ScreenModel) -> None:
         """Show the cell."""
-        view = model.cell()
-        self.query_one(DevicePanel).show(view.live)
-        self.query_one("#settings-title", TextPanel).show(view.title)
-        self.query_one("#settings", TextList).show([*view.warnings, *view.settings])
+        self.query_one(DevicePanel).show(model.devices())
+        title = f"What {model.cell.path.name} says; behind each value its line in the file, or default"
+        self.query_one("#settings-title", TextPanel).show(title)
+        self.query_one("#settings", TextList).show(model.cell_lines())
 
 
 class PreflightScreen(TabScreen):
@@ -106,11 +106,13 @@ class PreflightScreen(TabScreen):
 
     def draw_body(self, model: ScreenModel) -> None:
         """Show the checklist."""
-        view = model.checklist()
-        self.query_one("#instruction", TextPanel).show(view.instruction)
-        lines = [line for item in view.items for line in checklist_lines(item)]
-        self.query_one("#checklist", TextList).show(lines)
-        self.query_one("#plan", TextList).show(view.plan)
+        self.query_one("#instruction", TextPanel).show(model.instruction())
+        self.query_one("#checklist", TextList).show(model.checklist())
+        self.query_one("#plan", TextList).show(model.plan_lines())
+
+
+RECORDS_HEADER = f"{'point/pose':12}{'x':>8}{'y':>8}{'z':>8}{'residual':>9}{'sigma':>6}"
+"""The residual is the largest of x, y and z; sigma its ratio to noise."""
 
 
 class MeasureScreen(TabScreen):
@@ -137,20 +139,17 @@ class MeasureScreen(TabScreen):
         yield DevicePanel(id="devices")
         with Horizontal(id="lower"):
             with Vertical(id="record-side"):
-                yield TextPanel(id="records-title", classes="title")
-                yield TextPanel(id="records-header", classes="table-header")
+                yield TextPanel("Records: deviation and residual, mm", id="records-title", classes="title")
+                yield TextPanel(RECORDS_HEADER, id="records-header", classes="table-header")
                 yield TextList(id="records", follows=True)
             yield PlotPanel(id="accuracy")
 
     def draw_body(self, model: ScreenModel) -> None:
         """Show the run."""
-        view = model.measure()
-        self.query_one(GuidancePanel).show(view.guidance)
-        self.query_one(DevicePanel).show(view.live)
-        self.query_one("#records-title", TextPanel).show(view.records_title)
-        self.query_one("#records-header", TextPanel).show(view.records_header)
-        self.query_one("#records", TextList).show(view.records)
-        self.query_one(PlotPanel).show(view.accuracy)
+        self.query_one(GuidancePanel).show(model.guidance())
+        self.query_one(DevicePanel).show(model.run_devices())
+        self.query_one("#records", TextList).show(model.records())
+        self.query_one(PlotPanel).show(model.accuracy())
 
 
 PLOTS = 3
@@ -182,19 +181,11 @@ class ReviewScreen(TabScreen):
 
     def draw_body(self, model: ScreenModel) -> None:
         """Show the result."""
-        view = model.review()
-        self.query_one("#verdict", TextPanel).show(view.verdict, view.urgency)
-        self._show("#scope", view.scope)
-        self.query_one("#approval", TextPanel).show(view.approval)
-        self._show("#comparison", view.comparison)
-        self.query_one("#parameters-header", TextPanel).show(view.parameters_header)
-        self._show("#parameters", view.parameters)
-        self._show("#change", view.change)
-        for number, plot in enumerate(view.plots[:PLOTS]):
+        for place, text in model.review().items():
+            urgency = model.verdict_urgency() if place == "verdict" else Urgency.CALM
+            self.query_one(f"#{place}", TextPanel).show(text, urgency)
+        for number, plot in enumerate(model.review_plots()):
             self.query_one(f"#plot-{number}", PlotPanel).show(plot)
-
-    def _show(self, place: str, lines: tuple[str, ...]) -> None:
-        self.query_one(place, TextPanel).show("\n".join(lines))
 
 
 class HistoryScreen(TabScreen):
@@ -221,10 +212,9 @@ class HistoryScreen(TabScreen):
     def draw_body(self, model: ScreenModel) -> None:
         """Show the runs."""
         self.is_asked = model.question() is not None
-        view = model.history()
-        self.query_one("#history-header", TextPanel).show(view.note or view.header)
-        self.query_one("#comparison", TextList).show(view.comparison)
-        self.query_one(RowList).show([(entry.name, entry.line) for entry in view.entries])
+        self.query_one("#history-header", TextPanel).show(model.history_title())
+        self.query_one("#comparison", TextList).show(model.comparison())
+        self.query_one(RowList).show([(one.name, one.line) for one in model.runs or ()])
 
     async def action_about(self, what: str) -> None:
         """Do something about the run that is chosen."""

@@ -15,9 +15,8 @@ from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
 from hexacell.screen.preferences import KEYS, ScreenAction
-from hexacell.text.screens.lines import device_lines
 from hexacell.text.screens.plot_lines import plot_lines
-from hexacell.text.screens.views import Guidance, HeaderView, LiveView, PlotView, Urgency
+from hexacell.text.screens.views import Line, PlotView, Urgency
 
 
 class TextPanel(Static):
@@ -73,44 +72,35 @@ class TextList(VerticalScroll):
 MOST_LINES = 6
 """Three gauges, encoders, controller and stop line."""
 
+WORDS = ("Now", "Next", "Time", "Stop")
+
 
 class DevicePanel(Vertical):
     """A line for each device."""
 
-    def __init__(
-        self,
-        *,
-        id: str | None = None,  # noqa: A002 - as in every widget
-        for_mounting: bool = False,
-    ) -> None:
+    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - as in every widget
         self._lines = [TextPanel() for _ in range(MOST_LINES)]
-        self._for_mounting = for_mounting
         super().__init__(*self._lines, id=id)
 
-    def show(self, live: LiveView) -> None:
+    def show(self, lines: Sequence[Line]) -> None:
         """Show the devices."""
-        lines = device_lines(live, for_mounting=self._for_mounting)
         for number, panel in enumerate(self._lines):
             panel.display = number < len(lines)
             if panel.display:
                 panel.show(*lines[number])
 
 
-WORDS = ("Now", "Next", "Time", "Stop")
-
-
 class GuidancePanel(Vertical):
     """Four lines, the first one emphasised."""
 
     def __init__(self) -> None:
-        self._lines = [TextPanel(classes=f"guidance-{word.lower()}") for word in WORDS]
-        super().__init__(*self._lines)
+        self._lines = {word: TextPanel(classes=f"guidance-{word.lower()}") for word in WORDS}
+        super().__init__(*self._lines.values())
 
-    def show(self, guidance: Guidance) -> None:
+    def show(self, guidance: Mapping[str, str]) -> None:
         """Show the guidance."""
-        texts = (guidance.now, guidance.following, guidance.remaining, guidance.stopping)
-        for word, panel, text in zip(WORDS, self._lines, texts, strict=True):
-            panel.show(f"{word:5}{text}")
+        for word, text in guidance.items():
+            self._lines[word].show(f"{word:5}{text}")
 
 
 class PlotPanel(Vertical):
@@ -192,12 +182,10 @@ class TopLine(Horizontal):
         yield TextPanel("hexacell", id="where")
         yield TextPanel("starting", id="state")
 
-    def show(self, view: HeaderView) -> None:
-        """Show a header."""
-        where = " | ".join(part for part in ("hexacell", view.cell, view.activity) if part)
-        state = " | ".join(part for part in (view.status, view.control) if part)
+    def show(self, where: str, state: str, urgency: Urgency) -> None:
+        """Show what is done where, and how it stands."""
         self.query_one("#where", TextPanel).show(where)
-        self.query_one("#state", TextPanel).show(state, view.urgency)
+        self.query_one("#state", TextPanel).show(state, urgency)
 
 
 class TabLine(Static):

@@ -60,7 +60,7 @@ async def opened_history(cell: Cell) -> AsyncIterator[Pilot[int]]:
     async with app.run_test(size=(100, 30)) as pilot:
         await until(lambda: app.model is not None)
         await press(pilot, "5")
-        await until(lambda: app.model is not None and bool(app.model.history().entries))
+        await until(lambda: app.model is not None and bool(app.model.runs))
         await settled(pilot)
         yield pilot
 
@@ -158,7 +158,8 @@ def latest_line(pilot: Pilot[int]) -> str:
     app = pilot.app
     assert isinstance(app, TechnicianApp)
     assert app.model is not None
-    return app.model.history().entries[0].line
+    assert app.model.runs
+    return app.model.runs[0].line
 
 
 async def until_asked(pilot: Pilot[int]) -> None:

@@ -377,7 +377,7 @@ async def test_a_run_that_is_over_is_in_the_history(cell: Cell, run: ToldRun, op
         run.tell(StatusChanged(status=Status.ENDED))
         run.end()
         backend = app.model
-        await until(lambda: backend.history().entries == workplace.entries)
+        await until(lambda: backend.runs == workplace.entries)
 
 
 async def test_quitting_without_a_run_asks_nothing(cell: Cell, opened: Opened) -> None:

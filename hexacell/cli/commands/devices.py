@@ -89,15 +89,15 @@ def _write(found: SearchFindings, path: Path, console: Console) -> ExitCode:
     """Ask for the rest, question by question; an empty answer takes what stands in brackets."""
     assistant = FirstCellAssistant(path, draft_of(found, path))
     while not assistant.is_done:
-        view = assistant.view()
-        if view.problem:
-            console.error(view.problem)
-        console.print(f"\n{view.progress}: {view.text}\n  {view.hint}")
-        console.prompt(f"[{view.answer}] ")
+        if assistant.problem:
+            console.error(assistant.problem)
+        text, hint = assistant.question
+        console.print(f"\n{assistant.progress}: {text}\n  {hint}")
+        console.prompt(f"[{assistant.suggestion}] ")
         typed = sys.stdin.readline()
         if not typed:
             raise AnswerNeeded("the questions were not all answered", action="No file was written")
-        assistant.answer(typed.strip() or view.answer)
+        assistant.answer(typed.strip() or assistant.suggestion)
     console.print(f"\n{path} is written. Next: hexacell preflight {path}")
     return ExitCode.DONE
 

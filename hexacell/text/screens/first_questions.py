@@ -6,7 +6,6 @@ from pathlib import Path
 
 from hexacell.errors import HexacellError
 from hexacell.services.devices.first_cell import CellDraft
-from hexacell.text.screens.views import FirstQuestionView
 
 QUESTIONS = {
     "name": ("What is this cell called?", "A short name, as it is to stand on screens and in reports."),
@@ -49,59 +48,55 @@ QUESTIONS = {
 }
 
 
-def first_question(draft: CellDraft, number: int, problem: str) -> FirstQuestionView:
-    """One question, counted from 0; what was answered before is its answer at first."""
-    answers = draft.answers()
-    asked = answers[number]
-    kind, _, axis = asked.name.partition(" ")
-    text, hint = QUESTIONS["port of gauge" if kind == "port" and axis else kind]
-    return FirstQuestionView(
-        progress=f"Question {number + 1} of {len(answers)}",
-        text=text.format(axis=axis),
-        hint=hint.format(axis=axis),
-        answer=draft.given.get(asked.name, asked.default),
-        problem=problem,
-    )
-
-
 class FirstCellAssistant:
     """Makes the cell file at a path, from a draft where something is known already.
 
     Attributes:
         is_done: whether the file is there.
+        problem: why the last answer could not be taken; empty if it could.
     """
 
     def __init__(self, path: Path, draft: CellDraft | None = None) -> None:
-        self.is_done = False
+        self.is_done, self.problem = False, ""
         self._draft = CellDraft(path) if draft is None else draft
         self._number = 0
-        self._problem = ""
 
-    def view(self) -> FirstQuestionView:
-        """The question that is asked now."""
-        return first_question(self._draft, self._number, self._problem)
+    @property
+    def progress(self) -> str:
+        """Which of how many questions is asked now."""
+        return f"Question {self._number + 1} of {len(self._draft.answers())}"
+
+    @property
+    def question(self) -> tuple[str, str]:
+        """What is asked now, and a hint."""
+        kind, _, axis = self._draft.answers()[self._number].name.partition(" ")
+        text, hint = QUESTIONS["port of gauge" if kind == "port" and axis else kind]
+        return text.format(axis=axis), hint.format(axis=axis)
+
+    @property
+    def suggestion(self) -> str:
+        """The previous answer to this question, or its default."""
+        asked = self._draft.answers()[self._number]
+        return self._draft.given.get(asked.name, asked.default)
 
     def answer(self, given: str) -> None:
         """Take an answer and go on to the next question; after the last one, write the file."""
         answers = self._draft.answers()
         name = answers[self._number].name
-        self._problem = self._draft.problem(name, given)
-        if self._problem:
+        self.problem = self._draft.problem(name, given)
+        if self.problem:
             return
         self._draft.given[name] = given
         if self._number + 1 < len(answers):
             self._number += 1
-        else:
-            self._finish()
-
-    def back(self) -> None:
-        """Return to the question before."""
-        self._number, self._problem = max(0, self._number - 1), ""
-
-    def _finish(self) -> None:
+            return
         try:
             self._draft.write()
         except HexacellError as error:
-            self._problem = str(error)
+            self.problem = str(error)
         else:
             self.is_done = True
+
+    def back(self) -> None:
+        """Return to the question before."""
+        self._number, self.problem = max(0, self._number - 1), ""

@@ -1,26 +1,12 @@
-"""Views of the devices: what they show now, and what must hold before motion."""
+"""Text for the devices: what they show now, and what must hold before motion."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from hexacell.errors import HexacellError, flatten_errors
-from hexacell.run_process.messages import (
-    ControllerSnapshot,
-    EncoderSnapshot,
-    GaugeSnapshot,
-    LiveSnapshot,
-)
-from hexacell.text.screens.lines import NEVER
-from hexacell.text.screens.views import (
-    ChecklistItem,
-    ChecklistView,
-    DeviceLine,
-    GaugeReadout,
-    LiveView,
-    Mark,
-    Urgency,
-)
+from hexacell.run_process.messages import ControllerSnapshot, EncoderSnapshot, GaugeSnapshot, LiveSnapshot
+from hexacell.text.screens.views import ChecklistItem, Line, Mark, Urgency
 from procedures.run.keys import ThreeNumbers
 
 BAR_COLUMNS = 17
@@ -47,50 +33,80 @@ PLAN_UNKNOWN = "v carries the plan out on simulated robots: records, minutes, an
 TRYING = "Trying the plan on simulated robots, some seconds ..."
 
 
-def live_view(
+def device_lines(
     snapshot: LiveSnapshot | None,
     later_s: float = 0.0,
     zero_mm: ThreeNumbers | None = None,
-    mounting_mm: float = 1.0,
-) -> LiveView:
-    """The devices as they show now.
+    mounting_mm: float | None = None,
+) -> list[Line]:
+    """A line for each device, as it shows now.
 
     Args:
         snapshot: their latest values; None without any.
         later_s: how long ago these came.
         zero_mm: what the gauges showed along base x, y, z when they were zeroed.
-        mounting_mm: how far from its middle a plunger may stand when gauges are placed.
+        mounting_mm: how far from its middle a plunger may stand while gauges are placed; then only they
+            are shown, each with how it is to be moved.
     """
     if snapshot is None:
-        return LiveView(note=NOT_CONNECTED)
-    gauges = tuple(gauge_readout(one, later_s, zero_mm, mounting_mm) for one in snapshot.gauges)
-    devices = [encoder_line(snapshot.encoders, later_s), controller_line(snapshot.controller, later_s)]
+        return [(NOT_CONNECTED, Urgency.CALM)]
+    gauges = [
+        (_gauge_line(one, later_s, zero_mm, mounting_mm), urgency_of(one.problem))
+        for one in snapshot.gauges
+    ]
+    if mounting_mm is not None:
+        return gauges
+    lines = [
+        *gauges,
+        _encoder_line(snapshot.encoders, later_s),
+        _controller_line(snapshot.controller, later_s),
+    ]
     if snapshot.stop_reason:
-        devices.append(DeviceLine("stop line", f"NO MOTION: {snapshot.stop_reason}", Urgency.ALARM))
-    return LiveView(gauges, tuple(devices))
+        lines.append((f"stop line  NO MOTION: {snapshot.stop_reason}", Urgency.ALARM))
+    return lines
 
 
-def gauge_readout(
-    gauge: GaugeSnapshot, later_s: float, zero_mm: ThreeNumbers | None, mounting_mm: float
-) -> GaugeReadout:
-    """One gauge."""
-    shown, place, half = gauge.shown_mm, plunger_place(gauge), gauge.travel_mm / 2.0
+def urgency_of(problem: str) -> Urgency:
+    """Alarm where a device does not answer."""
+    return Urgency.ALARM if problem else Urgency.CALM
+
+
+def _gauge_line(
+    gauge: GaugeSnapshot, later_s: float, zero_mm: ThreeNumbers | None, mounting_mm: float | None
+) -> str:
+    """A gauge in at most 80 columns, or why it does not answer."""
+    name = gauge.name if gauge.name == gauge.axis else f"{gauge.name} ({gauge.axis})"
+    age = age_text(gauge.age_s, later_s)
+    if gauge.problem:
+        since = "" if gauge.age_s is None else f" for {age}"
+        return f"{name:4}NO READING{since}: {gauge.problem.removeprefix(f'gauge {gauge.name}: ')}"
+    reading = "-" if gauge.shown_mm is None else f"{gauge.shown_mm:+.4f}"
+    place, half = plunger_place(gauge), gauge.travel_mm / 2.0
+    start, bar = f"{name:4}{reading:>9} {gauge.unit}", travel_bar(place, half)
+    if mounting_mm is not None:
+        return f"{start}  {bar}  {mounting_advice(gauge, mounting_mm)}"
+    moved = gauge_deviation(gauge, zero_mm)
+    deviation = " " * 11 if moved is None else f"  d {moved:>+7.3f}"
     noise = f"{1e3 * gauge.noise_mm:.1f} um" if gauge.noise_mm is not None else "-"
-    return GaugeReadout(
-        name=gauge.name,
-        axis=gauge.axis,
-        reading="-" if shown is None else f"{shown:+.4f}",
-        unit=gauge.unit,
-        deviation=""
-        if shown is None or zero_mm is None
-        else f"{gauge.sign * shown - zero_mm['xyz'.index(gauge.axis)]:+.3f}",
-        age=age_text(gauge.age_s, later_s),
-        noise=noise,
-        bar=travel_bar(place, half),
-        place=f"? /{half:g}" if place is None else f"{place:+.2f}/{half:g}",
-        advice=mounting_advice(gauge, mounting_mm),
-        problem=gauge.problem.removeprefix(f"gauge {gauge.name}: "),
-    )
+    stands = f"? /{half:g}" if place is None else f"{place:+.2f}/{half:g}"
+    return f"{start}{deviation}{age:>7}{noise:>9} {bar} {stands}"
+
+
+def gauge_deviation(gauge: GaugeSnapshot, zero_mm: ThreeNumbers | None) -> float | None:
+    """A gauge's reading along its base axis from the zero of the set, mm; None without either."""
+    if gauge.shown_mm is None or zero_mm is None:
+        return None
+    return gauge.sign * gauge.shown_mm - zero_mm["xyz".index(gauge.axis)]
+
+
+def gauge_figure(gauge: GaugeSnapshot, zero_mm: ThreeNumbers | None) -> str:
+    """The axis of a gauge and its deviation from the zero of the set, without one its reading."""
+    moved = gauge_deviation(gauge, zero_mm)
+    if gauge.problem:
+        return f"{gauge.axis} - - -"
+    if moved is not None:
+        return f"{gauge.axis} {moved:+.3f}"
+    return f"{gauge.axis} " + ("" if gauge.shown_mm is None else f"{gauge.shown_mm:+.4f}"[:-1])
 
 
 def plunger_place(gauge: GaugeSnapshot) -> float | None:
@@ -129,35 +145,33 @@ def travel_bar(place_mm: float | None, half_mm: float) -> str:
 def age_text(age_s: float | None, later_s: float) -> str:
     """How long ago a device answered."""
     if age_s is None:
-        return NEVER
+        return "never"
     age = age_s + later_s
     return f"{age:.1f} s" if age < 99.95 else "> 99 s"
 
 
-def encoder_line(encoders: EncoderSnapshot, later_s: float) -> DeviceLine:
-    """The six joint variables."""
-    if encoders.problem:
-        return DeviceLine("encoders", encoders.problem, Urgency.ALARM)
-    if encoders.positions is None:
-        return DeviceLine("encoders", "no reading yet")
-    positions = " ".join(f"{one:+9.3f}" for one in encoders.positions)
-    is_silent = encoders.age_s is None or encoders.age_s + later_s > OLD_S
-    age = f", {age_text(encoders.age_s, later_s)} ago" if is_silent else ""
-    return DeviceLine("encoders", f"{positions} {encoders.unit}{age}")
+def _encoder_line(encoders: EncoderSnapshot, later_s: float) -> Line:
+    text = encoders.problem or "no reading yet"
+    if not encoders.problem and encoders.positions is not None:
+        positions = " ".join(f"{one:+9.3f}" for one in encoders.positions)
+        is_silent = encoders.age_s is None or encoders.age_s + later_s > OLD_S
+        age = f", {age_text(encoders.age_s, later_s)} ago" if is_silent else ""
+        text = f"{positions} {encoders.unit}{age}"
+    return f"{'encoders':11}{text}", urgency_of(encoders.problem)
 
 
-def controller_line(controller: ControllerSnapshot, later_s: float) -> DeviceLine:
+def _controller_line(controller: ControllerSnapshot, later_s: float) -> Line:
     """Whether the controller may move."""
+    said = "".join(f"; {message}" for message in controller.error_messages)
+    text, urgency = f"EMERGENCY STOP{said}", Urgency.ALARM
     if controller.problem:
-        return DeviceLine("controller", controller.problem, Urgency.ALARM)
-    if controller.estop is None:
-        return DeviceLine("controller", "no answer yet")
-    said = "; ".join(controller.error_messages)
-    messages = f"; {said}" if said else ""
-    if controller.estop:
-        return DeviceLine("controller", f"EMERGENCY STOP{messages}", Urgency.ALARM)
-    state = "on, may move" if controller.enabled else "off"
-    return DeviceLine("controller", f"{state}, {age_text(controller.age_s, later_s)} ago{messages}")
+        text = controller.problem
+    elif controller.estop is None:
+        text, urgency = "no answer yet", Urgency.CALM
+    elif not controller.estop:
+        state = "on, may move" if controller.enabled else "off"
+        text, urgency = f"{state}, {age_text(controller.age_s, later_s)} ago{said}", Urgency.CALM
+    return f"{'controller':11}{text}", urgency
 
 
 def live_items(live: LiveSnapshot | None) -> tuple[ChecklistItem, ...]:
@@ -170,29 +184,18 @@ def live_items(live: LiveSnapshot | None) -> tuple[ChecklistItem, ...]:
     ]
     found = "" if live.encoders.positions is None else "six positions"
     encoders = _device("encoders", live.encoders.problem, found)
+    answer = {None: "", True: "answers; in emergency stop, asked about at the start", False: "answers"}
+    controller = _device("controller", live.controller.problem, answer[live.controller.estop])
     stop = ChecklistItem(Mark.DONE, "stop line", "motion is allowed")
     if live.stop_reason:
         stop = ChecklistItem(Mark.FAILED, "stop line", live.stop_reason, "Release it")
-    return (*gauges, encoders, _controller(live), stop)
+    return (*gauges, encoders, controller, stop)
 
 
 def _device(name: str, problem: str, found: str) -> ChecklistItem:
     if problem:
         return ChecklistItem(Mark.FAILED, name, problem.removeprefix(f"{name}: "))
     return ChecklistItem(Mark.DONE, name, found) if found else ChecklistItem(Mark.BUSY, name, "waited for")
-
-
-def _controller(live: LiveSnapshot) -> ChecklistItem:
-    controller = live.controller
-    if controller.problem:
-        return ChecklistItem(Mark.FAILED, "controller", controller.problem)
-    if controller.estop is None:
-        return ChecklistItem(Mark.BUSY, "controller", "waited for")
-    if controller.estop:
-        return ChecklistItem(
-            Mark.DONE, "controller", "answers; in emergency stop, asked about at the start"
-        )
-    return ChecklistItem(Mark.DONE, "controller", "answers")
 
 
 def failed_items(error: HexacellError) -> tuple[ChecklistItem, ...]:
@@ -205,26 +208,10 @@ def failed_items(error: HexacellError) -> tuple[ChecklistItem, ...]:
 
 def passed_items(devices: Sequence[str]) -> tuple[ChecklistItem, ...]:
     """The items of a preflight that found nothing; ``devices`` are those that answered."""
-    named = (ChecklistItem(Mark.DONE, line) for line in devices)
-    return (*named, *(ChecklistItem(Mark.DONE, name) for name in NOT_CHECKED_YET))
+    return tuple(ChecklistItem(Mark.DONE, name) for name in (*devices, *NOT_CHECKED_YET))
 
 
-def checklist_view(
-    live: LiveSnapshot | None,
-    checked: tuple[ChecklistItem, ...] | None,
-    plan: tuple[str, ...],
-    *,
-    is_checking: bool = False,
-    refusal: str = "",
-    has_fixture: bool = False,
-) -> ChecklistView:
-    """The whole list; ``checked`` is what the preflight found, None before it.
-
-    ``has_fixture`` is whether the cell can check its length scale.
-    """
-    if checked is None:
-        mark = Mark.BUSY if is_checking else Mark.OPEN
-        checked = tuple(ChecklistItem(mark, name) for name in NOT_CHECKED_YET)
-    press = f"{PRESS_CHECK} {PRESS_LENGTH}" if has_fixture else PRESS_CHECK
-    instruction = CHECKING if is_checking else refusal or press
-    return ChecklistView((*live_items(live), *checked), plan or (PLAN_UNKNOWN,), instruction, refusal)
+def unchecked_items(*, is_checking: bool) -> tuple[ChecklistItem, ...]:
+    """What a preflight is still to look at."""
+    mark = Mark.BUSY if is_checking else Mark.OPEN
+    return tuple(ChecklistItem(mark, name) for name in NOT_CHECKED_YET)

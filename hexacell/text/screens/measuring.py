@@ -2,64 +2,51 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from itertools import pairwise
 from statistics import median
 
 from hexacell.cell.model import CellSettings
 from hexacell.run_process.messages import HostFailed
 from hexacell.text.layout import duration
-from hexacell.text.screens.live import live_view
 from hexacell.text.screens.run_picture import RunPicture, Setback
-from hexacell.text.screens.views import FaultView, Guidance, MeasureView, PlotView, Series
+from hexacell.text.screens.views import FaultView, PlotView, Series
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
 from procedures.steps import events
-from procedures.steps.base import BaseStep, StepOfSet
+from procedures.steps.base import StepOfSet
 from procedures.steps.move import Expectation, Move
 from procedures.steps.sample import Place
 
-NO_RUN = Guidance(
-    now="no run is being measured here",
-    following="look at 2 Preflight, and start a run from there",
-    remaining="-",
-    stopping="nothing moves now",
-)
-RECORDS_HEADER = f"{'point/pose':12}{'x':>8}{'y':>8}{'z':>8}{'residual':>9}{'sigma':>6}"
-"""Header of the list of records; the residual is the largest of x, y and z, sigma its ratio to noise."""
+NO_RUN = {
+    "Now": "no run is being measured here",
+    "Next": "look at 2 Preflight, and start a run from there",
+    "Time": "-",
+    "Stop": "nothing moves now",
+}
+AFTER_COMPUTING = {
+    "identify": "the held-out poses are measured with the old geometry",
+    "propose": "the change is shown in 4 Review and waits for approval",
+    "commit": "the held-out poses are measured with the new geometry",
+    "judge": "the verdict is shown in 4 Review",
+}
+"""What follows a step that moves nothing."""
 
 PACE_RECORDS = 8
 """Number of the latest records whose pace gives the time that is left."""
 RESUMABLE = "What was measured is kept. Mend it, then press r in 2 Preflight, which resumes the run."
 
 
-def measure_view(picture: RunPicture, settings: CellSettings | None, now_s: float) -> MeasureView:
-    """The screen of a run that is being measured."""
-    at = picture.at
-    zero = None if at is None else picture.state.zero_shown(at)
-    mounting_mm = 1.0 if settings is None else settings.stations.mounting_mm
-    target = None if settings is None else settings.identification.target_mm
-    return MeasureView(
-        guidance=guidance(picture, settings),
-        live=live_view(picture.live, now_s - picture.live_at_s, zero, mounting_mm),
-        records_title="Records: deviation and residual, mm",
-        records_header=RECORDS_HEADER,
-        records=record_lines(picture),
-        accuracy=accuracy_plot(picture, target),
-    )
-
-
-def guidance(picture: RunPicture, settings: CellSettings | None) -> Guidance:
-    """What happens now, what is next, how long, and how to stop."""
+def guidance(picture: RunPicture, settings: CellSettings | None) -> dict[str, str]:
+    """What happens now, what is next, how long it takes, and how to stop."""
     if picture.described is None:
         return NO_RUN
-    return Guidance(
-        now=_now(picture),
-        following=_following(picture, settings),
-        remaining=_remaining(picture),
-        stopping=_stopping(picture),
-    )
+    return {
+        "Now": _now(picture),
+        "Next": _following(picture, settings),
+        "Time": _remaining(picture),
+        "Stop": _stopping(picture),
+    }
 
 
 def _now(picture: RunPicture) -> str:
@@ -95,17 +82,11 @@ def _doing(picture: RunPicture) -> str:
     if step is None:
         return "choosing the next pose"
     if isinstance(step, Move):
-        return f"moving to {_pose_name(step)}"
+        name = step.at.name
+        named = {0: f"a waypoint on the way to {name}", 1: f"the reference of {name}"}
+        return f"moving to {named.get(step.orientation) or step.at.pose_name(step.orientation)}"
     doing = step.doing or step.kind
     return step.activity() or (f"{step.at.name}: {doing}" if isinstance(step, StepOfSet) else doing)
-
-
-def _pose_name(step: Move) -> str:
-    if step.orientation == 0:
-        return f"a waypoint on the way to {step.at.name}"
-    if step.orientation == 1:
-        return f"the reference of {step.at.name}"
-    return step.at.pose_name(step.orientation)
 
 
 def _following(picture: RunPicture, settings: CellSettings | None) -> str:
@@ -117,20 +98,10 @@ def _following(picture: RunPicture, settings: CellSettings | None) -> str:
     if picture.status is Status.PAUSED:
         return "it goes on where it was when you press p"
     if at is None or (step is not None and step.moves_nothing):
-        return _after_computing(step)
+        return AFTER_COMPUTING.get("" if step is None else step.kind, "the next pose")
     if isinstance(step, Place):
         return "the reference is read, then the gauges are tried by small moves"
     return _after_set(picture.state, at, settings)
-
-
-def _after_computing(step: BaseStep | None) -> str:
-    words = {
-        "identify": "the held-out poses are measured with the old geometry",
-        "propose": "the change is shown in 4 Review and waits for approval",
-        "commit": "the held-out poses are measured with the new geometry",
-        "judge": "the verdict is shown in 4 Review",
-    }
-    return words.get("" if step is None else step.kind, "the next pose")
 
 
 def _after_set(state: RunState, at: SetKey, settings: CellSettings | None) -> str:
@@ -150,28 +121,17 @@ def _after_set(state: RunState, at: SetKey, settings: CellSettings | None) -> st
 
 
 def _remaining(picture: RunPicture) -> str:
-    done = completed_readings(picture.state)
+    done = sum(len(measured.samples) + measured.closed for measured in picture.state.sets.values())
     planned = picture.described.expected_records if picture.described else 0
     if picture.state.ended is not None:
         return f"done: {done} readings"
     if planned <= 0:
         return f"{done} readings so far"
     left = max(0, planned - done)
-    pace = _minutes_per_record(picture.record_times)
-    if pace is None:
-        return f"at most {left} of {planned} readings are left"
-    return f"about {duration(left * pace)}: at most {left} of {planned} readings are left"
-
-
-def completed_readings(state: RunState) -> int:
-    """Records and closings of sets, of which a run is made."""
-    return sum(len(measured.samples) + measured.closed for measured in state.sets.values())
-
-
-def _minutes_per_record(times: tuple[datetime, ...]) -> float | None:
-    recent = times[-PACE_RECORDS - 1 :]
+    recent = picture.record_times[-PACE_RECORDS - 1 :]
     gaps = [(later - earlier).total_seconds() / 60.0 for earlier, later in pairwise(recent)]
-    return median(gaps) if gaps else None
+    about = f"about {duration(left * median(gaps))}: " if gaps else ""
+    return f"{about}at most {left} of {planned} readings are left"
 
 
 def _stopping(picture: RunPicture) -> str:
@@ -190,26 +150,15 @@ def _stopping(picture: RunPicture) -> str:
 
 def record_lines(picture: RunPicture) -> tuple[str, ...]:
     """A line for each record, in the order in which they were taken."""
-    samples = [sample for measured in picture.state.sets.values() for sample in measured.samples]
-    return tuple(_record_line(sample, picture) for sample in samples)
-
-
-def _record_line(sample: events.RecordTaken, picture: RunPicture) -> str:
-    name = f"{_short_name(sample.at)}/{sample.orientation}"
-    values = "".join(f"{value:+8.3f}" for value in sample.deviation_mm)
-    expected = picture.expected.get((sample.at, sample.orientation))
-    return f"{name:12}{values}{_residual(sample, expected)}"
-
-
-def _short_name(at: SetKey) -> str:
-    words = {
-        Phase.IDENTIFY: "{}",
-        Phase.BEFORE: "before {}",
-        Phase.AFTER: "after {}",
-        Phase.CONFIRM: "confirm {}",
-        Phase.LENGTH: "length {}",
-    }
-    return words[at.phase].format(at.point)
+    lines = []
+    for at, measured in picture.state.sets.items():
+        phase = "" if at.phase is Phase.IDENTIFY else f"{at.phase.name.lower()} "
+        for sample in measured.samples:
+            name = f"{phase}{at.point}/{sample.orientation}"
+            values = "".join(f"{value:+8.3f}" for value in sample.deviation_mm)
+            residual = _residual(sample, picture.expected.get((at, sample.orientation)))
+            lines.append(f"{name:12}{values}{residual}")
+    return tuple(lines)
 
 
 def _residual(sample: events.RecordTaken, expected: Expectation | None) -> str:

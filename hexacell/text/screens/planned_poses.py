@@ -7,19 +7,20 @@ from collections.abc import Iterator, Sequence
 from hexacell.cell.model import CellSettings
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.text.screens.live import TRYING
-from hexacell.text.screens.views import PlanView
 
 NOT_TRIED = "v in 2 Preflight tries the plan; then its poses are here."
 EVERYTHING = "These poses were measured on a simulated robot; a real one is sent to others near them."
 
 
-def plan_view(
-    settings: CellSettings, planned: Sequence[VisitedPose], *, is_trying: bool = False
-) -> PlanView:
-    """The exclusions of the cell file, and the planned poses, once the plan was tried."""
+def plan_note(planned: Sequence[VisitedPose], *, is_trying: bool) -> str:
+    """Where the poses of the plan come from, or why there are none."""
     notes = [EVERYTHING] if planned else [] if is_trying else [NOT_TRIED]
-    rows = [*_exclusions(settings), *(_poses(settings, planned) if planned else ())]
-    return PlanView(" ".join([*notes, *([TRYING] if is_trying else [])]), tuple(rows))
+    return " ".join([*notes, *([TRYING] if is_trying else [])])
+
+
+def plan_rows(settings: CellSettings, planned: Sequence[VisitedPose]) -> list[tuple[str, str]]:
+    """Name and line of each exclusion of the cell file and, once the plan was tried, of its poses."""
+    return [*_exclusions(settings), *(_poses(settings, planned) if planned else ())]
 
 
 def exclusions_text(settings: CellSettings) -> str:

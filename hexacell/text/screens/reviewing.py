@@ -8,22 +8,13 @@ import numpy as np
 
 from hexacell.cell.model import CellSettings
 from hexacell.services.history.run_index import PastRun
-from hexacell.text.history import NO_RUNS, history_head, history_line
+from hexacell.text.history import history_line
 from hexacell.text.line_face import event_text
 from hexacell.text.parameters import parameter_table, rows_of_run
 from hexacell.text.screens.measuring import accuracy_plot
 from hexacell.text.screens.questions import PERSON, approval_refusal
 from hexacell.text.screens.run_picture import RunPicture
-from hexacell.text.screens.views import (
-    Choice,
-    HistoryEntry,
-    HistoryView,
-    PlotView,
-    QuestionView,
-    ReviewView,
-    Series,
-    Urgency,
-)
+from hexacell.text.screens.views import Choice, HistoryEntry, PlotView, QuestionView, Series, Urgency
 from hexacell.text.verdict import VERDICT_MEANINGS
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import DeviationStatistics
@@ -43,31 +34,35 @@ WHAT_TO_PRESS = (
 URGENCIES = {Verdict.PASS: Urgency.CALM, Verdict.FAIL: Urgency.ALARM}
 
 
-def review_view(picture: RunPicture, settings: CellSettings | None, change: str = "") -> ReviewView:
-    """The screen of a result; ``change`` is the text change of the config, if it is known."""
+def review_texts(picture: RunPicture, settings: CellSettings | None) -> dict[str, str]:
+    """The texts of a result, by the part of the screen that shows each; the verdict first."""
     state, subject = picture.state, picture.question and picture.question.subject
     diff = subject.diff if isinstance(subject, PendingChange) else ""
-    verdict, urgency = _verdict(state)
-    header, *lines = parameter_table(rows_of_run(state, settings))
-    return ReviewView(
-        verdict=verdict,
-        scope=_scope(state),
-        approval=_approval(picture),
-        parameters_header=header,
-        parameters=tuple(lines) or ("The geometry is not identified yet.",),
-        comparison=_comparison(state),
-        plots=(deviation_plot(state), residual_plot(picture), accuracy_plot(picture, None)),
-        change=tuple((diff or change or "There is no change yet.").splitlines()),
-        urgency=urgency,
-    )
+    verdict = "No verdict yet: it is given once the held-out poses are measured."
+    if state.judged is not None:
+        verdict = f"{state.judged.verdict.upper()}: {VERDICT_MEANINGS[state.judged.verdict]}"
+    header, *parameters = parameter_table(rows_of_run(state, settings))
+    return {
+        "verdict": verdict,
+        "scope": "\n".join(_scope(state)),
+        "approval": _approval(picture),
+        "comparison": "\n".join(_comparison(state)),
+        "parameters-header": header,
+        "parameters": "\n".join(parameters) or "The geometry is not identified yet.",
+        "change": diff.rstrip("\n") or "There is no change yet.",
+    }
 
 
-def _verdict(state: RunState) -> tuple[str, Urgency]:
-    judged = state.judged
-    if judged is None:
-        return "No verdict yet: it is given once the held-out poses are measured.", Urgency.CALM
-    urgency = URGENCIES.get(judged.verdict, Urgency.ATTENTION)
-    return f"{judged.verdict.upper()}: {VERDICT_MEANINGS[judged.verdict]}", urgency
+def verdict_urgency(state: RunState) -> Urgency:
+    """How much attention the verdict needs."""
+    if state.judged is None:
+        return Urgency.CALM
+    return URGENCIES.get(state.judged.verdict, Urgency.ATTENTION)
+
+
+def review_plots(picture: RunPicture) -> tuple[PlotView, ...]:
+    """Deviations of the held-out poses, residuals of the records, and the predicted accuracy."""
+    return deviation_plot(picture.state), residual_plot(picture), accuracy_plot(picture, None)
 
 
 def _scope(state: RunState) -> tuple[str, ...]:
@@ -93,15 +88,12 @@ def _approval(picture: RunPicture) -> str:
     if state.proposed is not None:
         failed = [gate.sentence for gate in state.proposed.gates if not gate.passed]
         return f"Not approved. {' '.join(failed)}".strip()
-    return f"Approving is not possible yet: {_missing(state)}."
-
-
-def _missing(state: RunState) -> str:
+    missing = "the held-out poses with the old geometry are still to be measured"
     if state.started is not None and state.started.mode not in {"quick", "optimise"}:
-        return "this run changes nothing"
-    if state.identified is None:
-        return "the geometry is not identified"
-    return "the held-out poses with the old geometry are still to be measured"
+        missing = "this run changes nothing"
+    elif state.identified is None:
+        missing = "the geometry is not identified"
+    return f"Approving is not possible yet: {missing}."
 
 
 def _comparison(state: RunState) -> tuple[str, ...]:
@@ -159,14 +151,6 @@ def residual_plot(picture: RunPicture) -> PlotView:
 def history_entries(runs: Sequence[PastRun]) -> tuple[HistoryEntry, ...]:
     """A line for each run, in their order."""
     return tuple(HistoryEntry(run.name, history_line(run), run.summary.has_proposal) for run in runs)
-
-
-def history_view(entries: tuple[HistoryEntry, ...] | None, compared: tuple[str, ...]) -> HistoryView:
-    """The list; ``entries`` are None until they are read."""
-    if entries is None:
-        return HistoryView(history_head(), (), note=READING)
-    note = "" if entries else NO_RUNS
-    return HistoryView(history_head(), entries, (*WHAT_TO_PRESS, "", *compared), note)
 
 
 def rollback_question(run: str, *, is_in_controller: bool) -> QuestionView:

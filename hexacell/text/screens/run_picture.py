@@ -19,7 +19,7 @@ from hexacell.run_process.messages import (
     RunDescribed,
     StatusChanged,
 )
-from hexacell.text.screens.views import HeaderView, Urgency
+from hexacell.text.screens.views import Urgency
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import Question
@@ -113,7 +113,9 @@ def picture_after(  # noqa: PLR0911 - a case a message
         case CursorMoved():
             return replace(picture, cursor=message)
         case HostFailed():
-            return _with_failure(picture, message)
+            # The journal has already said how a run ended.
+            is_known = isinstance(picture.setback, events.Interrupted) and message.exit_code is not None
+            return picture if is_known else _with_setback(picture, message)
 
 
 def _with_event(picture: RunPicture, message: EventRecorded) -> RunPicture:
@@ -144,42 +146,28 @@ def _with_step(picture: RunPicture, step: Step) -> RunPicture:
     return replace(picture, forecasts=(*picture.forecasts, (records, step.expected.forecast)))
 
 
-def _with_failure(picture: RunPicture, failed: HostFailed) -> RunPicture:
-    """What the journal has said of the end of a run is not said again."""
-    was_told = isinstance(picture.setback, events.Interrupted) and failed.exit_code is not None
-    return picture if was_told else _with_setback(picture, failed)
-
-
 def _with_setback(picture: RunPicture, setback: Setback) -> RunPicture:
     return replace(picture, setback=setback, setbacks=picture.setbacks + 1)
 
 
-def header_view(cell: str, picture: RunPicture) -> HeaderView:
-    """The cell, what is done there, its state, and who is in control."""
-    described = picture.described
+def header_line(cell: str, picture: RunPicture) -> tuple[str, str, Urgency]:
+    """The cell and what is done there; its state and who is in control; and how urgent that is."""
+    described, control = picture.described, picture.control
     if described is None:
-        return HeaderView(cell, status="no run")
+        return f"hexacell | {cell}", "no run", Urgency.CALM
+    activity = MODES[described.mode]
     if described.is_recorded:
-        return HeaderView(
-            cell, f"recorded {MODES[described.mode]} {described.folder.name}", _cursor(picture)
-        )
-    status = picture.status.value.upper()
-    urgency = URGENT.get(picture.status, Urgency.CALM)
-    return HeaderView(cell, MODES[described.mode], status, _control(picture), urgency)
+        where = f"hexacell | {cell} | recorded {activity} {described.folder.name}"
+        return where, _cursor(picture.cursor), Urgency.CALM
+    state = picture.status.value.upper()
+    if control is not None:
+        watching = f"watching, {control.who or 'nobody'} is in control"
+        state += f" | {'you are in control' if control.is_in_control else watching}"
+    return f"hexacell | {cell} | {activity}", state, URGENT.get(picture.status, Urgency.CALM)
 
 
-def _cursor(picture: RunPicture) -> str:
-    cursor = picture.cursor
+def _cursor(cursor: CursorMoved | None) -> str:
     if cursor is None:
         return "RECORDED"
     speed = f"x{cursor.speed:g}" if cursor.speed else "halted"
     return f"{cursor.at:%Y-%m-%d %H:%M:%S} {cursor.sequence}/{cursor.last} {speed}"
-
-
-def _control(picture: RunPicture) -> str:
-    control = picture.control
-    if control is None:
-        return ""
-    if control.is_in_control:
-        return "you are in control"
-    return f"watching, {control.who or 'nobody'} is in control"

@@ -1,4 +1,4 @@
-"""The views of the screens: text and numbers, ready to be drawn.
+"""What the screens draw: questions, faults, checklists, pictures, and large figures.
 
 Only the standard library is imported, so that the first screen is drawn before anything is computed.
 """
@@ -9,15 +9,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class Mark(StrEnum):
-    """How one item of a list stands, in two letters that need no colour."""
-
-    DONE = "ok"
-    FAILED = "NO"
-    BUSY = ".."
-    OPEN = "--"
-
-
 class Urgency(StrEnum):
     """How much attention a text needs."""
 
@@ -26,73 +17,8 @@ class Urgency(StrEnum):
     ALARM = "alarm"
 
 
-@dataclass(frozen=True, slots=True)
-class HeaderView:
-    """The first line: which cell, what is done there, its state, and who is in control."""
-
-    cell: str
-    activity: str = ""
-    status: str = ""
-    control: str = ""
-    urgency: Urgency = Urgency.CALM
-
-
-@dataclass(frozen=True, slots=True)
-class Guidance:
-    """What happens now, what is next, how long it takes, and how to stop."""
-
-    now: str
-    following: str
-    remaining: str
-    stopping: str
-
-
-@dataclass(frozen=True, slots=True)
-class GaugeReadout:
-    """One gauge as it shows now.
-
-    Attributes:
-        reading: as its display has it, with ``unit``.
-        deviation: along its base axis from the zero of the set; empty without one.
-        bar: the plunger's place in its travel as a picture, and ``place`` in numbers.
-        advice: what to do with it, or why nothing is to be done.
-        problem: why it does not answer; empty if it does.
-    """
-
-    name: str
-    axis: str
-    reading: str
-    unit: str
-    deviation: str
-    age: str
-    noise: str
-    bar: str
-    place: str
-    advice: str
-    problem: str = ""
-
-    @property
-    def urgency(self) -> Urgency:
-        """Alarm where the gauge does not answer."""
-        return Urgency.ALARM if self.problem else Urgency.CALM
-
-
-@dataclass(frozen=True, slots=True)
-class DeviceLine:
-    """One device in a line of text."""
-
-    name: str
-    text: str
-    urgency: Urgency = Urgency.CALM
-
-
-@dataclass(frozen=True, slots=True)
-class LiveView:
-    """All devices as they show now; ``note`` says so where nothing is known."""
-
-    gauges: tuple[GaugeReadout, ...] = ()
-    devices: tuple[DeviceLine, ...] = ()
-    note: str = ""
+Line = tuple[str, Urgency]
+"""A line of text, and how much attention it needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,18 +61,6 @@ class PlotView:
     def is_empty(self) -> bool:
         """Whether there is no point to draw."""
         return not any(one.xs for one in self.series)
-
-
-@dataclass(frozen=True, slots=True)
-class MeasureView:
-    """The screen of a run that is being measured; ``records`` has a line each, the latest last."""
-
-    guidance: Guidance
-    live: LiveView
-    records_title: str
-    records_header: str
-    records: tuple[str, ...]
-    accuracy: PlotView
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,14 +110,13 @@ class FaultView:
     action: str
 
 
-@dataclass(frozen=True, slots=True)
-class CellView:
-    """The cell: its devices live, and what its file says with the origin of each value."""
+class Mark(StrEnum):
+    """How one item of a list stands, in two letters that need no colour."""
 
-    title: str
-    live: LiveView
-    settings: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    DONE = "ok"
+    FAILED = "NO"
+    BUSY = ".."
+    OPEN = "--"
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,67 +128,11 @@ class ChecklistItem:
     finding: str = ""
     action: str = ""
 
-
-@dataclass(frozen=True, slots=True)
-class ChecklistView:
-    """Everything that must hold before motion, and what the plan is expected to give.
-
-    ``refusal`` is why no run can be started now; empty if one can.
-    """
-
-    items: tuple[ChecklistItem, ...]
-    plan: tuple[str, ...]
-    instruction: str
-    refusal: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class PlanView:
-    """Exclusions and the poses of a plan; ``note`` says where they come from, or why there are none.
-
-    Each row is the name of a point, a pose or an exclusion, and a line of text.
-    """
-
-    note: str
-    rows: tuple[tuple[str, str], ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class ReviewView:
-    """A result: the verdict first, with its scope, and everything behind it.
-
-    Attributes:
-        scope: what the verdict holds for, and what was not checked.
-        approval: what is to be decided, or why it cannot be yet.
-        comparison: before and after at the held-out points.
-    """
-
-    verdict: str
-    scope: tuple[str, ...]
-    approval: str
-    parameters_header: str = ""
-    parameters: tuple[str, ...] = ()
-    comparison: tuple[str, ...] = ()
-    plots: tuple[PlotView, ...] = ()
-    change: tuple[str, ...] = ()
-    urgency: Urgency = Urgency.CALM
-
-
-@dataclass(frozen=True, slots=True)
-class FirstQuestionView:
-    """One question of the first-time assistant.
-
-    Attributes:
-        progress: which of how many it is.
-        answer: what is in the field at first.
-        problem: why the last answer could not be taken; empty if it could.
-    """
-
-    progress: str
-    text: str
-    hint: str
-    answer: str
-    problem: str = ""
+    @property
+    def lines(self) -> list[str]:
+        """How it stands, and below it what to do."""
+        lines = [f"{self.mark}  {self.name}{f': {self.finding}' if self.finding else ''}"]
+        return [*lines, f"    -> {self.action}"] if self.action and self.mark is Mark.FAILED else lines
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,14 +147,36 @@ class HistoryEntry:
     has_proposal: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class HistoryView:
-    """The runs of a cell, the latest first; ``note`` says so where there are none.
+ROWS = 5
+"""Height of a figure in rows, at scale 1."""
 
-    ``comparison`` is what was asked about one of them.
+_SHAPES = {
+    "0": ("###", "# #", "# #", "# #", "###"),
+    "1": (" # ", "## ", " # ", " # ", "###"),
+    "2": ("###", "  #", "###", "#  ", "###"),
+    "3": ("###", "  #", "###", "  #", "###"),
+    "4": ("# #", "# #", "###", "  #", "  #"),
+    "5": ("###", "#  ", "###", "  #", "###"),
+    "6": ("###", "#  ", "###", "# #", "###"),
+    "7": ("###", "  #", "  #", "  #", "  #"),
+    "8": ("###", "# #", "###", "# #", "###"),
+    "9": ("###", "# #", "###", "  #", "###"),
+    "+": ("   ", " # ", "###", " # ", "   "),
+    "-": ("   ", "   ", "###", "   ", "   "),
+    ".": (" ", " ", " ", " ", "#"),
+    "x": ("   ", "# #", " # ", "# #", "   "),
+    "y": ("   ", "# #", "###", "  #", "## "),
+    "z": ("   ", "###", " # ", "#  ", "###"),
+    " ": (" ", " ", " ", " ", " "),
+}
+
+
+def block_text(text: str, scale: int = 1) -> list[str]:
+    """A short text of figures, signs and axes in lines of blocks; anything else is left blank.
+
+    A point of a figure is ``2 * scale`` columns wide and ``scale`` rows high.
     """
-
-    header: str
-    entries: tuple[HistoryEntry, ...]
-    comparison: tuple[str, ...] = ()
-    note: str = ""
+    shapes = [_SHAPES.get(letter, _SHAPES[" "]) for letter in text]
+    rows = [" ".join(shape[row] for shape in shapes) for row in range(ROWS)]
+    wide = ["".join(("█" if cell == "#" else " ") * 2 * scale for cell in row).rstrip() for row in rows]
+    return [row for row in wide for _ in range(scale)]

@@ -16,7 +16,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.services.preflight.exclusions import toggle_exclusion
 from hexacell.services.run.calibration_run import calibrate
 from hexacell.services.run.replay_run import replay
-from hexacell.text.screens.planned_poses import exclusions_text, plan_view
+from hexacell.text.screens.planned_poses import exclusions_text, plan_rows
 from procedures.engine.commands import Abort, CommandQueue
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase
@@ -130,7 +130,7 @@ def test_a_key_excludes_and_removes_and_keeps_the_rest_of_the_file(cell: Cell) -
     [refused] = two.settings.excluded_commands.commands
     assert (refused.pose, refused.within_mm, refused.within_deg) == (PLANNED[1][2].as_tuple(), 30.0, 5.0)
     assert exclusions_text(two.settings) == "Excluded by the cell file: 1 pose, point 3."
-    rows = dict(plan_view(two.settings, PLANNED).rows)
+    rows = dict(plan_rows(two.settings, PLANNED))
     assert list(rows) == ["e1", "e2", "1", "1.1", "1.3", "2", "2.1", "2.2", "2.3"]
     assert rows["e1"].startswith("OUT")
     assert "within 30 mm, 5 deg" in rows["e1"]

@@ -24,13 +24,12 @@ from hexacell.run_process.messages import (
     StatusChanged,
 )
 from hexacell.text.parameters import parameter_table, rows_of_run
-from hexacell.text.screens.lines import block_text, device_lines
-from hexacell.text.screens.live import live_view, mounting_advice, travel_bar
+from hexacell.text.screens.live import device_lines, mounting_advice, travel_bar
 from hexacell.text.screens.measuring import fault_view, guidance, record_lines
 from hexacell.text.screens.questions import question_view
-from hexacell.text.screens.reviewing import review_view
+from hexacell.text.screens.reviewing import review_texts
 from hexacell.text.screens.run_picture import RunPicture, picture_after
-from hexacell.text.screens.views import Urgency
+from hexacell.text.screens.views import Urgency, block_text
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
 from procedures.engine.command_loop import Status
@@ -99,8 +98,8 @@ def test_a_plunger_is_shown_in_its_travel(place: float | None, bar: str) -> None
 
 def test_a_device_that_is_silent_gets_older_by_itself() -> None:
     snapshot = LiveSnapshot(gauges=(gauge(),), encoders=EncoderSnapshot(positions=(0.0,) * 6, age_s=0.1))
-    assert "0.1 s" in device_lines(live_view(snapshot))[0][0]
-    lines = device_lines(live_view(snapshot, later_s=7.0))
+    assert "0.1 s" in device_lines(snapshot)[0][0]
+    lines = device_lines(snapshot, later_s=7.0)
     assert "7.1 s" in lines[0][0]
     assert lines[1][0].endswith("mm, 7.1 s ago")
 
@@ -112,7 +111,7 @@ def test_what_is_urgent_is_said_in_words_too() -> None:
         controller=ControllerSnapshot(estop=True, enabled=False, error_messages=("drive 3",), age_s=0.1),
         stop_reason="the door is open",
     )
-    assert device_lines(live_view(snapshot)) == [
+    assert device_lines(snapshot) == [
         ("x   NO READING for 0.1 s: it answers in inch", Urgency.ALARM),
         ("encoders   leg 3 is silent", Urgency.ALARM),
         ("controller EMERGENCY STOP; drive 3", Urgency.ALARM),
@@ -121,12 +120,12 @@ def test_what_is_urgent_is_said_in_words_too() -> None:
 
 
 def test_without_devices_that_is_said() -> None:
-    assert device_lines(live_view(None)) == [("No device is connected.", Urgency.CALM)]
+    assert device_lines(None) == [("No device is connected.", Urgency.CALM)]
 
 
 def test_a_line_of_a_gauge_fits_a_narrow_terminal() -> None:
     snapshot = LiveSnapshot(gauges=(gauge(shown_mm=-12.3456, noise_mm=0.0123, travel_mm=25.0),))
-    line, _ = device_lines(live_view(snapshot, 12.0, (1.0, 1.0, 1.0)))[0]
+    line, _ = device_lines(snapshot, 12.0, (1.0, 1.0, 1.0))[0]
     assert len(line) <= 78
 
 
@@ -143,7 +142,7 @@ def test_an_emergency_stop_is_a_persons() -> None:
 
 
 def test_guidance_without_a_run() -> None:
-    assert guidance(RunPicture(), None).now == "no run is being measured here"
+    assert guidance(RunPicture(), None)["Now"] == "no run is being measured here"
 
 
 @pytest.mark.parametrize(
@@ -162,21 +161,21 @@ def test_guidance_without_a_run() -> None:
     ],
 )
 def test_guidance_says_what_happens_now(messages: tuple[HostMessage, ...], now: str) -> None:
-    assert guidance(pictured(described(), *messages), None).now == now
+    assert guidance(pictured(described(), *messages), None)["Now"] == now
 
 
 def test_the_time_that_is_left_follows_from_the_pace() -> None:
     story = Story(POINT)
     told = [recorded(story.sampled(number), number) for number in range(1, 6)]
     picture = pictured(described(expected_records=25), *told)
-    assert guidance(picture, None).remaining == "about 10 minutes: at most 20 of 25 readings are left"
+    assert guidance(picture, None)["Time"] == "about 10 minutes: at most 20 of 25 readings are left"
 
 
 def test_who_watches_is_told_who_is_in_control() -> None:
     picture = pictured(described(), ControlChanged(is_in_control=False, who="grace"))
-    assert guidance(picture, None).stopping == "you only watch: grace is in control; c takes over"
+    assert guidance(picture, None)["Stop"] == "you only watch: grace is in control; c takes over"
     asked = picture_after(picture, QuestionOpened(question=ask_mounting(1, 1, Pose(0.0, 0.0, 0.0))), 0.0)
-    assert guidance(asked, None).now == "a question waits for who is in control"
+    assert guidance(asked, None)["Now"] == "a question waits for who is in control"
 
 
 def test_who_does_not_keep_a_result_knows_that_the_old_config_comes_back() -> None:
@@ -244,9 +243,9 @@ def test_a_check_shows_what_has_changed() -> None:
 @pytest.mark.parametrize("verdict", Verdict)
 def test_every_verdict_is_said_in_words_with_its_scope(verdict: Verdict) -> None:
     judged = events.ResultValidated(verdict=verdict, line="what came of it")
-    view = review_view(pictured(described(), recorded(judged)), None)
-    assert view.verdict.lower().startswith(f"{verdict.value}: ")
-    assert view.scope == ("what came of it",)
+    shown = review_texts(pictured(described(), recorded(judged)), None)
+    assert shown["verdict"].lower().startswith(f"{verdict.value}: ")
+    assert shown["scope"] == "what came of it"
 
 
 @pytest.mark.parametrize(
@@ -262,4 +261,4 @@ def test_every_verdict_is_said_in_words_with_its_scope(verdict: Verdict) -> None
 )
 def test_the_approval_says_how_it_stands(told: tuple[events.Event, ...], approval: str) -> None:
     picture = pictured(described(), *map(recorded, told))
-    assert review_view(picture, None).approval == approval
+    assert review_texts(picture, None)["approval"] == approval

@@ -44,55 +44,24 @@ def bus_settings(settings: EncoderSettings) -> dict[str, object]:
     return settings.bus
 
 
-class SampleHistory:
-    """The latest sample of six joints, for one opening of the encoders.
+class BankSession(ABC):
+    """An open bus; used by one thread. A subclass connects at its creation.
 
-    ``subjects`` are the subjects of messages about legs 1 to 6.
+    Attributes:
+        identities: those of the encoders of legs 1 to 6, after :meth:`start`.
+        subjects: those of messages about legs 1 to 6.
     """
 
-    def __init__(self, settings: EncoderSettings, subjects: Sequence[str]) -> None:
-        self._settings = settings
-        self._subjects = subjects
-        self._latest: tuple[float, tuple[float, ...]] | None = None
-
-    def check_signs(self, counts: tuple[int, ...]) -> None:
-        """Raise ``WrongSetting`` if counts are negative ones, read as unsigned."""
-        if self._settings.signed:
-            return
-        for subject, count in zip(self._subjects, counts, strict=True):
-            if count >= NEGATIVE:
-                raise WrongSetting(
-                    f"shows {count} counts, as a negative number does that is read as unsigned",
-                    subject=subject,
-                    action="Write `signed = true` under [encoders]",
-                )
-
-    def check_speed(self, positions: tuple[float, ...]) -> None:
-        """Raise ``InvalidSampleError`` if a joint went farther than it can; else keep the sample."""
-        now, speed = time.monotonic(), self._settings.largest_speed
-        if self._latest is not None and speed is not None:
-            before_s, before = self._latest
-            farthest = MARGIN + speed * (now - before_s)
-            for subject, one, other in zip(self._subjects, before, positions, strict=True):
-                if abs(other - one) > farthest:
-                    unit = self._settings.unit
-                    raise invalid_sample(
-                        f"jumped from {one:.3f} to {other:.3f} {unit} in {now - before_s:.2g} s", subject
-                    )
-        self._latest = now, positions
-
-
-class BankSession(ABC):
-    """An open bank; used by one thread. ``subjects`` are those of messages about legs 1 to 6."""
+    identities: tuple[DeviceIdentity, ...]
 
     def __init__(self, settings: EncoderSettings, subjects: Sequence[str]) -> None:
+        self.subjects = subjects
         self._settings = settings
-        self._history = SampleHistory(settings, subjects)
+        self._latest_sample: tuple[float, tuple[float, ...]] | None = None
 
-    @property
     @abstractmethod
-    def identities(self) -> tuple[DeviceIdentity, ...]:
-        """The identities of the encoders of legs 1 to 6."""
+    def start(self) -> None:
+        """Identify the encoders and take a first sample; closed by the caller if it fails."""
 
     @abstractmethod
     def _sample(self) -> tuple[int, ...]:
@@ -112,22 +81,35 @@ class BankSession(ABC):
             DeviceError: the positions are not of one instant, or the bus failed.
         """
         counts = self._sample()
-        self._history.check_signs(counts)
+        for subject, count in zip(self.subjects, counts, strict=True):
+            if count >= NEGATIVE and not self._settings.signed:
+                raise WrongSetting(
+                    f"shows {count} counts, as a negative number does that is read as unsigned",
+                    subject=subject,
+                    action="Write `signed = true` under [encoders]",
+                )
         positions = joint_variables(counts, self._settings)
-        self._history.check_speed(positions)
+        self._check_speed(positions)
         return EncoderSample(counts, positions, self._settings.unit)
+
+    def _check_speed(self, positions: tuple[float, ...]) -> None:
+        """Raise ``InvalidSampleError`` if a joint went farther than it can; else keep the sample."""
+        now, speed = time.monotonic(), self._settings.largest_speed
+        if self._latest_sample is not None and speed is not None:
+            before_s, before = self._latest_sample
+            farthest = MARGIN + speed * (now - before_s)
+            for subject, one, other in zip(self.subjects, before, positions, strict=True):
+                if abs(other - one) > farthest:
+                    where = f"from {one:.3f} to {other:.3f} {self._settings.unit}"
+                    raise invalid_sample(f"jumped {where} in {now - before_s:.2g} s", subject)
+        self._latest_sample = now, positions
 
 
 Session = TypeVar("Session", bound=BankSession)
 
 
 class ThreadedBank(ABC, Generic[Session]):
-    """A :class:`drivers.interfaces.EncoderBank` of sessions on a thread.
-
-    Args:
-        settings: of the cell file.
-        trace: gets all traffic, in the threads of the bus.
-    """
+    """A :class:`drivers.interfaces.EncoderBank` of sessions on a thread; ``trace`` gets all traffic."""
 
     def __init__(self, settings: EncoderSettings, trace: TraceRecorder | None = None) -> None:
         self._settings = settings
@@ -137,7 +119,7 @@ class ThreadedBank(ABC, Generic[Session]):
 
     @abstractmethod
     def _begin(self, closing: threading.Event) -> Session:
-        """Open the bus; nothing stays open after a failure. ``closing`` interrupts it."""
+        """Open the bus; ``closing`` interrupts every wait."""
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
         """The identities, legs 1 to 6, of the connected encoders.
@@ -173,6 +155,7 @@ class ThreadedBank(ABC, Generic[Session]):
 
     def _open(self, closing: threading.Event) -> tuple[DeviceIdentity, ...]:
         self._session = self._begin(closing)
+        self._session.start()
         return self._session.identities
 
     def _read(self) -> EncoderSample:

@@ -12,6 +12,7 @@ from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand
 from drivers.encoders.electronic_data_sheet import read_data_sheet
 from drivers.encoders.node_identity import (
+    SECOND_RESPONSE_S,
     check_serial_number,
     check_step,
     detect_nodes,
@@ -39,10 +40,7 @@ class Cia406Bank(ThreadedBank["EncoderSession"]):
 
 
 class EncoderSession(BankSession):
-    """Opens, identifies, configures and starts the nodes; then takes samples.
-
-    If a step fails, the bus is closed again.
-    """
+    """Opens, identifies, configures and starts the nodes; then takes samples."""
 
     def __init__(
         self,
@@ -51,20 +49,11 @@ class EncoderSession(BankSession):
         trace: TraceRecorder | None,
         alarm_timing: AlarmTiming,
     ) -> None:
-        legs = tuple(Leg(number, node) for number, node in enumerate(settings.nodes, 1))
-        super().__init__(settings, [leg.subject for leg in legs])
+        self._legs = tuple(Leg(number, node) for number, node in enumerate(settings.nodes, 1))
+        super().__init__(settings, [leg.subject for leg in self._legs])
+        self._data_sheet = None if settings.eds is None else read_data_sheet(Path(settings.eds))
+        self._alarm_timing = alarm_timing
         self.bus = EncoderBus(bus_settings(settings), closing, trace)
-        try:
-            self._data_sheet = None if settings.eds is None else read_data_sheet(Path(settings.eds))
-            self._start(legs, alarm_timing)
-        except BaseException:
-            self.bus.close()
-            raise
-
-    @property
-    def identities(self) -> tuple[DeviceIdentity, ...]:
-        """The identities of the encoders of legs 1 to 6."""
-        return self._identities
 
     def close(self) -> None:
         """Close the bus."""
@@ -79,15 +68,16 @@ class EncoderSession(BankSession):
         self.bus.check()
         return counts
 
-    def _start(self, legs: tuple[Leg, ...], alarm_timing: AlarmTiming) -> None:
-        settings = self._settings
+    def start(self) -> None:
+        """Configure all nodes, and start them together."""
+        settings, legs = self._settings, self._legs
         nodes = tuple(EncoderNode(leg, self.bus, settings.timeout_s) for leg in legs)
         for node in nodes:
             node.command(NmtCommand.ENTER_PRE_OPERATIONAL)
         detect_nodes(nodes, self.bus, settings.timeout_s)
         monitors = tuple(NodeMonitor(leg, self.bus, settings.heartbeat_ms) for leg in legs)
         device_types = tuple(read_device_type(node, settings.unit) for node in nodes)
-        self._identities = tuple(map(self._identify, nodes, device_types))
+        self.identities = tuple(map(self._identify, nodes, device_types))
         channels = tuple(
             configure_position_tpdo(node, device_type, settings.heartbeat_ms)
             for node, device_type in zip(nodes, device_types, strict=True)
@@ -104,10 +94,11 @@ class EncoderSession(BankSession):
 
         self._sampler = sampler
         self.bus.health_check = check_all
-        self._alarms = AlarmPoll(nodes, monitors, alarm_timing)
+        self._alarms = AlarmPoll(nodes, monitors, self._alarm_timing)
         for node in nodes:
             node.command(NmtCommand.START)
-        sampler.self_test()
+        sampler.sample()
+        self.bus.listen(SECOND_RESPONSE_S)  # to surplus responses
 
     def _identify(self, node: EncoderNode, device_type: DeviceType) -> DeviceIdentity:
         check_step(node, self._settings)

@@ -170,7 +170,7 @@ class _Received:
 
 
 class DbcSession(BankSession):
-    """An open bus on which all six encoders were heard."""
+    """A bus on which the encoders are heard."""
 
     def __init__(
         self,
@@ -183,27 +183,22 @@ class DbcSession(BankSession):
         self._database = read_database(described, settings.unit, settings.step)
         super().__init__(settings, [signal.subject for signal in self._database.signals])
         self._latest: dict[int, _Received] = {}
-        self._bus = EncoderBus(bus_settings(settings), closing, trace, self._accepts)
-        try:
-            for frame in self._database.frames:
-                self._bus.network.subscribe(frame.number, self._receiver(frame))
-            self._sample()
-        except BaseException:
-            self._bus.close()
-            raise
-
-    @property
-    def identities(self) -> tuple[DeviceIdentity, ...]:
-        """One identity a leg; such encoders have no names of their own."""
-        return tuple(
+        self.identities = tuple(
             DeviceIdentity(
-                f"encoder of leg {one.leg}",
+                f"encoder of leg {one.leg}",  # such encoders have no names of their own
                 "dbc",
                 one.name,
                 settings=f"steps of {one.signal.scale:g} {one.signal.unit}, offset {one.signal.offset:g}",
             )
             for one in self._database.signals
         )
+        self._bus = EncoderBus(bus_settings(settings), closing, trace, self._accepts)
+
+    def start(self) -> None:
+        """Listen to all six, and take a first sample."""
+        for frame in self._database.frames:
+            self._bus.network.subscribe(frame.number, self._receiver(frame))
+        self._sample()
 
     def close(self) -> None:
         """Close the bus."""

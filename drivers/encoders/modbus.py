@@ -93,7 +93,7 @@ class ModbusBank(ThreadedBank["ModbusSession"]):
 
 
 class ModbusSession(BankSession):
-    """An open line on which all six encoders answered."""
+    """A line on which the encoders answer."""
 
     def __init__(
         self,
@@ -113,28 +113,12 @@ class ModbusSession(BankSession):
         self._url = described.port
         self._port = ModbusPort(self._url, {**LINE, **described.serial}, closing, trace)
         self._port.subject = "encoders"
-        try:
-            self._begin()
-        except BaseException:
-            self._port.close()
-            raise
-
-    @property
-    def identities(self) -> tuple[DeviceIdentity, ...]:
-        """One identity a leg: such encoders have no names of their own."""
-        adapter = adapter_at(self._url)
-        return tuple(
-            DeviceIdentity(
-                f"encoder of leg {leg}", "modbus", f"device {device}, register {register}", port=adapter
-            )
-            for leg, (device, register) in enumerate(self._described.places, 1)
-        )
 
     def close(self) -> None:
         """Close the line."""
         self._port.close()
 
-    def _begin(self) -> None:
+    def start(self) -> None:
         """Open the line, and read; some devices refuse a request with registers that they do not have."""
         try:
             self._port.open()
@@ -146,6 +130,11 @@ class ModbusSession(BankSession):
         except RefusedRequest:
             self._spans = register_spans(self._described, joined=False)
             self._sample()
+        adapter = adapter_at(self._url)
+        self.identities = tuple(  # such encoders have no names of their own
+            DeviceIdentity(subject, "modbus", f"device {device}, register {register}", port=adapter)
+            for subject, (device, register) in zip(self.subjects, self._described.places, strict=True)
+        )
 
     def _sample(self) -> tuple[int, ...]:
         latch, spans = self._described.latch, self._spans

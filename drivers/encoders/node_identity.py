@@ -57,8 +57,12 @@ def read_device_type(node: EncoderNode, unit: JointUnit = JointUnit.MM) -> Devic
     value = node.read(od.DEVICE_TYPE)
     if value not in {kind.value for kind in DeviceType if kind.unit is unit}:
         wanted = "linear" if unit is JointUnit.MM else "rotary"
+        profile, kind = value & 0xFFFF, value >> 16
+        what = f"profile {profile}; encoders are {od.ENCODER_PROFILE}"
+        if profile == od.ENCODER_PROFILE:
+            what = f"an encoder, but of class {kind}; linear ones are 8 and 10"
         raise DeviceError(
-            f"is no absolute {wanted} encoder: its device type is {_device_type_text(value)}",
+            f"is no absolute {wanted} encoder: its device type is 0x{value:08X} ({what})",
             subject=node.leg.subject,
             action="Check `nodes` under [encoders] in the cell file against the devices' node ids",
         )
@@ -68,30 +72,22 @@ def read_device_type(node: EncoderNode, unit: JointUnit = JointUnit.MM) -> Devic
 def check_step(node: EncoderNode, settings: EncoderSettings) -> None:
     """Compare what a count is with the cell file."""
     if isinstance(settings, LinearEncoderSettings):
-        _check_measuring_step(node, settings)
+        found = _measuring_step(node, settings.step_object)
+        is_right = math.isclose(found, settings.measuring_step_nm, rel_tol=1e-9)
+        has, stated = f"a measuring step of {found} nm", f"{settings.measuring_step_nm:g} nm"
+        key = "measuring_step_nm"
     elif isinstance(settings, RotaryEncoderSettings):
-        _check_counts_per_turn(node, settings.counts_per_turn)
-
-
-def _check_counts_per_turn(node: EncoderNode, counts: int) -> None:
-    found = node.read_optional(od.UNITS_PER_TURN)
-    if found is None:
-        found = node.read(od.RESOLUTION)
-    if found != counts:
+        counts = node.read_optional(od.UNITS_PER_TURN)
+        found = node.read(od.RESOLUTION) if counts is None else counts
+        is_right = found == settings.counts_per_turn
+        has, stated, key = f"{found} counts a turn", str(settings.counts_per_turn), "counts_per_turn"
+    else:
+        return
+    if not is_right:
         raise DeviceError(
-            f"has {found} counts a turn, the cell file says {counts}",
+            f"has {has}, the cell file says {stated}",
             subject=node.leg.subject,
-            action="Correct `counts_per_turn` under [encoders], or set the device with its vendor's tool",
-        )
-
-
-def _check_measuring_step(node: EncoderNode, settings: LinearEncoderSettings) -> None:
-    step_nm, found = settings.measuring_step_nm, _measuring_step(node, settings.step_object)
-    if not math.isclose(found, step_nm, rel_tol=1e-9):
-        raise DeviceError(
-            f"has a measuring step of {found} nm, the cell file says {step_nm:g} nm",
-            subject=node.leg.subject,
-            action="Correct `measuring_step_nm` under [encoders], or set the device with its vendor's tool",
+            action=f"Correct `{key}` under [encoders], or set the device with its vendor's tool",
         )
 
 
@@ -160,10 +156,3 @@ def check_serial_number(node: EncoderNode, identity: DeviceIdentity, settings: E
             action="If it was exchanged on purpose, correct `serial_numbers` under [encoders] and "
             "calibrate; if not, check which cable goes to which leg",
         )
-
-
-def _device_type_text(value: int) -> str:
-    profile, kind = value & 0xFFFF, value >> 16
-    if profile == od.ENCODER_PROFILE:
-        return f"0x{value:08X} (an encoder, but of class {kind}; linear ones are 8 and 10)"
-    return f"0x{value:08X} (profile {profile}; encoders are {od.ENCODER_PROFILE})"

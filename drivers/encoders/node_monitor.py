@@ -69,10 +69,6 @@ class NodeMonitor:
         """Whether its heartbeat is overdue."""
         return self._last_heartbeat is not None and now_s - self._last_heartbeat > self.timeout_s
 
-    def has_fault(self, now_s: float) -> bool:
-        """Whether it restarted, is silent, or reports an error."""
-        return self.restarted or self.emergency is not None or self.is_silent(now_s)
-
     def start_heartbeat_timeout(self) -> None:
         """From now on a missing heartbeat is a fault, unless heartbeats are off."""
         if self._heartbeat_ms:
@@ -104,21 +100,18 @@ class NodeMonitor:
 def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
     """Raise if a node restarted, its heartbeat is overdue, or it reports an error."""
     now_s = time.monotonic()
-    faulty = [monitor for monitor in monitors if monitor.has_fault(now_s)]
-    if not faulty:
-        return
-    restarted = [monitor.leg for monitor in faulty if monitor.restarted]
+    restarted = [monitor.leg for monitor in monitors if monitor.restarted]
     if restarted:
         raise RestartedNodeError(
             "restarted, or was stopped, during the run and lost its configuration: the set is void",
             subject=subject_of(restarted),
             action="Check its supply, open the encoders again and repeat the set",
         )
-    silent = [monitor for monitor in faulty if monitor.is_silent(now_s)]
+    silent = [monitor for monitor in monitors if monitor.is_silent(now_s)]
     if silent:
         what = f"no heartbeat for {silent[0].timeout_s:.2g} s"
         raise silent_nodes(what, [monitor.leg for monitor in silent], all_legs=len(silent) == len(monitors))
-    for monitor in faulty:
+    for monitor in monitors:
         if monitor.emergency is not None:
             action = _CHECK_BUS if monitor.is_about_the_bus else _CHECK_DEVICE
             raise invalid_sample(f"reports {monitor.emergency}", monitor.leg.subject, action)
@@ -188,21 +181,18 @@ class AlarmPoll:
         now_s = time.monotonic()
         self._sampling_s += now_s - self._begun_s
         emergencies = sum([monitor.emergencies for monitor in self._monitors])
-        if emergencies == self._emergencies_seen and not self._is_due(now_s):
+        since_s, timing = now_s - self._polled_s, self._timing
+        is_cheap = since_s >= 2.0 * self._sampling_s or timing.bus_share * since_s >= self._cost_s
+        if emergencies == self._emergencies_seen and not (since_s >= timing.period_s and is_cheap):
             return
         self._polls += 1
         self._emergencies_seen = -1  # due again at once, should one be found
         for node, entry in self._entries:
-            if entry is not WARNINGS or self._polls % self._timing.warnings_every == 0:
+            if entry is not WARNINGS or self._polls % timing.warnings_every == 0:
                 self._check_entry(node, entry)
         self._emergencies_seen = emergencies
         self._polled_s, self._sampling_s = time.monotonic(), 0.0
         self._cost_s = self._polled_s - now_s
-
-    def _is_due(self, now_s: float) -> bool:
-        since_s, timing = now_s - self._polled_s, self._timing
-        has_paused = since_s >= 2.0 * self._sampling_s
-        return since_s >= timing.period_s and (has_paused or timing.bus_share * since_s >= self._cost_s)
 
     def _check_entry(self, node: EncoderNode, entry: ObjectEntry) -> None:
         value = node.read(entry)

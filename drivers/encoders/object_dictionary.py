@@ -80,24 +80,15 @@ TPDO_COUNT = 4
 """TPDOs whose COB-IDs are predefined: 180h, 280h, 380h and 480h plus the node id (CiA 301)."""
 
 
-def tpdo_parameter(number: int, subindex: int, size: int) -> ObjectEntry:
+COB_ID, TRANSMISSION_TYPE, EVENT_TIMER = 1, 2, 5
+"""Communication parameters of a TPDO: the COB-ID has bit 31 set while it is off; the transmission type is
+1 to 240 with every n-th SYNC, 254 and 255 on events; the event timer is in ms, 0 is off."""
+TPDO_PARAMETER_BYTES = {COB_ID: 4, TRANSMISSION_TYPE: 1, EVENT_TIMER: 2}
+
+
+def tpdo_parameter(number: int, parameter: int) -> ObjectEntry:
     """A communication parameter of TPDO ``number`` (from 1)."""
-    return ObjectEntry(0x1800 + number - 1, subindex, size)
-
-
-def tpdo_cob_id(number: int) -> ObjectEntry:
-    """Its COB-ID, with bit 31 set while it is off."""
-    return tpdo_parameter(number, 1, 4)
-
-
-def tpdo_transmission_type(number: int) -> ObjectEntry:
-    """Its transmission type: 1 to 240 with every n-th SYNC, 254 and 255 on events."""
-    return tpdo_parameter(number, 2, 1)
-
-
-def tpdo_event_timer(number: int) -> ObjectEntry:
-    """Its event timer, ms; 0 is off."""
-    return tpdo_parameter(number, 5, 2)
+    return ObjectEntry(0x1800 + number - 1, parameter, TPDO_PARAMETER_BYTES[parameter])
 
 
 def tpdo_mapping(number: int, slot: int) -> ObjectEntry:

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from drivers.encoders import object_dictionary as od
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, duplicated_node, setting_refused, silent_nodes
-from drivers.encoders.node_identity import SECOND_RESPONSE_S
 from drivers.encoders.object_dictionary import DeviceType, ObjectEntry
-from drivers.errors import BusError, SilentNodeError
+from drivers.errors import BusError
 from hexacell.errors import DeviceError
 
 SYNC = 0x080
@@ -80,7 +79,7 @@ def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: i
         tpdos, key=lambda one: (one.position_offset is None, one.transmission_type > 240, one.number)
     )
     for tpdo in tpdos:
-        node.write(od.tpdo_cob_id(tpdo.number), tpdo.cob_id | _OFF)
+        node.write(od.tpdo_parameter(tpdo.number, od.COB_ID), tpdo.cob_id | _OFF)
     channel = _set_up(node, selected, kind)
     if heartbeat_ms or node.read_optional(od.PRODUCER_HEARTBEAT):
         node.write(od.PRODUCER_HEARTBEAT, heartbeat_ms)
@@ -88,14 +87,14 @@ def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: i
 
 
 def _read(node: EncoderNode, number: int) -> Tpdo | None:
-    cob_id = node.read_optional(od.tpdo_cob_id(number))
+    cob_id = node.read_optional(od.tpdo_parameter(number, od.COB_ID))
     if cob_id is None:
         return None
     slots = range(1, node.read(od.tpdo_mapping(number, 0)) + 1)
     return Tpdo(
         number,
         cob_id,
-        node.read(od.tpdo_transmission_type(number)),
+        node.read(od.tpdo_parameter(number, od.TRANSMISSION_TYPE)),
         tuple(node.read(od.tpdo_mapping(number, slot)) for slot in slots),
     )
 
@@ -109,16 +108,16 @@ def _set_up(node: EncoderNode, tpdo: Tpdo, kind: DeviceType) -> PositionChannel:
         offset = 0
     if offset % 8:
         raise setting_refused(f"has its position {offset} bits into TPDO {tpdo.number}", node.leg)
-    node.write(od.tpdo_transmission_type(tpdo.number), WITH_EVERY_SYNC)
-    if node.read_optional(od.tpdo_event_timer(tpdo.number)):
-        node.write(od.tpdo_event_timer(tpdo.number), 0)
+    node.write(od.tpdo_parameter(tpdo.number, od.TRANSMISSION_TYPE), WITH_EVERY_SYNC)
+    if node.read_optional(od.tpdo_parameter(tpdo.number, od.EVENT_TIMER)):
+        node.write(od.tpdo_parameter(tpdo.number, od.EVENT_TIMER), 0)
     cob_id = 0x80 + 0x100 * tpdo.number + node.leg.node
-    node.write(od.tpdo_cob_id(tpdo.number), cob_id | tpdo.cob_id & _NO_RTR)
+    node.write(od.tpdo_parameter(tpdo.number, od.COB_ID), cob_id | tpdo.cob_id & _NO_RTR)
     # Read back: some devices acknowledge a write without effect.
-    if node.read(od.tpdo_transmission_type(tpdo.number)) != WITH_EVERY_SYNC:
+    if node.read(od.tpdo_parameter(tpdo.number, od.TRANSMISSION_TYPE)) != WITH_EVERY_SYNC:
         what = f"acknowledges, but does not keep, TPDO {tpdo.number} with every SYNC"
         raise setting_refused(what, node.leg)
-    if node.read(od.tpdo_cob_id(tpdo.number)) & _OFF:
+    if node.read(od.tpdo_parameter(tpdo.number, od.COB_ID)) & _OFF:
         raise setting_refused(f"acknowledges, but does not do, switching TPDO {tpdo.number} on", node.leg)
     return PositionChannel(cob_id, offset // 8)
 
@@ -170,19 +169,19 @@ class SyncSampler:
         from before would pass for one to its SYNC.
         """
         for _ in range(MAX_SYNCS):
-            is_synchronized = self._await_late_responses()
-            self._send_sync()
+            is_synchronized = self._is_complete() or self._bus.wait_for(self._is_complete, self._timeout_s)
+            with self._bus.condition:
+                # Late responses that do not come are written off; each leg owes one to this SYNC.
+                self._outstanding = [min(outstanding, 0) + 1 for outstanding in self._outstanding]
+            self._bus.network.send_message(SYNC, b"")
             if not self._bus.wait_for(self._is_complete, self._timeout_s):
                 continue
             if not is_synchronized:
                 self._bus.listen(LATE_RESPONSE_TIMEOUTS * self._timeout_s)
             return self._received()
-        raise self._silent()
-
-    def self_test(self) -> None:
-        """Take one sample and listen for surplus responses."""
-        self.sample()
-        self._bus.listen(SECOND_RESPONSE_S)
+        silent = [leg for leg, left in zip(self._legs, self._outstanding, strict=True) if left > 0]
+        what = f"no response to SYNC within {self._timeout_s:g} s, {MAX_SYNCS} times"
+        raise silent_nodes(what, silent, all_legs=len(silent) == len(self._legs))
 
     def check(self) -> None:
         """Raise if a leg sent more positions than there were SYNCs, or another master sends SYNC."""
@@ -195,19 +194,6 @@ class SyncSampler:
                 subject=self._bus.name,
                 action="Give the encoders a bus of their own, or switch the other master off",
             )
-
-    def _await_late_responses(self) -> bool:
-        """Wait for late responses; false if some were written off."""
-        if self._is_complete() or self._bus.wait_for(self._is_complete, self._timeout_s):
-            return True
-        with self._bus.condition:
-            self._outstanding = [min(outstanding, 0) for outstanding in self._outstanding]
-        return False
-
-    def _send_sync(self) -> None:
-        with self._bus.condition:
-            self._outstanding = [outstanding + 1 for outstanding in self._outstanding]
-        self._bus.network.send_message(SYNC, b"")
 
     def _is_complete(self) -> bool:
         return max(self._outstanding) <= 0
@@ -223,13 +209,6 @@ class SyncSampler:
                 action="Open the encoders again; if it stays so, use another device",
             )
         return counts
-
-    def _silent(self) -> SilentNodeError:
-        silent = [
-            leg for leg, outstanding in zip(self._legs, self._outstanding, strict=True) if outstanding > 0
-        ]
-        what = f"no response to SYNC within {self._timeout_s:g} s, {MAX_SYNCS} times"
-        return silent_nodes(what, silent, all_legs=len(silent) == len(self._legs))
 
     def _on_position(self, can_id: int, data: bytearray, _timestamp: float) -> None:
         index = self._index[can_id]

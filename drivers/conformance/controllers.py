@@ -10,7 +10,7 @@ from drivers.conformance.suite import Suite, against_twin, failure, require_name
 from drivers.controllers.linuxcnc.protocol import pose_difference
 from drivers.errors import MotionInterrupted, MoveRefused, StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction
-from hexacell.cell.controller import ControllerSettings
+from hexacell.cell.robot import ControllerSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.kinematics.pose import Pose
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.simulation import SimulationSettings
+from hexacell.cell.uncertainty import LengthCheckSettings
 from hexacell.clock import CellClock
 from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import ReachError

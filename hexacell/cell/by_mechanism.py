@@ -15,13 +15,12 @@ from typing import Any, TypeVar
 
 from pydantic import Field, create_model
 
-from hexacell.cell.controller import ControllerSettings, RotaryControllerSettings
 from hexacell.cell.devices import LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.cell.fields import GeometrySettings, InRange, NotNegative, Positive, Section
 from hexacell.cell.limits import LimitSettings, SpeedSettings
 from hexacell.cell.measuring import GuardSettings, NoiseSettings, TimingSettings
 from hexacell.cell.model import CellSettings, ToleranceSettings
-from hexacell.cell.robot import RobotSettings, mechanism_of
+from hexacell.cell.robot import ControllerSettings, RobotSettings, RotaryControllerSettings, mechanism_of
 from hexacell.cell.simulation import SimulatedEncoders, SimulatedMotion, SimulationSettings
 from hexacell.cell.uncertainty import (
     CommonUncertaintySettings,

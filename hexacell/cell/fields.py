@@ -18,7 +18,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
-from hexacell.storage.secrets import MASK
+from hexacell.storage.toml_document import MASK
 
 LARGEST_NUMBER = 1e6
 """Largest number in a cell file or a measurement file: a kilometre, eleven days."""
@@ -78,16 +78,15 @@ def _a_password(secret: SecretStr) -> SecretStr:
 
 
 def _a_name(name: str) -> str:
-    """A name is that of a folder too, and stands in the lines of a report."""
-    if name != name.strip() or name.startswith(".") or not all(map(_may_be_in_a_name, name)):
+    if (
+        name != name.strip()
+        or name.startswith(".")
+        or not all(sign.isalnum() or sign in SIGNS_OF_NAMES for sign in name)
+    ):
         raise _outside(
             "a name of letters, digits, spaces and . _ - + ( ) #, no dot first, no space at its ends"
         )
     return name
-
-
-def _may_be_in_a_name(sign: str) -> bool:
-    return sign.isalnum() or sign in SIGNS_OF_NAMES
 
 
 def _a_day(value: object) -> date:

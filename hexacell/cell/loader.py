@@ -23,8 +23,14 @@ from hexacell.cell.robot import DEFAULT_MECHANISM
 from hexacell.errors import FileError, HexacellError, UsageError, did_you_mean, joined
 from hexacell.plugins import Group, load, names
 from hexacell.storage.atomic_files import read_text
-from hexacell.storage.secrets import MASK, without_secrets
-from hexacell.storage.toml_document import KeyPath, TomlDocument, is_secret, table_header
+from hexacell.storage.toml_document import (
+    MASK,
+    KeyPath,
+    TomlDocument,
+    is_secret,
+    table_header,
+    without_secrets,
+)
 
 _log = logging.getLogger(__name__)
 

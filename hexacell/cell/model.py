@@ -8,7 +8,6 @@ from typing import Literal, Self, TypeVar
 from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.devices import (
     EncoderSettings,
     GaugeSettings,
@@ -21,7 +20,6 @@ from hexacell.cell.fields import (
     broken_rule,
     key,
 )
-from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.limits import MOST_EXCLUSIONS, ExclusionSettings, LimitSettings, SpeedSettings
 from hexacell.cell.measuring import (
     AcceptanceSettings,
@@ -44,10 +42,11 @@ from hexacell.cell.operation import (
     UnattendedSettings,
 )
 from hexacell.cell.recovery import RecoverySettings
-from hexacell.cell.robot import RobotSettings
+from hexacell.cell.robot import ControllerSettings, RobotSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.cell.uncertainty import (
     CommonUncertaintySettings,
+    LengthCheckSettings,
 )
 from hexacell.kinematics.commanded_motion import RefusedCommands
 from hexacell.kinematics.mechanism import Mechanism

@@ -9,7 +9,7 @@ from typing import Literal
 from pydantic import field_validator, model_validator
 
 from hexacell.cell.fields import Name, NotNegative, Positive, Section, Text, broken_rule, key
-from hexacell.storage.secrets import MASK
+from hexacell.storage.toml_document import MASK
 
 _POSTGRESQL = re.compile(r"postgresql://(?P<login>[^/@]*@)?[^/@]*/[^/?]+(?P<query>\?.*)?")
 

@@ -13,14 +13,13 @@ from pathlib import Path
 
 from pydantic import SecretStr
 
-from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.fields import LONGEST_TEXT, Password, Section
 from hexacell.cell.loader import Cell, SectionType, validated
 from hexacell.cell.model import CellSettings
+from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import FileError, UsageError
 from hexacell.storage.atomic_files import os_error_to_file_error, read_text
-from hexacell.storage.secrets import clear_secrets
-from hexacell.storage.toml_document import TomlDocument
+from hexacell.storage.toml_document import TomlDocument, clear_secrets
 
 VARIABLES = {
     "connect_password": "HEXACELL_CONNECT_PASSWORD",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Literal
 
-from hexacell.cell.controller import STARTUP_WORDS, StartupWord
 from hexacell.cell.fields import (
     GeometrySettings,
     InRange,
@@ -16,6 +15,7 @@ from hexacell.cell.fields import (
     Text,
     key,
 )
+from hexacell.cell.robot import STARTUP_WORDS, StartupWord
 
 FaultKind = Literal[
     "emergency stop",

@@ -10,7 +10,7 @@ from hexacell.cell.passwords import password_warnings
 from hexacell.cli.console import Console
 from hexacell.config.pending_write import settle_config
 from hexacell.errors import UsageError
-from hexacell.services.preflight.warnings import certificate_warnings, exposure_warnings, telling_warnings
+from hexacell.services.preflight import certificate_warnings, exposure_warnings, telling_warnings
 
 
 def cell_at(path: Path, console: Console) -> Cell:

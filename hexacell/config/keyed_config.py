@@ -28,8 +28,6 @@ from hexacell.config.interface import (
     ConfigPart,
     ControllerGeometry,
     ControllerLimits,
-)
-from hexacell.config.number_tokens import (
     NumberToken,
     number_of,
     replace_tokens,

@@ -19,8 +19,8 @@ from hexacell.config.interface import (
     ControllerGeometry,
     ControllerLimits,
     PartFormat,
+    require_physical,
 )
-from hexacell.config.number_tokens import require_physical
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch

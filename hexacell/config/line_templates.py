@@ -26,8 +26,8 @@ from typing import Any
 from pydantic import Field
 
 from hexacell.cell.fields import Text
+from hexacell.config.interface import NUMBER, NumberToken
 from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, NumberKeys, options_of
-from hexacell.config.number_tokens import NUMBER, NumberToken
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.parameters import LEGS, ParameterSet
 

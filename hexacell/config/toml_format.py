@@ -31,8 +31,9 @@ from hexacell.config.interface import (
     ControllerGeometry,
     ControllerLimits,
     JointRanges,
+    require_physical,
+    write_number,
 )
-from hexacell.config.number_tokens import require_physical, write_number
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch

@@ -17,10 +17,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
-from hexacell.config.change import ConfigChange, require_fingerprint
+from hexacell.config.change import AFTER, BEFORE, RECEIPT, ConfigChange, Receipt, require_fingerprint
 from hexacell.config.layout import Contents, fingerprint_of, read_contents
 from hexacell.config.pending_write import forget_write, note_write
-from hexacell.config.receipt import AFTER, BEFORE, RECEIPT, Receipt
 from hexacell.errors import FileError, HexacellError, WriteBackUndone
 from hexacell.storage import atomic_files
 

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 from functools import partial
 
 from hexacell.cell.loader import Cell, describe
-from hexacell.config.receipt import ConfigEditedSince
+from hexacell.config.change import ConfigEditedSince
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import HexacellError, UsageError
 from hexacell.run_process.messages import LiveSnapshot

@@ -23,8 +23,7 @@ from hexacell.screen.child import run_child
 from hexacell.screen.preferences import RESUME, WITH_LENGTH
 from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
 from hexacell.services.history.run_index import PastRun
-from hexacell.services.preflight.exclusions import toggle_exclusion
-from hexacell.services.preflight.warnings import exposure_warnings
+from hexacell.services.preflight import exposure_warnings, toggle_exclusion
 from hexacell.services.recorded.journal_soundness import read_sound
 from hexacell.services.recorded.resumption import LATEST, run_to_resume
 from hexacell.services.write_back.config_rollback import roll_back_config

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hexacell.config.change import BEFORE, ConfigVersions, NumberVersions, kept_paths
 from hexacell.config.layout import names_of
-from hexacell.config.receipt import BEFORE, ConfigVersions, NumberVersions, kept_paths
 from hexacell.config.write_record import WriteKind, WriteRecord
 from hexacell.text.layout import wrapped
 

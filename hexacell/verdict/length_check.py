@@ -9,8 +9,8 @@ import numpy as np
 
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen
-from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.model import CellSettings
+from hexacell.cell.uncertainty import LengthCheckSettings
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.problem.prior import RecordPlacement
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY

@@ -29,9 +29,8 @@ from pathlib import Path
 from drivers.errors import StartupNotPermitted
 from drivers.interfaces import Controller, StartupAction, StartupActions
 from hexacell.cell.loader import Cell
-from hexacell.config.change import ConfigChange, propose
+from hexacell.config.change import RECEIPT, ConfigChange, Receipt, propose
 from hexacell.config.layout import Contents, fingerprint, fingerprint_of, read_contents
-from hexacell.config.receipt import RECEIPT, Receipt
 from hexacell.config.write_back import commit, rollback
 from hexacell.config.write_record import THE_RUN, WriteCause, WriteKind, recorded_write
 from hexacell.errors import FileError, HexacellError, Interruption, WriteBackUndone

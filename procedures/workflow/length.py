@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.cell.length_check import LengthCheckSettings
+from hexacell.cell.uncertainty import LengthCheckSettings
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from procedures.run.keys import Phase, SetKey

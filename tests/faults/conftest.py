@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.config.receipt import AFTER
+from hexacell.config.change import AFTER
 from hexacell.runs.run_folder import RunFolder
 from procedures.journal.journal import read_journal
 from procedures.resources.controller_config import PROVISIONAL_FOLDER

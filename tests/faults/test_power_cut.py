@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.config.receipt import Receipt
+from hexacell.config.change import Receipt
 from hexacell.config.write_back import rollback
 from procedures.journal.journal import read_journal
 from tests.faults.cell import NEVER_GOOD_ENOUGH, Site, make_site

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexacell.config.linuxcnc_ini import IniText
-from hexacell.config.number_tokens import NumberToken, number_of, replace_tokens
+from hexacell.config.interface import NumberToken, number_of, replace_tokens
+from hexacell.config.linuxcnc import IniText
 from hexacell.errors import FileError
 from hexacell.storage.atomic_files import read_text
 

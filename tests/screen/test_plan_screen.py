@@ -16,7 +16,7 @@ from hexacell.screen.further_screens import PlanScreen
 from hexacell.screen.overlays import FaultOverlay
 from hexacell.screen.widgets import RowList
 from hexacell.screen.workplace import TriedPlan
-from hexacell.services.preflight.exclusions import toggle_exclusion
+from hexacell.services.preflight import toggle_exclusion
 from tests.screen.conftest import Opened, settled
 from tests.screen.test_job import press, shown, until_shown
 from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot

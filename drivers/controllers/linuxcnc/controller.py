@@ -36,7 +36,7 @@ from drivers.interfaces import (
     StartupActions,
 )
 from drivers.wire_trace import TraceRecorder
-from hexacell.cell.controller import ControllerSettings
+from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 

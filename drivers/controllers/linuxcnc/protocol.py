@@ -15,7 +15,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Self
 
-from hexacell.cell.controller import ControllerSettings
+from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import UsageError
 from hexacell.kinematics.pose import Pose
 

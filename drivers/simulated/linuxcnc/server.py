@@ -17,7 +17,7 @@ from typing import TypeVar
 
 from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Machine, TaskMode, WaitMode
 from drivers.simulated.served_device import Closeable
-from hexacell.cell.controller import ControllerSettings
+from hexacell.cell.robot import ControllerSettings
 
 HOST = "127.0.0.1"
 SERVER = "EMCNETSVR 1.1"

@@ -11,7 +11,7 @@ from typing import Any
 
 from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
-from hexacell.config.receipt import AFTER, BEFORE
+from hexacell.config.change import AFTER, BEFORE
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.runs.run_folder import CELL_FILE, JOURNAL, MEASUREMENTS, RESULT, RunFolder

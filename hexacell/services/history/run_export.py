@@ -9,13 +9,12 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from hexacell.config.change import ConfigChange
+from hexacell.config.change import AFTER, BEFORE, RECEIPT, ConfigChange
 from hexacell.config.layout import fingerprint_of
-from hexacell.config.receipt import AFTER, BEFORE, RECEIPT
 from hexacell.errors import FileError, UsageError
 from hexacell.runs.run_folder import CELL_FILE, MEASUREMENTS, RESULT, RunFolder
 from hexacell.storage import atomic_files
-from hexacell.storage.secrets import with_lines_masked, without_secrets
+from hexacell.storage.toml_document import with_lines_masked, without_secrets
 from procedures.journal.journal import read_entries
 from procedures.resources.controller_config import PROVISIONAL_FOLDER
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 
-from hexacell.config.receipt import RECEIPT, Receipt
+from hexacell.config.change import RECEIPT, Receipt
 from hexacell.errors import HexacellError, UsageError
 from hexacell.results.result import IdentificationResult
 from hexacell.runs.run_folder import RunFolder, read_attempts

@@ -1,25 +1,114 @@
-"""Delivery of a notice to one address: by webhook, MQTT or apprise, with retries, in bounded time."""
+"""A notice delivered to one address: by webhook, MQTT or apprise, with retries, in bounded time.
+
+Addresses have their secrets from the environment, or from a file of their own.
+"""
 
 from __future__ import annotations
 
 import logging
+import os
+import re
 import ssl
 import threading
 import time
 import urllib.error
 import urllib.request
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from http.client import HTTPException
+from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 
-from hexacell.cell.operation import BROKERS, WEBHOOKS, Occasion, scheme_of
-from hexacell.services.notify.address import NoticeAddress
+from hexacell.cell.fields import Password, Section
+from hexacell.cell.operation import BROKERS, WEBHOOKS, NotificationSettings, Occasion, scheme_of
+from hexacell.cell.passwords import stated_secrets
+from hexacell.errors import UsageError
 from hexacell.services.notify.notice import Notice, NoticeUndelivered
+from hexacell.storage.toml_document import MASK
 
 _log = logging.getLogger(__name__)
+
+PARTS = ("url", "user", "password", "token")
+_SHORTEST_SECRET = 3
+
+
+class AddressFile(Section):
+    """The content of a notification's ``password_file``."""
+
+    url: Password | None = None
+    user: Password | None = None
+    password: Password | None = None
+    token: Password | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NoticeAddress:
+    """A resolved address. Only ``name`` may be shown; texts by others go through :meth:`masked` first."""
+
+    name: str
+    url: str = field(repr=False)
+    user: str | None = field(default=None, repr=False)
+    password: str | None = field(default=None, repr=False)
+    token: str | None = field(default=None, repr=False)
+    topic: str = ""
+    ca_file: Path | None = None
+    open_url: str | None = None
+
+    def masked(self, text: str) -> str:
+        """A text without anything of this address that is secret."""
+        for secret in sorted(self._secrets(), key=len, reverse=True):
+            text = text.replace(secret, MASK)
+        return text
+
+    def _secrets(self) -> set[str]:
+        given = [self.user, self.password, self.token]
+        if self.open_url != self.url:
+            parts = urlsplit(self.url)
+            given += [self.url, parts.username, parts.password, parts.query, parts.fragment]
+            given += re.split(r"[/&=?;#]", f"{parts.path}&{parts.query}&{parts.fragment}")
+            given += [parts.netloc]
+        whole = {one for one in given if one and len(one) >= _SHORTEST_SECRET}
+        return whole | {unquote(one) for one in whole} | {quote(one, safe="") for one in whole}
+
+
+def variable(name: str, part: str) -> str:
+    """The variable of the environment for a part of an address."""
+    return f"HEXACELL_NOTIFY_{re.sub(r'[^A-Z0-9]+', '_', name.upper()).strip('_')}_{part.upper()}"
+
+
+def resolved_address(
+    settings: NotificationSettings,
+    cell: str,
+    folder: Path,
+    environment: Mapping[str, str] = os.environ,
+) -> NoticeAddress:
+    """The address of a recipient; ``folder`` has the cell file, ``cell`` is the cell's name.
+
+    Raises:
+        FileError: its password file cannot be read, or others can read or change it.
+        UsageError: there is no url anywhere, or a variable cannot be one.
+    """
+    file = None if settings.password_file is None else folder / settings.password_file
+    variables = {part: variable(settings.name, part) for part in PARTS}
+    stated = stated_secrets(file, AddressFile, variables, environment)
+    found = {name: value.get_secret_value() for name, value in stated.items()}
+    url = found.pop("url", settings.url)
+    if not url or "://" not in url:
+        raise UsageError(
+            "the notification has no url",
+            subject=settings.name,
+            action=f"Write url in [[notifications]] or its password_file, or set "
+            f"{variable(settings.name, 'url')}",
+        )
+    ca_file = None if settings.ca_file is None else folder / settings.ca_file
+    topic = settings.topic or f"hexacell/{re.sub(r'[#+/]', '-', cell)}"
+    return NoticeAddress(
+        settings.name, url, topic=topic.rstrip("/"), ca_file=ca_file, open_url=settings.url, **found
+    )
+
 
 PAUSES_S = (1.0, 4.0)
 """Waits before another attempt, s: a service that is just being restarted is back after them."""

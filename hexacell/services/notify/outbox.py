@@ -23,8 +23,7 @@ from hexacell.cell.loader import Cell
 from hexacell.cell.operation import NotificationSettings
 from hexacell.errors import FileError, HexacellError
 from hexacell.runs.run_folder import runs_folder
-from hexacell.services.notify.address import NoticeAddress, resolved_address
-from hexacell.services.notify.delivery import deliver
+from hexacell.services.notify.delivery import NoticeAddress, deliver, resolved_address
 from hexacell.services.notify.notice import Notice, PendingNotice, notice_id
 from hexacell.storage import atomic_files
 

@@ -14,10 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from hexacell.cell.loader import Cell
-from hexacell.config.change import ConfigChange
+from hexacell.config.change import BEFORE, RECEIPT, ConfigChange, Receipt, kept_paths
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import are_same_files, fingerprint_of, read_contents_if_present
-from hexacell.config.receipt import BEFORE, RECEIPT, Receipt, kept_paths
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import SAME_FRAMES

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
+from hexacell.config.change import Receipt
 from hexacell.config.layout import fingerprint
-from hexacell.config.receipt import Receipt
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.results.result import AcceptedResult, LengthResult

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import get_args
 
 from hexacell.cell.bundled import CONTROLLER, bundled_config
-from hexacell.cell.controller import FurtherFileSettings
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.passwords import password_path
+from hexacell.cell.robot import FurtherFileSettings
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.errors import FileError, UsageError
 from hexacell.runs.cell_lock import cell_lock, lock_path

@@ -8,13 +8,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from hexacell.cell.by_mechanism import geometry_settings
-from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.measuring import IdentificationSettings
 from hexacell.cell.model import CellSettings
-from hexacell.config.change import ConfigChange
+from hexacell.cell.robot import ControllerSettings
+from hexacell.config.change import BEFORE, ConfigChange, kept_paths
 from hexacell.config.layout import Contents, fingerprint_of, read_contents_if_present
-from hexacell.config.receipt import BEFORE, kept_paths
 from hexacell.errors import FileError, HexacellError
 from hexacell.runs.run_folder import CELL_FILE, RunFolder
 from hexacell.services.recorded.journal_soundness import require_sound

@@ -13,7 +13,7 @@ from datetime import datetime
 from pathlib import Path
 
 from hexacell.cell.loader import Cell
-from hexacell.config.receipt import Receipt
+from hexacell.config.change import Receipt
 from hexacell.config.write_record import (
     RECORDS,
     THE_RUN,

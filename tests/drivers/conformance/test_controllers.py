@@ -9,7 +9,7 @@ from drivers.conformance import ControllerConformance, ControllerTwin
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.interfaces import Controller
 from drivers.simulated.linuxcnc.server import SimulatedController
-from hexacell.cell.controller import ControllerSettings
+from hexacell.cell.robot import ControllerSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.kinematics.pose import Pose
 from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine

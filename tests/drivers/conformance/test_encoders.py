@@ -19,8 +19,8 @@ from drivers.interfaces import DeviceIdentity, EncoderBank, EncoderSample, Start
 from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
 from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.linuxcnc.server import SimulatedController
-from hexacell.cell.controller import ControllerSettings
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
+from hexacell.cell.robot import ControllerSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.clock import CellClock
 from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text

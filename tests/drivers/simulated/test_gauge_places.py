@@ -9,9 +9,9 @@ import pytest
 
 from drivers.simulated.physics import GaugePlaces
 from hexacell.cell.bundled import bundled_config
-from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedFixture
+from hexacell.cell.uncertainty import LengthCheckSettings
 
 FIXTURE = LengthCheckSettings(
     first_seat=(-150.0, 0.0, 500.0), direction=(0.6, 0.8, 0.0), distance_mm=200.0, uncertainty_mm=0.01

@@ -7,7 +7,8 @@ from typing import Any, get_args
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.cell import controller, devices, limits, measuring, model, simulation
+from hexacell.cell import devices, limits, measuring, model, simulation
+from hexacell.cell import robot as controller
 from hexacell.cell.by_mechanism import cell_model
 from hexacell.cell.loader import describe, dump, schema
 from hexacell.cell.robot import DEFAULT_MECHANISM

@@ -11,7 +11,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import dump, load_cell
 from hexacell.cell.operation import USUAL_OCCASIONS, NotificationSettings, Occasion, OccasionWord
 from hexacell.errors import FileError
-from hexacell.storage.secrets import without_secrets
+from hexacell.storage.toml_document import without_secrets
 
 OPEN_ADDRESSES = [
     "https://host:8443/a/b",

@@ -10,11 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.config.interface import ConfigFormat
+from hexacell.config.interface import ConfigFormat, write_number
 from hexacell.config.line_templates import LineTemplates
-from hexacell.config.linuxcnc_hal import HalPins
-from hexacell.config.linuxcnc_ini import LinuxcncIni
-from hexacell.config.number_tokens import write_number
+from hexacell.config.linuxcnc import HalPins, LinuxcncIni
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS
@@ -227,7 +225,7 @@ def test_pins_of_the_stock_hexapod() -> None:
 
 
 class TestWhatLinuxcncSees:
-    """As ``inivar`` of LinuxCNC 2.9 answers, see ``linuxcnc_ini``."""
+    """As ``inivar`` of LinuxCNC 2.9 answers, see ``linuxcnc``."""
 
     FORM = LinuxcncIni(HEXAGLIDE_PARAMETERS, INI)
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.config.change import ConfigChange, propose
+from hexacell.config.change import AFTER, BEFORE, ConfigChange, Receipt, propose
 from hexacell.config.layout import Contents, fingerprint, read_contents
 from hexacell.config.pending_write import (
     is_interrupted,
@@ -19,7 +19,6 @@ from hexacell.config.pending_write import (
     note_write,
     settle_interrupted_write,
 )
-from hexacell.config.receipt import AFTER, BEFORE, Receipt
 from hexacell.config.write_back import commit, restore, rollback
 from hexacell.errors import FileError, HexacellError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.config.interface import ConfigFormat
-from hexacell.config.number_tokens import write_number
+from hexacell.config.interface import ConfigFormat, write_number
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry

@@ -6,9 +6,8 @@ import pytest
 
 from hexacell.config import write_back
 from hexacell.config import write_back as replacement
-from hexacell.config.change import ConfigChange, propose
+from hexacell.config.change import ConfigChange, Receipt, propose
 from hexacell.config.layout import fingerprint
-from hexacell.config.receipt import Receipt
 from hexacell.config.toml_format import NativeToml
 from hexacell.config.write_back import commit, rollback
 from hexacell.errors import FileError, WriteBackUndone

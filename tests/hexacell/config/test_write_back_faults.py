@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from hexacell.config.change import ConfigChange, propose
+from hexacell.config.change import ConfigChange, Receipt, propose
 from hexacell.config.layout import fingerprint
-from hexacell.config.receipt import Receipt
 from hexacell.config.write_back import commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry

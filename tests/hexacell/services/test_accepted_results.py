@@ -10,8 +10,8 @@ import pytest
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
+from hexacell.config.change import RECEIPT, Receipt
 from hexacell.config.layout import fingerprint
-from hexacell.config.receipt import RECEIPT, Receipt
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.run.accepted_results import last_accepted_result
 from hexacell.verdict.decision import Verdict

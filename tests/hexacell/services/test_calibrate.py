@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from hexacell.cell.loader import load_cell
-from hexacell.config.change import ConfigChange
+from hexacell.config.change import ConfigChange, Receipt
 from hexacell.config.layout import fingerprint
-from hexacell.config.receipt import Receipt
 from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.runs.cell_lock import cell_lock

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from hexacell.cell.loader import Cell
-from hexacell.config.receipt import RECEIPT
+from hexacell.config.change import RECEIPT
 from hexacell.config.write_back import commit
 from hexacell.config.write_record import RECORDS
 from hexacell.runs.cell_lock import cell_lock

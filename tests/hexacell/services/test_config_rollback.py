@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hexacell.cell.loader import Cell
-from hexacell.config.receipt import AFTER, BEFORE, ConfigEditedSince
+from hexacell.config.change import AFTER, BEFORE, ConfigEditedSince
 from hexacell.config.write_back import commit
 from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
 from hexacell.runs.cell_lock import cell_lock

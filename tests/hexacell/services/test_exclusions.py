@@ -13,7 +13,7 @@ from hexacell.cell.limits import ExclusionSettings
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.errors import ExitCode, FileError, Interruption, UsageError
 from hexacell.kinematics.pose import Pose
-from hexacell.services.preflight.exclusions import toggle_exclusion
+from hexacell.services.preflight import toggle_exclusion
 from hexacell.services.run.calibration_run import calibrate
 from hexacell.services.run.replay_run import replay
 from hexacell.text.screens.planned_poses import exclusions_text, plan_rows

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from hexacell.cell.loader import Cell
-from hexacell.config.receipt import ConfigEditedSince, Receipt
+from hexacell.config.change import ConfigEditedSince, Receipt
 from hexacell.errors import (
     AnswerNeeded,
     CellBusy,

@@ -7,8 +7,7 @@ import tomllib
 import pytest
 
 from hexacell.errors import FileError
-from hexacell.storage.secrets import clear_secrets, with_lines_masked, without_secrets
-from hexacell.storage.toml_document import TomlDocument
+from hexacell.storage.toml_document import TomlDocument, clear_secrets, with_lines_masked, without_secrets
 
 TEXT = """\
 # a cell, and a password_file beside it

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hexacell.config.receipt import ConfigVersions, NumberVersions
+from hexacell.config.change import ConfigVersions, NumberVersions
 from hexacell.text.config_changes import versions_text
 
 VERSIONS = ConfigVersions(

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from hexacell.cell.bundled import bundled_config
-from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.loader import load_cell
-from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.cell.uncertainty import LengthCheckSettings, UncertaintySettings
 from hexacell.identification.estimator import identify
 from hexacell.measurements.records import MeasurementSet, joints_of
 from hexacell.results.result import IdentificationResult, LengthResult

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from hexacell.cell.length_check import LengthCheckSettings
+from hexacell.cell.uncertainty import LengthCheckSettings
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record, deviation_of, joints_of
 from hexacell.robot.model import Robot

@@ -28,7 +28,7 @@ WALL_CLOCKS = {
 }
 MAY_LOOK = {
     "hexacell/runs/run_folder.py": "names a run folder",
-    "hexacell/services/preflight/warnings.py": "warns; the run itself decides",
+    "hexacell/services/preflight.py": "warns; the run itself decides",
     "hexacell/services/run/calibration_run.py": "says which certificates have expired; a person decides",
     "hexacell/services/schedule/unattended_runs.py": "keeps quiet hours, and notes when a run was refused",
     "hexacell/services/history/retention.py": "says which runs are old; a person deletes them",

@@ -16,7 +16,7 @@ from drivers.errors import GaugeSilent
 from hexacell.campaign import planner
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.recovery import UnattendedRecovery
-from hexacell.config.receipt import Receipt
+from hexacell.config.change import Receipt
 from hexacell.errors import ExitCode, Interruption
 from hexacell.kinematics.pose import Pose
 from hexacell.services.run.calibration_run import calibration_of_run

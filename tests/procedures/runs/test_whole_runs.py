@@ -8,8 +8,7 @@ import tomllib
 
 import numpy as np
 
-from hexacell.config.change import ConfigChange
-from hexacell.config.receipt import Receipt
+from hexacell.config.change import ConfigChange, Receipt
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import ExitCode
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide

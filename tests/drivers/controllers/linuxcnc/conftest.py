@@ -12,7 +12,7 @@ import pytest
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.wire_trace import WireTrace
-from hexacell.cell.controller import ControllerSettings
+from hexacell.cell.robot import ControllerSettings
 
 PATIENT = Timeouts(explanation=0.05, poll=0.002)
 IMPATIENT = Timeouts(

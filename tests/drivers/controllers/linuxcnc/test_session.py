@@ -13,7 +13,7 @@ from drivers.controllers.linuxcnc.protocol import Address, Timeouts
 from drivers.errors import ConnectionLost, ResponseTimeout
 from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import WireTrace
-from hexacell.cell.controller import ControllerSettings, RotaryControllerSettings
+from hexacell.cell.robot import ControllerSettings, RotaryControllerSettings
 from hexacell.errors import DeviceError, ExitCode, UsageError
 
 HELLO = "hello EMC hexacell 1.0"

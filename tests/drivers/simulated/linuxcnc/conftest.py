@@ -13,7 +13,7 @@ from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.simulated.linuxcnc.server import HOST, SimulatedController
 from drivers.simulated.linuxcnc.state import MotionRefused
-from hexacell.cell.controller import ControllerSettings
+from hexacell.cell.robot import ControllerSettings
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, FileError
 from hexacell.kinematics.pose import Pose

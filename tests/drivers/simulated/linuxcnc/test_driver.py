@@ -22,7 +22,7 @@ from drivers.interfaces import StartupAction
 from drivers.simulated.linuxcnc.mdi import ModalState
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.linuxcnc.state import WaitMode
-from hexacell.cell.controller import ControllerSettings
+from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 from tests.drivers.simulated.linuxcnc.conftest import QUICK

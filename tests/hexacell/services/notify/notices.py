@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from hexacell.cell.operation import Occasion
-from hexacell.services.notify.address import NoticeAddress
+from hexacell.services.notify.delivery import NoticeAddress
 from hexacell.services.notify.notice import Notice
 
 

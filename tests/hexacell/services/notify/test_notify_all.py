@@ -16,7 +16,7 @@ from hexacell.cell.loader import Cell
 from hexacell.cell.operation import NotificationSettings, Occasion
 from hexacell.errors import FileError
 from hexacell.runs.run_folder import runs_folder
-from hexacell.services.notify.address import NoticeAddress
+from hexacell.services.notify.delivery import NoticeAddress
 from hexacell.services.notify.notice import Notice, NoticeUndelivered
 from hexacell.services.notify.outbox import (
     NoticeOutbox,

@@ -1,1 +1,0 @@
-"""Before a run: warnings about the cell, and the exclusions in its file."""

@@ -206,7 +206,7 @@ def _expected_zero(plan: Plan, belief: RobotBelief, point: int) -> GaugeZero:
 
 def _undetermined_parameters(plan: Plan) -> Iterator[HexacellError]:
     """The failure that even well spread poses leave many parameters as uncertain as drawn."""
-    names = plan.robot.mechanism.convention.free_names()
+    names = plan.robot.mechanism.convention.free_names
     before, predicted = plan.robot.prior, plan.predicted_belief().covariance
     after = np.sqrt(np.diag(predicted))
     if plan.robot.identifies is not ParameterChoice.ALL:

@@ -127,7 +127,7 @@ class Forecaster:
         error = self.task.error(belief)
         if error is None:
             return PointRanking(dict.fromkeys(points, math.inf), points[0])
-        error = error.of_estimate
+        error = TaskError(error.jacobian)  # that of all parameters, which records improve whatever is held
         information = PlannedInformation.of(self.sets_at(points), belief)
         gains: dict[int, float] = {}
         rates: dict[int, float] = {}

@@ -220,18 +220,14 @@ def _from_other_starts(problem: Problem, found: Identification) -> Identificatio
         if other is None:
             break
         is_better = (other.records, -cost(other)) > (best.records, -cost(best))
-        if _is_same_minimum(best, other):
+        is_near = abs(cost(other) - cost(best)) <= SAME_COST * cost(best)
+        if is_near and other.records == best.records:
             same += 1
         elif is_better:
             same = 0
         if is_better:
             best = other
     return best if best.converged else _continued(problem, best)
-
-
-def _is_same_minimum(found: Identification, other: Identification) -> bool:
-    is_near = abs(cost(other) - cost(found)) <= SAME_COST * cost(found)
-    return other.records == found.records and is_near
 
 
 def _estimates_from_other_starts(problem: Problem) -> Iterator[Identification]:

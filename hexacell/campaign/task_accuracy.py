@@ -39,11 +39,6 @@ class TaskError:
     held: HeldParameters | None = None
     gain: Array | None = None
 
-    @property
-    def of_estimate(self) -> TaskError:
-        """The error of the estimate of all parameters, which records improve whatever is held."""
-        return TaskError(self.jacobian)
-
     def variances(self, covariance: Array) -> Array:
         """Mean square distances (n,), mm^2, under a covariance (p, p) of the estimated free parameters."""
         if self.held is not None and self.gain is not None:

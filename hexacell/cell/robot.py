@@ -21,11 +21,10 @@ from hexacell.cell.fields import (
     broken_rule,
     key,
 )
-from hexacell.kinematics.encoder_scales import WithEncoderScales
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
-from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS
-from hexacell.kinematics.mechanisms.screw_legs import ScrewLegs, Screws
+from hexacell.kinematics.mechanisms.encoder_scales import WithEncoderScales
+from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS, ScrewLegs, Screws
 from hexacell.plugins import Group, load
 
 StartupWord = Literal["reset-estop", "switch-on", "home"]

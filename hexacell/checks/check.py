@@ -207,7 +207,7 @@ def identified_before(robot: Robot, covariance: Array, drift_mm: float) -> Ident
     ``drift_mm`` is the standard deviation of what each length may have changed since.
     """
     mechanism, geometry = robot.mechanism, robot.commanding
-    rows = mechanism.convention.free_rows()
+    rows = mechanism.convention.free_rows
     sigma = drift_sigma(mechanism, drift_mm, robot.tolerances)
     drift = drift_covariance(mechanism, geometry, sigma)
     return IdentifiedBefore(mechanism, geometry, covariance[np.ix_(rows, rows)], drift)

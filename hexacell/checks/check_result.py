@@ -136,7 +136,7 @@ def _changes(estimate: OnlineEstimate) -> Iterator[ParameterChange]:
     convention = belief.mechanism.convention
     change = belief.free - convention.free_parameters(belief.controller)
     sigma = np.sqrt(np.diag(belief.covariance))
-    rows = convention.free_rows()
+    rows = convention.free_rows
     for row, moved, deviation in zip(rows, change.tolist(), sigma.tolist(), strict=True):
         parameter = belief.mechanism.parameters.parameters[row]
         yield ParameterChange(

@@ -43,7 +43,7 @@ class FrameTests:
         ruled = [*convention.zero, *(name for group in convention.equal for name in group)]
         if not set(ruled) <= set(parameters.names) or len(set(ruled)) != len(ruled):
             raise AssertionError("a rule names no parameter, or one that another rule names")
-        fixed = len(parameters) - len(convention.free_names())
+        fixed = len(parameters) - len(convention.free_names)
         if fixed != len(example.mechanism.frame_freedom.columns):
             raise AssertionError(
                 f"the rules fix {fixed} numbers, the frames may be changed in "
@@ -92,7 +92,7 @@ class FrameTests:
         example = self.example
         convention = example.mechanism.convention
         all_together = _by_parameters(example, np.eye(len(example.mechanism.parameters)))
-        free = _by_parameters(example, convention.basis())
+        free = _by_parameters(example, convention.basis)
         rank = int(np.sum(all_together > LEAST_DETERMINED * all_together[0]))
         determined = len(free) - example.mechanism.frame_freedom.size
         if rank != determined:

@@ -9,12 +9,11 @@ successive halving; Spall, Introduction to Stochastic Search and Optimization, 2
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell.design.candidates import rows_apart, targets_within_limits
 from hexacell.design.predicted_records import (
@@ -26,6 +25,7 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rows import Rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,23 +78,11 @@ GainOfRecords = Callable[[PredictedRecords], Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RatedRecords:
+class RatedRecords(Rows):
     """Predicted records (n), and what each gains (n,)."""
 
     records: PredictedRecords
     gains: Array
-
-    def __len__(self) -> int:
-        return len(self.gains)
-
-    @classmethod
-    def concatenate(cls, parts: Sequence[RatedRecords]) -> RatedRecords:
-        """The records of several."""
-        records = PredictedRecords.concatenate([part.records for part in parts])
-        return cls(records, np.concatenate([part.gains for part in parts]))
-
-    def __getitem__(self, rows: NDArray[np.intp] | slice) -> RatedRecords:
-        return RatedRecords(self.records[rows], self.gains[rows])
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
@@ -14,6 +13,7 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rows import Rows
 from hexacell.kinematics.sensitivity import has_singularity_margin, margin_and_mode
 
 TWIST_PER_TILT = 2.0
@@ -38,7 +38,7 @@ class Amplitudes(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ReachableTargets:
+class ReachableTargets(Rows):
     """Poses that the estimated robot takes within its limits.
 
     Attributes:
@@ -48,18 +48,6 @@ class ReachableTargets:
 
     poses: PoseBatch
     joints: Array
-
-    @classmethod
-    def concatenate(cls, parts: Sequence[ReachableTargets]) -> ReachableTargets:
-        """The targets of several."""
-        poses = PoseBatch.concatenate(part.poses for part in parts)
-        return cls(poses, np.concatenate([part.joints for part in parts]))
-
-    def __len__(self) -> int:
-        return len(self.joints)
-
-    def __getitem__(self, rows: Mask | NDArray[np.intp] | slice) -> ReachableTargets:
-        return ReachableTargets(self.poses[rows], self.joints[rows])
 
 
 @lru_cache(maxsize=64)

@@ -57,7 +57,7 @@ def decorrelating_poses(
 
     Records keep the limits and are almost surely inside the gauges' travel.
     """
-    names = found.problem.mechanism.convention.free_names()
+    names = found.problem.mechanism.convention.free_names
     trials = list(_trials(belief, found)) if pairs else []
     return tuple(
         _best(trials, belief.covariance, (names.index(pair.first), names.index(pair.second)), pair)

@@ -5,12 +5,10 @@ Both are propagated linearly with their covariances.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell.design.candidates import ReachableTargets, commands_for
 from hexacell.design.criteria import innovation_covariance
@@ -21,6 +19,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import assembly_mode
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rows import Rows
 from hexacell.kinematics.sensitivity import (
     POSITION,
     free_sensitivity,
@@ -108,7 +107,7 @@ def position_derivatives(belief: RobotBelief, targets: ReachableTargets) -> tupl
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PredictedRecords:
+class PredictedRecords(Rows):
     """The records (n) that some targets would give.
 
     Attributes:
@@ -125,29 +124,6 @@ class PredictedRecords:
     covariance: Array
     deviation: Array
     sigma: Array
-
-    def __len__(self) -> int:
-        return len(self.targets)
-
-    def __getitem__(self, rows: Mask | NDArray[np.intp] | slice) -> PredictedRecords:
-        return PredictedRecords(
-            self.targets[rows],
-            self.jacobian[rows],
-            self.covariance[rows],
-            self.deviation[rows],
-            self.sigma[rows],
-        )
-
-    @classmethod
-    def concatenate(cls, parts: Sequence[PredictedRecords]) -> PredictedRecords:
-        """The records of several."""
-        return cls(
-            ReachableTargets.concatenate([part.targets for part in parts]),
-            np.concatenate([part.jacobian for part in parts]),
-            np.concatenate([part.covariance for part in parts]),
-            np.concatenate([part.deviation for part in parts]),
-            np.concatenate([part.sigma for part in parts]),
-        )
 
     def stay_inside(self, limits: Limits) -> Mask:
         """Which deviations surely stay inside the gauges' room, by linear propagation."""

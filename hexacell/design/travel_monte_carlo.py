@@ -36,6 +36,7 @@ from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.geometry import GeometryBatch
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rows import Rows
 from hexacell.kinematics.sensitivity import FreeSensitivity, free_sensitivity, has_singularity_margin
 from hexacell.limits.limits import Limits
 from hexacell.motion.paths import Path
@@ -151,7 +152,7 @@ class TravelConstraint:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _SampledRobots:
+class _SampledRobots(Rows):
     """Robots (r) that can take the reference pose, at n targets.
 
     Attributes:
@@ -164,23 +165,6 @@ class _SampledRobots:
     found: Mask
     deviations: Array
     leg_margins: Array
-
-    def __len__(self) -> int:
-        return len(self.found)
-
-    def at(self, targets: Mask) -> _SampledRobots:
-        """The robots at some of the targets."""
-        return _SampledRobots(
-            self.found[:, targets], self.deviations[:, targets], self.leg_margins[:, targets]
-        )
-
-    def with_others(self, others: _SampledRobots) -> _SampledRobots:
-        """These and others at the same targets."""
-        return _SampledRobots(
-            np.concatenate([self.found, others.found]),
-            np.concatenate([self.deviations, others.deviations]),
-            np.concatenate([self.leg_margins, others.leg_margins]),
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -210,9 +194,9 @@ class _Scenario:
             if not len(possible):
                 break
             more = self.sampled(variates, possible)
-            robots = more if robots is None else robots.with_others(more)
+            robots = more if robots is None else _SampledRobots.concatenate([robots, more])
             within = _nearly_all_within(robots, self.belief.limits, UNCERTAIN_SHARE)
-            possible, robots = possible[within], robots.at(within)
+            possible, robots = possible[within], robots[:, within]
         holds = np.zeros(len(self.joints) - 1, dtype=bool)
         holds[possible] = robots is not None and len(robots) >= FEWEST_SAMPLES
         return holds

@@ -21,8 +21,7 @@ from functools import cache
 import numpy as np
 
 from hexacell.distributions import normal_probability
-from hexacell.drift.carried_posterior import CarriedPosterior, StepGains, step_gains
-from hexacell.drift.run_evidence import Causes, RunEvidence
+from hexacell.drift.run_evidence import CarriedPosterior, Causes, RunEvidence, StepGains, step_gains
 from hexacell.drift.single_cause import possible_legs
 from hexacell.kinematics.rotations import Array
 

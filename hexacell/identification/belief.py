@@ -58,7 +58,7 @@ class RobotBelief:
     @property
     def basis(self) -> Array:
         """Matrix (P, p) from the free parameters to all of them."""
-        return self.mechanism.convention.basis()
+        return self.mechanism.convention.basis
 
     @cached_property
     def estimate(self) -> Geometry:

@@ -21,13 +21,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell.kinematics.forward import ForwardResult, continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.pose import AXES, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rows import Rows
 
 COMMAND_STAGES = (3,)
 """Continuation stages for a command. A pose that needs more is near a singularity and is not used."""
@@ -60,7 +60,9 @@ class RefusedCommand:
         concerned = np.asarray(poses.is_same(this))
         if self.within_deg > 0.0:
             apart = np.linalg.norm(poses.positions - this.positions, axis=-1)
-            concerned |= (apart <= self.within_mm) & (poses.angles_to(this) <= np.radians(self.within_deg))
+            cosines = 0.5 * (np.einsum("nij,ij->n", poses.rotations, this.rotations[0]) - 1.0)
+            angles = np.arccos(np.clip(cosines, -1.0, 1.0))
+            concerned |= (apart <= self.within_mm) & (angles <= np.radians(self.within_deg))
         if self.axis is None:
             return concerned
         column, sign = AXES.index(self.axis), 1.0 if self.is_highest else -1.0
@@ -97,7 +99,7 @@ class RefusedCommands:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ActualPoses:
+class ActualPoses(Rows):
     """The actual poses of n commands.
 
     Attributes:
@@ -109,9 +111,6 @@ class ActualPoses:
     poses: PoseBatch
     joints: Array
     found: Mask
-
-    def __getitem__(self, rows: NDArray[np.intp]) -> ActualPoses:
-        return ActualPoses(self.poses[rows], self.joints[rows], self.found[rows])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

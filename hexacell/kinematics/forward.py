@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.kinematics import rotations
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometries, Geometry, GeometryBatch
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -74,9 +74,7 @@ def assembly_mode(pose_jacobian: Array) -> Array:
     return signs
 
 
-def modes_of(
-    mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
-) -> Array:
+def modes_of(mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array) -> Array:
     """:func:`assembly_mode` (n,) of n poses with joint variables (n, 6), mm."""
     return assembly_mode(mechanism.residual_and_jacobian(geometry, poses, joints)[1])
 
@@ -86,74 +84,6 @@ def apply_twist(poses: PoseBatch, step: Array) -> PoseBatch:
     return PoseBatch(
         poses.positions + step[..., :3], rotations.from_vector(step[..., 3:]) @ poses.rotations
     )
-
-
-class _NewtonIteration:
-    """The iterates of n poses: ``rows`` are still active, the other poses have their final values."""
-
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        geometry: Geometry | GeometryBatch,
-        joints: Array,
-        start: PoseBatch,
-        mode: Array | None,
-        largest_contraction: float,
-    ) -> None:
-        self.positions, self.rotations = np.array(start.positions), np.array(start.rotations)
-        self.found = np.zeros(len(joints), dtype=bool)
-        self.rows = np.arange(len(joints))
-        self._mechanism, self._geometry = mechanism, geometry
-        self._joints, self._poses = joints, start
-        self._error, self._jacobian = mechanism.residual_and_jacobian(geometry, start, joints)
-        self._mode = assembly_mode(self._jacobian) if mode is None else mode
-        self._largest_contraction = largest_contraction
-        self._first_sizes: Array | None = None
-        self._contracts = np.ones(len(joints), dtype=bool)
-
-    def errors(self) -> Array:
-        """Largest absolute constraint of each active pose, mm."""
-        largest: Array = np.abs(self._error).max(axis=-1, initial=0.0)
-        return largest
-
-    def step(self) -> None:
-        """Advance all active poses by one step."""
-        step, sizes = _damped_step(self._jacobian, self._error)
-        if self._largest_contraction < np.inf:
-            self._judge(sizes)
-        self._poses = apply_twist(self._poses, step)
-        self._error, self._jacobian = self._mechanism.residual_and_jacobian(
-            self._geometry, self._poses, self._joints
-        )
-
-    def finish(self, finished: Mask, converged: Mask) -> None:
-        """Store the present values of some active poses as final; those that converged are found."""
-        if not finished.any():
-            return
-        rows = self.rows[finished]
-        self.positions[rows] = self._poses.positions[finished]
-        self.rotations[rows] = self._poses.rotations[finished]
-        rows = self.rows[converged]
-        same_mode = assembly_mode(self._jacobian[converged]) == self._mode[rows]
-        self.found[rows] = same_mode & self._contracts[rows]
-        self._keep_active(np.flatnonzero(~finished))
-
-    def _judge(self, sizes: Array) -> None:
-        """Compare the second step of each active pose with its first one, which was not to be shortened."""
-        if self._first_sizes is None:
-            self._first_sizes = np.empty(len(self._contracts))
-            self._first_sizes[self.rows] = sizes
-            self._contracts[self.rows] = sizes <= 1.0
-            return
-        contracts = sizes <= self._largest_contraction * self._first_sizes[self.rows]
-        self._contracts[self.rows] &= contracts
-        self._largest_contraction = np.inf
-
-    def _keep_active(self, kept: NDArray[np.intp]) -> None:
-        self.rows, self._poses, self._joints = self.rows[kept], self._poses[kept], self._joints[kept]
-        self._error, self._jacobian = self._error[kept], self._jacobian[kept]
-        if isinstance(self._geometry, GeometryBatch):
-            self._geometry = self._geometry.subset(kept)
 
 
 def _damped_step(jacobian: Array, error: Array) -> tuple[Array, Array]:
@@ -173,7 +103,7 @@ def _damped_step(jacobian: Array, error: Array) -> tuple[Array, Array]:
 
 def forward_kinematics(
     mechanism: Mechanism,
-    geometry: Geometry | GeometryBatch,
+    geometry: Geometries,
     joints: Array,
     start: PoseBatch,
     *,
@@ -197,22 +127,42 @@ def forward_kinematics(
     Returns:
         The poses (n), and which of them were found.
     """
-    iteration = _NewtonIteration(mechanism, geometry, joints, start, mode, largest_contraction)
-    for _ in range(max_steps):
-        errors = iteration.errors()
+    positions, orientations = np.array(start.positions), np.array(start.rotations)
+    found, contracts = np.zeros(len(joints), dtype=bool), np.ones(len(joints), dtype=bool)
+    first_sizes = np.empty(len(joints))
+    # What follows is of the active poses; the others have their final values.
+    rows, poses = np.arange(len(joints)), start
+    error, jacobian = mechanism.residual_and_jacobian(geometry, poses, joints)
+    required = assembly_mode(jacobian) if mode is None else mode
+    for number in range(max_steps + 1):
+        errors = np.abs(error).max(axis=-1, initial=0.0)
+        converged = errors < tolerance_mm
         # Written so that a pose with the error NaN, which no step can improve, is finished as well.
-        iteration.finish(~(errors >= tolerance_mm), errors < tolerance_mm)
-        if not len(iteration.rows):
+        finished = ~(errors >= tolerance_mm) | (number == max_steps)
+        if finished.any():
+            final = rows[finished]
+            positions[final], orientations[final] = poses.positions[finished], poses.rotations[finished]
+            final = rows[converged]
+            found[final] = contracts[final] & (assembly_mode(jacobian[converged]) == required[final])
+            left = np.flatnonzero(~finished)
+            rows, poses, joints = rows[left], poses[left], joints[left]
+            error, jacobian, geometry = error[left], jacobian[left], _of_rows(geometry, left)
+        if not len(rows):
             break
-        iteration.step()
-    else:
-        iteration.finish(np.ones(len(iteration.rows), dtype=bool), iteration.errors() < tolerance_mm)
-    return ForwardResult(PoseBatch(iteration.positions, iteration.rotations), iteration.found)
+        step, sizes = _damped_step(jacobian, error)
+        if largest_contraction < np.inf and number < 2:
+            # The second step is compared with the first one, which was not to be shortened.
+            if number == 0:
+                first_sizes[rows] = sizes
+            contracts[rows] &= sizes <= (largest_contraction * first_sizes[rows] if number else 1.0)
+        poses = apply_twist(poses, step)
+        error, jacobian = mechanism.residual_and_jacobian(geometry, poses, joints)
+    return ForwardResult(PoseBatch(positions, orientations), found)
 
 
 def continue_solution(
     mechanism: Mechanism,
-    geometry: Geometry | GeometryBatch,
+    geometry: Geometries,
     joints: Array,
     *,
     start: PoseBatch,
@@ -261,7 +211,7 @@ def continue_solution(
 
 def _continue_in_stages(
     mechanism: Mechanism,
-    geometries: tuple[Geometry, Geometry | GeometryBatch],
+    geometries: tuple[Geometry, Geometries],
     joints: tuple[Array, Array],
     start: PoseBatch,
     stages: int,
@@ -272,7 +222,7 @@ def _continue_in_stages(
     mode = modes_of(mechanism, geometries[0], start, joints[0])
     for stage in range(1, stages + 1):
         fraction = stage / stages
-        geometry = _between(geometries[0], _of_rows(geometries[1], rows), fraction)
+        geometry = _of_rows(geometries[1], rows).interpolate_from(geometries[0], fraction)
         stage_joints = (1.0 - fraction) * joints[0][rows] + fraction * joints[1][rows]
         tolerance_mm = TOLERANCE_MM if stage == stages else STAGE_TOLERANCE_MM
         result = forward_kinematics(
@@ -292,13 +242,6 @@ def _continue_in_stages(
     return ForwardResult(poses, found)
 
 
-def _of_rows(geometry: Geometry | GeometryBatch, rows: NDArray[np.intp]) -> Geometry | GeometryBatch:
+def _of_rows(geometry: Geometries, rows: NDArray[np.intp]) -> Geometries:
     """The geometry of some poses."""
     return geometry.subset(rows) if isinstance(geometry, GeometryBatch) else geometry
-
-
-def _between(start: Geometry, end: Geometry | GeometryBatch, fraction: float) -> Geometry | GeometryBatch:
-    """Linear interpolation between one geometry and one or many."""
-    if isinstance(end, GeometryBatch):
-        return end.interpolate_from(start, fraction)
-    return start.interpolate(end, fraction)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,8 +13,37 @@ from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.rotations import Array
 
 
+class _Numbers:
+    """What one geometry and a batch of them have in common."""
+
+    __slots__ = ()
+    parameters: ParameterSet
+    vector: Array
+    _arrays: dict[str, Array]
+
+    def __getitem__(self, symbol: str) -> Array:
+        # Newton's method asks for them at every step: the views are made once.
+        if symbol not in self._arrays:
+            self._arrays[symbol] = self.parameters.array(self.vector, symbol)
+        return self._arrays[symbol]
+
+    def once(self, name: str, compute: Callable[[], Array]) -> Array:
+        """What follows from the geometry alone, under a name that is no symbol: computed once."""
+        if name not in self._arrays:
+            self._arrays[name] = compute()
+        return self._arrays[name]
+
+    def with_numbers(self, parameters: ParameterSet, vector: Array) -> Self:
+        """Other numbers for the same poses."""
+        return type(self)(parameters, vector)  # type: ignore[call-arg]
+
+    def interpolate_from(self, start: Geometry, fraction: float) -> Self:
+        """Linear interpolation from one geometry: 0 gives ``start`` for each pose, 1 gives this."""
+        return self.with_numbers(self.parameters, (1.0 - fraction) * start.vector + fraction * self.vector)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Geometry:
+class Geometry(_Numbers):
     """The parameters of one robot, in their own units.
 
     ``vector`` (P,) is a read-only copy, in the order of ``parameters``; ``geometry["S"]`` is the array
@@ -46,18 +75,6 @@ class Geometry:
         """
         return cls(parameters, parameters.vector(values))
 
-    def __getitem__(self, symbol: str) -> Array:
-        # Newton's method asks for them at every step: the views are made once.
-        if symbol not in self._arrays:
-            self._arrays[symbol] = self.parameters.array(self.vector, symbol)
-        return self._arrays[symbol]
-
-    def once(self, name: str, compute: Callable[[], Array]) -> Array:
-        """What follows from the geometry alone, under a name that is no symbol: computed once."""
-        if name not in self._arrays:
-            self._arrays[name] = compute()
-        return self._arrays[name]
-
     def document(self) -> dict[str, Any]:
         """Nested lists under the symbols of the kinds, the form of every file."""
         return self.parameters.document(self.vector)
@@ -66,34 +83,21 @@ class Geometry:
         """Largest absolute difference of a parameter, mm; mrad of an angle."""
         return float(np.max(np.abs(self.vector - other.vector) / self.parameters.like_a_mm))
 
-    def interpolate(self, other: Geometry, fraction: float) -> Geometry:
-        """Linear interpolation: 0 gives this geometry, 1 gives ``other``."""
-        return Geometry(self.parameters, (1.0 - fraction) * self.vector + fraction * other.vector)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GeometryBatch:
-    """One geometry for each of n poses, for batched computations; ``vectors`` are (n, P)."""
+class GeometryBatch(_Numbers):
+    """One geometry for each of n poses, for batched computations; ``vector`` is (n, P)."""
 
     parameters: ParameterSet
-    vectors: Array
+    vector: Array
     _arrays: dict[str, Array] = field(default_factory=dict, init=False, repr=False)
-
-    def __getitem__(self, symbol: str) -> Array:
-        if symbol not in self._arrays:
-            self._arrays[symbol] = self.parameters.array(self.vectors, symbol)
-        return self._arrays[symbol]
-
-    def once(self, name: str, compute: Callable[[], Array]) -> Array:
-        """What follows from the geometry alone, under a name that is no symbol: computed once."""
-        if name not in self._arrays:
-            self._arrays[name] = compute()
-        return self._arrays[name]
-
-    def interpolate_from(self, start: Geometry, fraction: float) -> GeometryBatch:
-        """Linear interpolation from one geometry: 0 gives ``start`` for each pose, 1 gives this batch."""
-        return GeometryBatch(self.parameters, (1.0 - fraction) * start.vector + fraction * self.vectors)
 
     def subset(self, rows: NDArray[np.intp]) -> GeometryBatch:
         """The geometries of some poses."""
-        return GeometryBatch(self.parameters, self.vectors[rows])
+        return GeometryBatch(self.parameters, self.vector[rows])
+
+
+Geometries = Geometry | GeometryBatch
+"""One geometry for all poses, or one for each."""
+
+GeometriesType = TypeVar("GeometriesType", bound=_Numbers)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.errors import ReachError
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.parameters import GeometricParameter, JointUnit, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
@@ -53,14 +53,11 @@ class FrameConvention:
     zero: tuple[str, ...]
     equal: tuple[tuple[str, ...], ...]
 
+    @cached_property
     def basis(self) -> Array:
         """The (P, p) matrix from the free parameters to all parameters; its entries are 0 and 1."""
-        return self._basis
-
-    @cached_property
-    def _basis(self) -> Array:
         representative = {name: group[0] for group in self.equal for name in group}
-        free = self.free_names()
+        free = self.free_names
         matrix = np.zeros((len(self.parameters), len(free)))
         for row, name in enumerate(self.parameters.names):
             if name not in self.zero:
@@ -68,6 +65,7 @@ class FrameConvention:
         matrix.setflags(write=False)
         return matrix
 
+    @cached_property
     def free_names(self) -> tuple[str, ...]:
         """Names of the free parameters; a group of equal parameters has the name of its first."""
         dependent = {name for group in self.equal for name in group[1:]}
@@ -75,34 +73,25 @@ class FrameConvention:
             name for name in self.parameters.names if name not in self.zero and name not in dependent
         )
 
+    @cached_property
     def free_rows(self) -> NDArray[np.intp]:
         """Indices of the free parameters in a vector (P,) of all parameters."""
-        return self._free_rows
-
-    @cached_property
-    def _free_rows(self) -> NDArray[np.intp]:
-        return self.parameters.rows(self.free_names())
+        return self.parameters.rows(self.free_names)
 
     @cached_property
     def dependent(self) -> tuple[tuple[int, int], ...]:
         """Parameters that are equal to another one, and the free parameter that stands for both."""
         equal = [name for group in self.equal for name in group[1:]]
         rows = self.parameters.rows(equal)
-        return tuple(zip(rows.tolist(), self._columns[rows].tolist(), strict=True))
-
-    @cached_property
-    def _columns(self) -> NDArray[np.intp]:
-        """Which free parameter each parameter is (P,); -1 where it is zero."""
-        basis = self.basis()
-        return np.where(basis.any(axis=1), basis.argmax(axis=1), -1)
+        return tuple(zip(rows.tolist(), self.basis[rows].argmax(axis=1).tolist(), strict=True))
 
     def free_parameters(self, geometry: Geometry) -> Array:
         """The free parameters (p,) of a geometry in the convention's frames."""
-        return geometry.vector[self.free_rows()]
+        return geometry.vector[self.free_rows]
 
     def geometry(self, free: Array) -> Geometry:
         """The geometry of free parameters (p,)."""
-        return Geometry(self.parameters, self.basis() @ free)
+        return Geometry(self.parameters, self.basis @ free)
 
     def display_name(self, name: str) -> str:
         """The name of a parameter in text: "leg 3 length" for ``l3``, "B6 x" for ``B6x``.
@@ -170,11 +159,6 @@ class FrameTransform:
             self.base @ poses.rotations @ np.ascontiguousarray(self.platform.T),
         )
 
-    @property
-    def turns_nothing(self) -> bool:
-        """Whether poses have the same orientations in both frames."""
-        return np.array_equal(self.base, np.eye(3)) and np.array_equal(self.platform, np.eye(3))
-
     def deviations(self, deviations: Array) -> Array:
         """Differences of positions (n, 3), mm, in the new base frame."""
         return deviations @ self.base.T
@@ -235,7 +219,7 @@ class Mechanism(Protocol):
     frame_freedom: FrameFreedom
 
     def residual_and_jacobian(
-        self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+        self, geometry: Geometries, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
         """The constraints of the legs and their derivatives by the pose, for Newton's method.
 
@@ -287,11 +271,11 @@ class Mechanism(Protocol):
         """The guides on which sliders move; None for a mechanism whose words have no guide."""
         ...
 
-    def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
+    def legs(self, geometry: Geometries, poses: PoseBatch, joints: Array) -> Legs:
         """The legs in space at n poses."""
         ...
 
-    def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
+    def platform_radius(self, geometry: Geometries) -> Array:
         """Mean distance of the platform joints from the ball, mm; (n,) for a batch. It scales rotations."""
         ...
 

@@ -130,12 +130,6 @@ class PoseBatch:
         same: Mask = (distance < SAME_MM) & (angle < SAME_ANGLE)
         return same
 
-    def angles_to(self, other: PoseBatch) -> Array:
-        """Angles (n,), rad, by which n orientations are turned from another one (1)."""
-        cosines = 0.5 * (np.einsum("nij,ij->n", self.rotations, other.rotations[0]) - 1.0)
-        angles: Array = np.arccos(np.clip(cosines, -1.0, 1.0))
-        return angles
-
     def tilts(self) -> Array:
         """Angles (n,), rad, between the platform's z axis and the base's."""
         return np.arccos(np.clip(self.rotations[:, 2, 2], -1.0, 1.0))

@@ -1,11 +1,18 @@
-"""Rotation matrices from angles and from rotation vectors, batched.
+"""Rotation matrices from angles and from rotation vectors, and axes turned about x and y; batched.
 
 Convention: a pose's angles a, b, c turn about the fixed axes x, y, z in that order,
 ``R = Rz(c) Ry(b) Rx(a)`` (LinuxCNC's ``genhexkins`` and the paper's a, b, g).
+
+**Axes** are two numbers: the turns about x and y, at once, that put the z axis there.
+With the rotation vector ``(a, b, 0)``, ``t = sqrt(a^2 + b^2)``, ``s = sin t / t`` and
+``k = (1 - cos t) / t^2`` the axes x, y and z become (Rodrigues)
+
+    u = (1 - b^2 k, a b k, -b s),   w = (a b k, 1 - a^2 k, a s),   axis = (b s, -a s, cos t).
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +23,10 @@ Array = NDArray[np.floating[Any]]
 
 Mask = NDArray[np.bool_]
 
+SMALL = 1e-6
+"""Largest sine that is taken for its angle."""
+SERIES = 1e-3
+"""Angle, rad, below which the first terms of the series of k's derivative are exact to rounding."""
 
 _IDENTITY = np.eye(3)
 
@@ -74,19 +85,17 @@ def from_vector(vector: ArrayLike) -> Array:
     squared = np.einsum("...i,...i->...", vector, vector)[..., None]
     half = 0.5 * np.sqrt(squared)
     # Below this half angle the quotient is 1 to the last bit; at zero it is undefined.
-    quotient = np.sin(half) / half if half.min(initial=1.0) > 1e-9 else _sine_quotient(half)
+    if half.min(initial=1.0) > 1e-9:
+        quotient = np.sin(half) / half
+    else:
+        tiny = half < 1e-9
+        quotient = np.where(tiny, 1.0, np.sin(half) / np.where(tiny, 1.0, half))
     quadratic = 0.5 * quotient**2
     flat = (quotient * np.cos(half) * vector) @ _SKEW
     rotation: Array = flat.reshape(*vector.shape, 3)
     rotation += (quadratic * vector)[..., :, None] * vector[..., None, :]
     rotation += (1.0 - quadratic * squared)[..., None] * _IDENTITY
     return rotation
-
-
-def _sine_quotient(half: Array) -> Array:
-    tiny = half < 1e-9
-    quotient: Array = np.where(tiny, 1.0, np.sin(half) / np.where(tiny, 1.0, half))
-    return quotient
 
 
 def to_vector(rotation: ArrayLike) -> Array:
@@ -100,3 +109,61 @@ def to_vector(rotation: ArrayLike) -> Array:
     angle = np.arctan2(sine, cosine)
     scale = np.where(sine > 1e-12, angle / np.where(sine > 1e-12, sine, 1.0), 1.0)
     return axis * scale[..., None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TurnedAxes:
+    """Where the turns put x, y and z: unit vectors (..., 3), and derivatives (..., 3, 2) by the turns."""
+
+    u: Array
+    w: Array
+    axis: Array
+    u_by_turns: Array
+    w_by_turns: Array
+    axis_by_turns: Array
+
+    @classmethod
+    def by(cls, turns: Array) -> TurnedAxes:
+        """The axes by their turns (..., 2), rad."""
+        a, b = turns[..., 0], turns[..., 1]
+        angle = np.hypot(a, b)
+        s, k = np.sinc(angle / np.pi), 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+        # ``ds/da = a s_rate`` and ``dk/da = a k_rate``, likewise by b.
+        is_small = angle < SERIES
+        squared = np.where(is_small, 1.0, angle) ** 2
+        s_rate = np.where(is_small, -1.0 / 3.0 + angle**2 / 30.0, (np.cos(angle) - s) / squared)
+        k_rate = np.where(is_small, -1.0 / 12.0 + angle**2 / 180.0, (s - 2.0 * k) / squared)
+        return cls(
+            u=np.stack([1.0 - b * b * k, a * b * k, -b * s], axis=-1),
+            w=np.stack([a * b * k, 1.0 - a * a * k, a * s], axis=-1),
+            axis=np.stack([b * s, -a * s, np.cos(angle)], axis=-1),
+            u_by_turns=_rows(
+                (-b * b * a * k_rate, -2.0 * b * k - b**3 * k_rate),
+                (b * k + a * a * b * k_rate, a * k + a * b * b * k_rate),
+                (-a * b * s_rate, -s - b * b * s_rate),
+            ),
+            w_by_turns=_rows(
+                (b * k + a * a * b * k_rate, a * k + a * b * b * k_rate),
+                (-2.0 * a * k - a**3 * k_rate, -a * a * b * k_rate),
+                (s + a * a * s_rate, a * b * s_rate),
+            ),
+            axis_by_turns=_rows(
+                (a * b * s_rate, s + b * b * s_rate),
+                (-s - a * a * s_rate, -a * b * s_rate),
+                (-a * s, -b * s),
+            ),
+        )
+
+
+def turns_of(axes: Array) -> Array:
+    """The turns (..., 2), rad, of unit vectors (..., 3); of -z that about x."""
+    x, y, z = np.moveaxis(axes, -1, 0)
+    across = np.hypot(x, y)
+    is_vertical = across < SMALL
+    factor = np.where(is_vertical, 1.0, np.arctan2(across, z) / np.where(is_vertical, 1.0, across))
+    a = np.where(is_vertical & (z < 0.0), np.pi, -y * factor)
+    return np.stack([a, x * factor], axis=-1)
+
+
+def _rows(*rows: tuple[Array, Array]) -> Array:
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

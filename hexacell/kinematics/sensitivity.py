@@ -27,13 +27,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell.kinematics.forward import assembly_mode
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.mechanism import ConstraintDerivatives, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rows import Rows
 
 POSITION = 3
 POSE = 6
@@ -52,7 +52,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FreeSensitivity:
+class FreeSensitivity(Rows):
     """Derivatives of a pose by the joint variables (n, m, 6) and the free parameters (n, m, p).
 
     Rows are the ball's position, mm, then, if m is 6, the rotation vector in the base frame, rad. ``mode``
@@ -63,13 +63,8 @@ class FreeSensitivity:
     free: Array
     mode: Array
 
-    def __getitem__(self, rows: NDArray[np.intp]) -> FreeSensitivity:
-        return FreeSensitivity(self.joints[rows], self.free[rows], self.mode[rows])
 
-
-def pose_jacobian(
-    mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
-) -> Array:
+def pose_jacobian(mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array) -> Array:
     """Derivatives of the constraints by the pose.
 
     Args:
@@ -190,14 +185,14 @@ def _by_inverse(
     products = by_constraints[..., None] * linear.parameters[..., None, :, :]
     of_legs = products.reshape(*by_constraints.shape[:2], len(mechanism.parameters))
     order, convention = mechanism.parameters.leg_order, mechanism.convention
-    by_free: Array = np.take(of_legs, order[convention.free_rows()], axis=-1)
+    by_free: Array = np.take(of_legs, order[convention.free_rows], axis=-1)
     for row, column in convention.dependent:
         by_free[..., column] += of_legs[..., order[row]]
     return FreeSensitivity(by_constraints * linear.joints[..., None, :], by_free, mode)
 
 
 def singularity_margin(
-    mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+    mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array
 ) -> Array:
     """Smallest singular value (n,) of the dimensionless pose Jacobian; 0 at a singularity.
 
@@ -215,14 +210,14 @@ def singularity_margin(
 
 
 def has_singularity_margin(
-    mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array, margin: float
+    mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array, margin: float
 ) -> Mask:
     """Whether :func:`singularity_margin` is at least ``margin`` at each of n poses, computed faster."""
     return _has_margin(_dimensionless(mechanism, geometry, poses, joints), margin)
 
 
 def margin_and_mode(
-    mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array, margin: float
+    mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array, margin: float
 ) -> tuple[Mask, Array]:
     """:func:`has_singularity_margin`, and the :func:`assembly_mode` of each of n poses."""
     jacobian = _dimensionless(mechanism, geometry, poses, joints)
@@ -254,9 +249,7 @@ def _inverse_has_margin(inverse: Array, margin: float) -> Mask:
     return has_margin
 
 
-def _dimensionless(
-    mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
-) -> Array:
+def _dimensionless(mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array) -> Array:
     """The pose Jacobian with rotations scaled by the platform's mean radius."""
     scaled = pose_jacobian(mechanism, geometry, poses, joints).copy()
     scaled[..., 3:] /= np.reshape(mechanism.platform_radius(geometry), (-1, 1, 1))

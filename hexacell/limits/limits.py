@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.mechanism import SAME_FRAMES, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -172,7 +172,7 @@ class Limits:
     def allow_legs(
         self,
         mechanism: Mechanism,
-        geometry: Geometry | GeometryBatch,
+        geometry: Geometries,
         poses: PoseBatch,
         joints: Array,
         wanted: Array | float = 0.0,
@@ -183,7 +183,7 @@ class Limits:
         return self.legs.keeps(mechanism.legs(geometry, poses, joints), wanted)
 
     def leg_margins(
-        self, mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+        self, mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array
     ) -> Array:
         """By how much passive joints and legs keep their limits at n poses: (n, m), m = 0 without limits.
 

@@ -96,7 +96,9 @@ class LinesFrom:
         rows = rows[self._keeps_margin(belief.controller, commands, joints, rows)]
         actual, rows = self._trace(commands, joints, rows, thorough=thorough)
         rows = rows[self._keeps_margin(belief.estimate, actual, joints, rows)]
-        rows = rows[self._keeps_limits(actual, joints, rows)]
+        at = actual[:, rows].reshape(-1), joints[:, rows].reshape(-1, 6)
+        kept = belief.keeps_limits(*at, self._wanted_margins).reshape(len(joints), len(rows))
+        rows = rows[kept.all(axis=0)]
         is_open = np.zeros(len(ends), dtype=bool)
         is_open[rows] = True
         is_inside = is_open.copy()
@@ -121,12 +123,6 @@ class LinesFrom:
         keeps, mode = (found.reshape(shape) for found in margin_and_mode(*arguments, least))
         clear: Mask = np.all(keeps & (mode == mode[:1]), axis=0)
         return clear
-
-    def _keeps_limits(self, actual: PoseBatch, joints: Array, rows: NDArray[np.intp]) -> Mask:
-        """On which of some lines the estimated robot keeps its limits."""
-        poses, at = actual[:, rows].reshape(-1), joints[:, rows].reshape(-1, 6)
-        kept = self._belief.keeps_limits(poses, at, self._wanted_margins).reshape(len(joints), len(rows))
-        return np.asarray(kept.all(axis=0))
 
     def _trace(
         self, commands: PoseBatch, joints: Array, rows: NDArray[np.intp], *, thorough: bool

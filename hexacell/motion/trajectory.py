@@ -58,7 +58,7 @@ def interpolate_line(
     ``end`` has n poses and ``start`` one or n. The poses of n lines are ordered by piece, then by line.
     ``frames`` lead from the controller's, in whose angles it interpolates, to those of the poses.
     """
-    if not frames.turns_nothing:
+    if not all(np.array_equal(turn, np.eye(3)) for turn in (frames.base, frames.platform)):
         start, end = (frames.inverse().poses(poses) for poses in (start, end))
         return frames.poses(interpolate_line(start, end, pieces))
     fraction = np.linspace(0.0, 1.0, pieces + 1)[:, None, None]

@@ -38,8 +38,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
 from hexacell.plugins import Group, load
-from hexacell.robot.stated_effects import stated_effects
-from hexacell.robot.stated_limits import stated_limits
+from hexacell.robot.stated import stated_effects, stated_limits
 from hexacell.uncertainty.effects import Effect, errors_by_effects
 
 FARTHEST_DRAWING = 0.25
@@ -138,7 +137,7 @@ class Robot:
     def unknowns(self) -> int:
         """How many parameters are identified."""
         if self.identifies is ParameterChoice.ALL:
-            return len(self.mechanism.convention.free_names())
+            return len(self.mechanism.convention.free_names)
         return int(zero_columns(self.mechanism, self.controller).shape[1])
 
     def problem(self, measurements: MeasurementSet, before: Problem | None = None) -> Problem:

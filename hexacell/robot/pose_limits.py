@@ -27,7 +27,10 @@ def broken_limits(robot: Robot, pose: Pose) -> Iterator[str]:
     except ReachError as error:
         yield error.problem
         return
-    yield from _of_joints(robot, joints[0])
+    unit = robot.mechanism.words.joint_unit
+    for leg, (lowest, highest) in enumerate(robot.limits.joint_ranges):
+        if not lowest <= joints[0, leg] <= highest:
+            yield f"q{leg + 1} would be {joints[0, leg]:.1f} {unit}, outside {lowest:g} to {highest:g}"
     margin = singularity_margin(robot.mechanism, robot.commanding, poses, joints)[0]
     if margin < robot.limits.singularity_margin:
         yield f"the singularity margin is {margin:.3f}, below {robot.limits.singularity_margin:g}"
@@ -46,13 +49,6 @@ def _of_command(robot: Robot, pose: Pose) -> Iterator[str]:
     for axis, number, low, high in zip(AXES, numbers, axes.lowest, axes.highest, strict=True):
         if not low - ROUNDING <= number <= high + ROUNDING:
             yield f"axis {axis} would be at {number:.1f}, outside {low:g} to {high:g}"
-
-
-def _of_joints(robot: Robot, joints: Array) -> Iterator[str]:
-    unit = robot.mechanism.words.joint_unit
-    for leg, (lowest, highest) in enumerate(robot.limits.joint_ranges):
-        if not lowest <= joints[leg] <= highest:
-            yield f"q{leg + 1} would be {joints[leg]:.1f} {unit}, outside {lowest:g} to {highest:g}"
 
 
 def _of_legs(robot: Robot, poses: PoseBatch, joints: Array) -> Iterator[str]:

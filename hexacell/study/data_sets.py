@@ -6,7 +6,7 @@ deviations are differences of positions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,8 @@ from hexacell.errors import LimitError
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rows import Rows
 from hexacell.kinematics.sensitivity import has_singularity_margin
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot.model import Robot
@@ -99,24 +100,12 @@ def random_orientations(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reached:
+class Reached(Rows):
     """Commands (n), the joint variables (n, 6), mm, and the actual poses that they bring the robot to."""
 
     commands: PoseBatch
     joints: Array
     actual: PoseBatch
-
-    @classmethod
-    def concatenate(cls, parts: Sequence[Reached]) -> Reached:
-        """The commands of several."""
-        return cls(
-            PoseBatch.concatenate(part.commands for part in parts),
-            np.concatenate([part.joints for part in parts]),
-            PoseBatch.concatenate(part.actual for part in parts),
-        )
-
-    def __getitem__(self, rows: slice | Mask) -> Reached:
-        return Reached(self.commands[rows], self.joints[rows], self.actual[rows])
 
 
 def first_reached(

@@ -147,19 +147,14 @@ def _identified(chosen: ChosenRecords, count: int) -> Identification | None:
 def _accuracy(cell: Cell, robot: Robot, found: Identification, truth: Geometry) -> RecordsAccuracy:
     belief = robot.belief(found)
     error = Task.of(cell.settings, robot, belief).error(belief)
+    variances, axes = np.linalg.eigh(found.solution.information)
+    is_determined = variances[0] > ROUNDING * variances[-1]
     return RecordsAccuracy(
         found.records,
         found.geometry.largest_difference(truth),
-        _noise_mm(found),
+        float(np.sqrt(np.mean(np.sum(axes**2 / variances, axis=-1)))) if is_determined else float("inf"),
         float("nan") if error is None else error.worst(belief.covariance),
     )
-
-
-def _noise_mm(found: Identification) -> float:
-    variances, axes = np.linalg.eigh(found.solution.information)
-    if variances[0] <= ROUNDING * variances[-1]:
-        return float("inf")
-    return float(np.sqrt(np.mean(np.sum(axes**2 / variances, axis=-1))))
 
 
 @cache

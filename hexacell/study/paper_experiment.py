@@ -93,7 +93,8 @@ def run_experiment(experiment: Experiment) -> ExperimentOutcome:
         for some in (points[:CALIBRATING], points[CALIBRATING:])
     )
     scatter = experiment.repeatability_mm
-    records = _scattered(calibrating, scatter, random).measured(NOISE_MM, random)
+    off = scatter * random.standard_normal(calibrating.positions.shape)
+    records = replace(calibrating, positions=calibrating.positions + off).measured(NOISE_MM, random)
     stated = replace(robot, noise=Noise(NOISE_MM, float(np.hypot(NOISE_MM, scatter))))
     problem = stated.problem(records)
     try:
@@ -130,11 +131,6 @@ def _differences(
         return tuple(distances.ravel().tolist())
 
     return Differences(places(robot.commanding), places(found[0]), places(found[1]))
-
-
-def _scattered(measured: DataSet, scatter_mm: float, random: np.random.Generator) -> DataSet:
-    noise: Array = scatter_mm * random.standard_normal(measured.positions.shape)
-    return replace(measured, positions=measured.positions + noise)
 
 
 @cache

@@ -84,7 +84,7 @@ class LengthCheck:
         placement = records.placement
         mechanism, geometry = placement.mechanism, placement.geometry
         by_all, by_joints = position_sensitivity(mechanism, geometry, placement.poses, placement.joints)
-        jacobian = by_all @ mechanism.convention.basis()
+        jacobian = by_all @ mechanism.convention.basis
         acting = [one for one in effects if one.occurrence.is_in_records and one.name != COMMON_SCALE]
         shared = {one.name: shared_errors(records, jacobian, judged, one) for one in acting}
         by_geometry = jacobian @ covariance_factor(judged.covariance)

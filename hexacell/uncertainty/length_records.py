@@ -105,7 +105,7 @@ class JudgedGeometry:
         if COMMON_SCALE in self.parameter_columns:
             return self
         parameters = mechanism.parameters.parameters
-        rows = mechanism.convention.free_rows()
+        rows = mechanism.convention.free_rows
         is_length = np.array([parameters[row].kind.unit is ParameterUnit.MM for row in rows])
         smaller = -1e-6 * mechanism.convention.free_parameters(geometry) * is_length
         return replace(

@@ -89,7 +89,7 @@ class Assessment:
     @property
     def determines_too_little(self) -> bool:
         """Whether so many parameters are as uncertain as drawn that the geometry is hardly a result."""
-        free = self.found.problem.mechanism.convention.free_names()
+        free = self.found.problem.mechanism.convention.free_names
         unknown = set(self.undetermined) & set(free)
         identified = free if self.zeros is None else self.zeros.names
         return len(unknown) > UNDETERMINED_SHARE * len(identified)

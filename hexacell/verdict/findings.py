@@ -104,7 +104,7 @@ def _verdict(assessed: Assessment) -> str:
 
 def _incomplete(assessed: Assessment) -> str:
     convention = assessed.found.problem.mechanism.convention
-    free = convention.free_names()
+    free = convention.free_names
     names = [convention.display_name(name) for name in assessed.undetermined if name in free]
     if len(names) > NAMED_PARAMETERS:
         subject = f"{len(names)} of {len(free)} parameters are"

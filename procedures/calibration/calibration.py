@@ -32,7 +32,7 @@ from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.results.result import AcceptedResult
 from hexacell.results.written_geometry import WrittenGeometry, as_written
 from hexacell.robot.model import Robot
-from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.stated import stated_effects
 from hexacell.verdict.decision import ErrorLimits
 from hexacell.verdict.length_check import with_measured_scale
 from procedures.calibration.held_out_poses import HeldOutPoses, PosesByPoint, replacements

@@ -25,7 +25,7 @@ from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.robot.stated_limits import gauge_travel_of
+from hexacell.robot.stated import gauge_travel_of
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.guards.polling import (
     DevicePoller,

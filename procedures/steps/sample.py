@@ -14,7 +14,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import DeviceError, HexacellError, consists_only_of, joined
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Record, deviation_of
-from hexacell.robot.stated_limits import gauge_travel_of
+from hexacell.robot.stated import gauge_travel_of
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.questions import ask_mounting, ask_placement
 from procedures.run.readings import Reading, in_words

@@ -23,9 +23,9 @@ from hexacell.identification.estimator import identify
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
-from hexacell.services.study.studies import processes
 from hexacell.study.design_records import possible_targets
 from hexacell.study.design_study import SEED
+from hexacell.study.tasks import processes
 from tests.benchmarks.continuous_design import (
     Criterion,
     Design,

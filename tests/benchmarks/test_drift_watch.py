@@ -20,9 +20,8 @@ import numpy as np
 import pytest
 
 from hexacell.checks.change_alarm import machine_causes, machine_records
-from hexacell.drift.carried_posterior import CarriedPosterior
 from hexacell.drift.drift_watch import DriftWatch, StepAlarm, watch_runs
-from hexacell.drift.run_evidence import Causes, RunEvidence
+from hexacell.drift.run_evidence import CarriedPosterior, Causes, RunEvidence
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.virtual_robot import VirtualRobot

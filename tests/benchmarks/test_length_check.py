@@ -27,7 +27,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
-from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.stated import stated_effects
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_records import JudgedGeometry, LengthRecords, LengthStandard

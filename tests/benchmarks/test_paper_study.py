@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.services.study.studies import processes, run_study
 from hexacell.study.paper_simulation import PAPER, PAPER_EXACT_MM, PAPER_NOISY_MM, PaperStudy
+from hexacell.study.tasks import processes, run_study
 
 pytestmark = pytest.mark.benchmark
 

@@ -112,7 +112,7 @@ def whole_campaign(cell: Cell, robot: Robot, truth: Geometry, seed: int) -> Virt
 def drifted(known: Calibrated, drift_mm: float, number: int) -> Geometry:
     robot, random = known.robot, np.random.default_rng([SEED, number])
     convention = robot.mechanism.convention
-    rows = robot.mechanism.convention.free_rows()
+    rows = robot.mechanism.convention.free_rows
     factor = np.linalg.cholesky(known.covariance[np.ix_(rows, rows)])
     by_every = free_parameter_derivatives(robot.mechanism, robot.commanding)
     change = factor @ random.standard_normal(len(factor))

@@ -56,7 +56,7 @@ def cramer_rao_bound(robot, truth: Geometry, campaign: data_sets.DataSet) -> Arr
     """Smallest standard deviations (35,) of an unbiased estimator, mm."""
     positions = _position_of(robot, truth, campaign)
     by_joints = _by_joints(lambda joints: positions(truth, joints), campaign.joints)
-    basis = robot.mechanism.convention.basis()
+    basis = robot.mechanism.convention.basis
     vector = truth.vector.copy()
     columns = []
     for column in basis.T:

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.services.study.studies import processes, run_study
 from hexacell.study.paper_simulation import PAPER
+from hexacell.study.tasks import processes, run_study
 
 pytestmark = pytest.mark.benchmark
 

@@ -12,9 +12,8 @@ from collections.abc import Mapping
 
 import pytest
 
-from hexacell.services.study.studies import processes, run_study
 from hexacell.study.design_study import DesignOutcome, DesignTrial, run_design_trial
-from hexacell.study.tasks import Study
+from hexacell.study.tasks import Study, processes, run_study
 
 pytestmark = pytest.mark.benchmark
 

@@ -26,7 +26,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot
-from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.stated import stated_effects
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effect_kinds import (

@@ -27,7 +27,7 @@ def largest_chances(robot: Robot, known: Identification, built: Geometry, leg: i
     ``built`` is in the mechanism's frame convention.
     """
     mechanism = robot.mechanism
-    basis = mechanism.convention.basis()
+    basis = mechanism.convention.basis
     information = known.solution.information + LEAST_INFORMATION * robot.prior.precision
     covariance = basis @ np.linalg.inv(information) @ basis.T
     fitter = ToleranceFitter(mechanism, robot.drawing, robot.tolerances, built, covariance)

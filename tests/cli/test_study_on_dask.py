@@ -85,7 +85,7 @@ def test_what_cannot_be_is_refused(typed_here, arguments, words: str) -> None:
 
 
 def test_dask_may_be_absent(typed_here, monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "hexacell.services.study.dask_cluster", None)
+    monkeypatch.setitem(sys.modules, "hexacell.study.dask_cluster", None)
     refused = typed_here(*PAPER, "--scheduler", "tcp://127.0.0.1:1")
     assert refused.code == ExitCode.USAGE
     assert "Dask is not installed. Install hexacell[dask]" in refused.err

@@ -7,7 +7,7 @@ import pytest
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cell.uncertainty import UncertaintySettings
-from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.stated import stated_effects
 from hexacell.uncertainty.effects import Occurrence
 
 CONSTANTS = {

@@ -7,8 +7,8 @@ import argparse
 from hexacell.cli.console import Console
 from hexacell.cli.progress import task_bar
 from hexacell.errors import ExitCode, UsageError
-from hexacell.services.study.studies import NewExecutor, processes, run_study
 from hexacell.storage import atomic_files
+from hexacell.study.tasks import NewExecutor, processes, run_study
 from hexacell.text.studies import STUDIES
 
 
@@ -30,7 +30,7 @@ def _executors(options: argparse.Namespace) -> NewExecutor:
     if options.scheduler is None:
         return processes(options.processes)
     try:
-        from hexacell.services.study.dask_cluster import dask_cluster  # noqa: PLC0415 - an extra
+        from hexacell.study.dask_cluster import dask_cluster  # noqa: PLC0415 - an extra
     except ImportError as error:
         raise UsageError("Dask is not installed", action="Install hexacell[dask]") from error
     return dask_cluster(options.scheduler)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.prior import Prior
 from hexacell.kinematics.forward import CONTINUATION_STAGES, ForwardResult, continue_solution
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometries, Geometry, GeometryBatch
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.pose import PoseBatch
@@ -126,7 +126,7 @@ class CommandedPoses:
             joints=np.concatenate([self.joints, other.joints]),
         )
 
-    def solve_poses(self, geometry: Geometry | GeometryBatch, joints: Array) -> ForwardResult:
+    def solve_poses(self, geometry: Geometries, joints: Array) -> ForwardResult:
         """Poses that close ``geometry`` at joint variables (n, 6), mm, near the commanded ones.
 
         It is one geometry for all records, or one for each.

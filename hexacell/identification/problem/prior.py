@@ -159,7 +159,7 @@ class Prior:
         widths = tolerances.widths(mechanism.parameters)[:, None]
         factor = np.vstack([widths * by_parameters, tolerances.ball_mm * by_ball])
         own = np.vstack([np.diag(widths[:, 0]), tolerances.ball_mm * mechanism.parameters.ball_offset])
-        own_sigma = np.linalg.norm(own, axis=0)[mechanism.convention.free_rows()] / np.sqrt(3.0)
+        own_sigma = np.linalg.norm(own, axis=0)[mechanism.convention.free_rows] / np.sqrt(3.0)
         free = mechanism.convention.free_parameters(centre)
         return cls(centre, free, factor.T @ factor / 3.0, own_sigma)
 
@@ -183,7 +183,7 @@ class Prior:
     def leg_widths(self, mechanism: Mechanism) -> Array:
         """The largest tolerances (c,) of the numbers of one leg, the ball's offset included."""
         widths = np.zeros(len(mechanism.parameters))
-        widths[mechanism.convention.free_rows()] = np.sqrt(3.0 * np.diag(self.covariance))
+        widths[mechanism.convention.free_rows] = np.sqrt(3.0 * np.diag(self.covariance))
         parameters = mechanism.parameters
         largest = [parameters.array(widths, kind.symbol).max() for kind in parameters.kinds]
         return np.repeat(largest, [kind.numbers_per_leg for kind in parameters.kinds])

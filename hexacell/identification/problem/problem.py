@@ -82,12 +82,12 @@ class Problem:
     @property
     def basis(self) -> Array:
         """(P, p), from the free parameters to all parameters."""
-        return self.mechanism.convention.basis()
+        return self.mechanism.convention.basis
 
     @property
     def like_a_mm(self) -> Array:
         """What counts as much as a millimetre of each free parameter (p,)."""
-        return self.mechanism.parameters.like_a_mm[self.mechanism.convention.free_rows()]
+        return self.mechanism.parameters.like_a_mm[self.mechanism.convention.free_rows]
 
     @property
     def points(self) -> int:

@@ -261,7 +261,7 @@ class Identification:
         The difference or sum of two such parameters is known well and each of them poorly. The geometry may
         still be accurate, but a change identified in one of the two may be a change of the other.
         """
-        names = self.problem.mechanism.convention.free_names()
+        names = self.problem.mechanism.convention.free_names
         sigma = np.sqrt(np.diag(self.free_covariance))
         correlation = self.free_covariance / np.outer(sigma, sigma)
         rows, columns = np.triu_indices(len(names), 1)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.errors import UsageError
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import CLOSEST_JOINTS_MM, axes_through, by_pose
 from hexacell.kinematics.mechanism import (
     Branch,
@@ -80,9 +80,7 @@ class Hexaglide(JointedLegs):
     frame_freedom = FrameFreedom(base="x")  # the rails run along base x
     base_joint, platform_joint, length = "S", "B", "l"
 
-    def leg_vectors(
-        self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
-    ) -> tuple[Array, Array]:
+    def leg_vectors(self, geometry: Geometries, poses: PoseBatch, joints: Array) -> tuple[Array, Array]:
         # Products of small matrices are twice as fast in one layout.
         b = geometry["B"] @ np.ascontiguousarray(np.swapaxes(poses.rotations, -1, -2))
         v = geometry["S"] - poses.positions[:, None, :] - b
@@ -90,7 +88,7 @@ class Hexaglide(JointedLegs):
         return b, v
 
     def residual_and_jacobian(
-        self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+        self, geometry: Geometries, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
         b, v = self.leg_vectors(geometry, poses, joints)
         lengths = geometry["l"]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import Legs, axes_through, by_pose
 from hexacell.kinematics.mechanism import ConstraintDerivatives, FrameTransform, Guides, Mechanism
 from hexacell.kinematics.pose import PoseBatch
@@ -30,7 +30,7 @@ class JointedLegs(Mechanism):
     platform_joint: str
     length: str
 
-    def base_ends(self, geometry: Geometry | GeometryBatch, joints: Array) -> Array:
+    def base_ends(self, geometry: Geometries, joints: Array) -> Array:
         """The joints at the base's end, (n, 6, 3) or (6, 3), in the base frame, mm."""
         return geometry[self.base_joint]
 
@@ -47,19 +47,17 @@ class JointedLegs(Mechanism):
         """
         return -np.ones_like(joints), []
 
-    def lengths(self, geometry: Geometry | GeometryBatch, joints: Array) -> Array:
+    def lengths(self, geometry: Geometries, joints: Array) -> Array:
         """How long the legs should be, mm, (n, 6) or (6,)."""
         return geometry[self.length]
 
-    def leg_vectors(
-        self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
-    ) -> tuple[Array, Array]:
+    def leg_vectors(self, geometry: Geometries, poses: PoseBatch, joints: Array) -> tuple[Array, Array]:
         """R B_i (n, 6, 3), and the vectors (n, 6, 3) from the platform joints to the base's end, mm."""
         b = geometry[self.platform_joint] @ np.swapaxes(poses.rotations, -1, -2)
         return b, self.base_ends(geometry, joints) - poses.positions[:, None, :] - b
 
     def residual_and_jacobian(
-        self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+        self, geometry: Geometries, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
         b, v = self.leg_vectors(geometry, poses, joints)
         length = np.sqrt(np.einsum("nij,nij->ni", v, v))
@@ -101,12 +99,12 @@ class JointedLegs(Mechanism):
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         return None
 
-    def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
+    def legs(self, geometry: Geometries, poses: PoseBatch, joints: Array) -> Legs:
         b, v = self.leg_vectors(geometry, poses, joints)
         at_platform = poses.positions[:, None, :] + b
         return Legs(at_platform + v, at_platform, poses.rotations)
 
-    def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
+    def platform_radius(self, geometry: Geometries) -> Array:
         def compute() -> Array:
             joints = geometry[self.platform_joint]
             radius: Array = np.sqrt(np.einsum("...i,...i->...", joints, joints)).mean(axis=-1)

@@ -10,7 +10,7 @@ encoder's angle, in deg, and so is the crank's angle z where that is 0. The inve
 end is on its circle and on a sphere about the platform's joint, which has two solutions (branch).
 
 **Axes.** The axis of motor i is where turns about base x and base y, at once, put the z axis
-(:mod:`hexacell.kinematics.turned_axes`), and ``u``, ``w`` are where they put x and y. The only direction
+(:mod:`hexacell.kinematics.rotations`), and ``u``, ``w`` are where they put x and y. The only direction
 without such numbers is -z; seen from the convention's base frame, no motor's axis may point that way.
 
 **Frames.** The centre is that of the circle, so that no freedom along the axis is left. The base frame is
@@ -31,7 +31,7 @@ from dataclasses import replace
 import numpy as np
 
 from hexacell.errors import UsageError
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
     Branch,
@@ -49,8 +49,7 @@ from hexacell.kinematics.parameters import (
     ParameterUnit,
 )
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.turned_axes import TurnedAxes, turns_of
+from hexacell.kinematics.rotations import Array, TurnedAxes, turns_of
 
 ROTARY_CRANKS_PARAMETERS = ParameterSet(
     (
@@ -132,7 +131,7 @@ class RotaryCranks(JointedLegs):
     frame_freedom = FrameFreedom(size=True)
     base_joint, platform_joint, length = "centre", "platform", "rod"
 
-    def base_ends(self, geometry: Geometry | GeometryBatch, joints: Array) -> Array:
+    def base_ends(self, geometry: Geometries, joints: Array) -> Array:
         axes, (cosine, sine) = TurnedAxes.by(geometry["axis"]), _cosine_and_sine(geometry, joints)
         ends: Array = geometry["centre"] + geometry["crank"][..., None] * (axes.u * cosine + axes.w * sine)
         return ends
@@ -182,7 +181,7 @@ class RotaryCranks(JointedLegs):
     def encoder_zeros(self, geometry: Geometry) -> Array:
         return self.parameters.changes("zero", np.eye(6))
 
-    def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
+    def legs(self, geometry: Geometries, poses: PoseBatch, joints: Array) -> Legs:
         axes, (cosine, sine) = TurnedAxes.by(geometry["axis"]), _cosine_and_sine(geometry, joints)
         outward, along = axes.u * cosine + axes.w * sine, axes.w * cosine - axes.u * sine
         carriers = np.stack([outward, along, np.broadcast_to(axes.axis, outward.shape)], axis=-1)
@@ -201,7 +200,7 @@ class RotaryCranks(JointedLegs):
         return across, squares
 
 
-def _cosine_and_sine(geometry: Geometry | GeometryBatch, joints: Array) -> tuple[Array, Array]:
+def _cosine_and_sine(geometry: Geometries, joints: Array) -> tuple[Array, Array]:
     """Cosine and sine of the cranks' angles, (n, 6, 1) each."""
     angles = np.radians(geometry["zero"] + joints)[..., None]
     return np.cos(angles), np.sin(angles)

@@ -27,7 +27,7 @@ from dataclasses import replace
 import numpy as np
 
 from hexacell.errors import UsageError
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import CLOSEST_JOINTS_MM, axes_through
 from hexacell.kinematics.mechanism import (
     Branch,
@@ -41,8 +41,7 @@ from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.mechanisms.jointed_legs import JointedLegs
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.turned_axes import TurnedAxes, turns_of
+from hexacell.kinematics.rotations import Array, TurnedAxes, turns_of
 
 _SLIDER_JOINT, _PLATFORM_JOINT, _LENGTH = (
     replace(kind, default_tolerance=2.0) for kind in HEXAGLIDE_PARAMETERS.kinds
@@ -81,7 +80,7 @@ class SixRails(JointedLegs):
     frame_freedom = FrameFreedom()
     base_joint, platform_joint, length = "S", "B", "l"
 
-    def base_ends(self, geometry: Geometry | GeometryBatch, joints: Array) -> Array:
+    def base_ends(self, geometry: Geometries, joints: Array) -> Array:
         ends: Array = geometry["S"] + joints[..., None] * _directions(geometry)
         return ends
 
@@ -138,6 +137,6 @@ class SixRails(JointedLegs):
         return Guides(OWN_RAILS, along, across)
 
 
-def _directions(geometry: Geometry | GeometryBatch) -> Array:
+def _directions(geometry: Geometries) -> Array:
     """Unit vectors (..., 6, 3) along the rails."""
     return geometry.once("directions of the rails", lambda: TurnedAxes.by(geometry["rail"]).axis)

@@ -254,7 +254,7 @@ class _Event:
             yield "this is no covariance"
 
     def _effects(self, effects: dict[str, tuple[tuple[float, ...], ...]]) -> Iterator[str]:
-        free = len(self.settings.mechanism.convention.free_names())
+        free = len(self.settings.mechanism.convention.free_names)
         if any(len(row) != free for rows in effects.values() for row in rows):
             yield "an effect has another size"
 

@@ -22,7 +22,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import SAME_FRAMES
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import Robot, controller_geometry
-from hexacell.robot.stated_limits import stated_limits
+from hexacell.robot.stated import stated_limits
 from hexacell.runs.run_folder import RunFolder, find_run, run_folders, runs_folder
 from hexacell.services.recorded.recorded_robot import started_robot
 from procedures.journal.journal import RESTORE, read_entries

@@ -12,7 +12,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import Grade, UncertaintySettings
 from hexacell.kinematics.rotations import Array
-from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.stated import stated_effects
 from hexacell.uncertainty.effects import Effect as StatedEffect
 from tests.benchmarks.worlds import encoders, gauges, legs, rails
 from tests.benchmarks.worlds.effects import Effect, Only, Several

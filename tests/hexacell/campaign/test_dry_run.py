@@ -13,7 +13,7 @@ from hexacell.config.interface import ControllerGeometry
 from hexacell.dry_run.campaign import dry_run
 from hexacell.identification.solver.result import GeometryEstimate, Termination
 from hexacell.robot.model import make_robot
-from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.stated import stated_effects
 from hexacell.robot.virtual_robot import robots_within_tolerances
 from tests.geometries import hexaglide_geometry
 

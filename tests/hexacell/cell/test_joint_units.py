@@ -13,7 +13,7 @@ from hexacell.cell.loader import describe, load_cell
 from hexacell.cell.measuring import NoiseSettings
 from hexacell.errors import FileError
 from hexacell.kinematics.parameters import JointUnit
-from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.stated import stated_effects
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 JOINT_KEYS = ("joint_min", "joint_max", "encoder", "following", "spread_encoder", "repeatability", "offset")

@@ -9,8 +9,8 @@ import pytest
 
 from hexacell.cell.loader import load_cell
 from hexacell.errors import FileError
-from hexacell.kinematics.encoder_scales import WithEncoderScales
-from hexacell.kinematics.mechanisms.screw_legs import ScrewLegs
+from hexacell.kinematics.mechanisms.encoder_scales import WithEncoderScales
+from hexacell.kinematics.mechanisms.gough_stewart import ScrewLegs
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import robot_of
 

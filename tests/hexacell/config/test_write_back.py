@@ -77,7 +77,7 @@ def test_commits_are_undone_one_after_another(
     config: Path, run: Path, geometry: Geometry, proposal: ConfigChange
 ) -> None:
     first = commit(proposal, run)
-    further = geometry.interpolate(NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry, 2.0)
+    further = NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry.interpolate_from(geometry, 2.0)
     further = hexaglide_geometry(S=further["S"] + 1.0, B=further["B"], l=further["l"])
     second = commit(
         propose(

@@ -80,7 +80,7 @@ class WrongDerivative(GoughStewart):
 class OneGeometry(GoughStewart):
     def residual_and_jacobian(self, geometry, poses, joints):
         if not isinstance(geometry, Geometry):
-            geometry = Geometry(geometry.parameters, geometry.vectors[0])
+            geometry = Geometry(geometry.parameters, geometry.vector[0])
         return super().residual_and_jacobian(geometry, poses, joints)
 
 

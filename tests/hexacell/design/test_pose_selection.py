@@ -117,7 +117,7 @@ def test_the_ball_of_every_likely_robot_stays_inside_the_travel(stage, legs, hex
     goes_to = aimed_at(legs, estimate, choice, at)
     deviations = []
     for free in robots:
-        robot = Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis() @ free)
+        robot = Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis @ free)
         reference = stands(legs, robot, problem.joints[reference_row], from_where)
         deviations.append(stands(legs, robot, choice.record.targets.joints[0], goes_to)[:3] - reference[:3])
     spread = np.std(deviations, axis=0)
@@ -241,7 +241,7 @@ def test_the_jacobian_of_the_record_is_that_of_the_forward_kinematics(stage, leg
     def ball(free):
         return stands(
             legs,
-            Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis() @ free),
+            Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis @ free),
             choice.record.targets.joints[0],
             goes_to,
         )[:3]
@@ -312,7 +312,7 @@ def test_the_jacobian_of_the_zero_is_that_of_the_forward_kinematics(know, paper,
     deviations = exact.measured().deviations[rows]
 
     def at(free):
-        geometry = Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis() @ free)
+        geometry = Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis @ free)
         near = np.hstack([exact.balls[rows], Rotation.from_matrix(exact.rotations[rows]).as_rotvec()])
         found = np.array(
             [stands(legs, geometry, q, pose) for q, pose in zip(exact.joints[rows], near, strict=True)]

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.drift.carried_posterior import DIFFUSE, CarriedPosterior
 from hexacell.drift.drift_watch import CumulativeSums, alarm_limit
-from hexacell.drift.run_evidence import RunEvidence
+from hexacell.drift.run_evidence import DIFFUSE, CarriedPosterior, RunEvidence
 from tests.hexacell.drift.synthetic_runs import CAUSES, LinearRobot
 
 ROBOTS = 400

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.drift.carried_posterior import CarriedPosterior
-from hexacell.drift.run_evidence import whiten_records
+from hexacell.drift.run_evidence import CarriedPosterior, whiten_records
 from hexacell.drift.single_cause import single_cause_test
 from hexacell.identification.problem.prior import SystematicErrors
 from hexacell.kinematics.geometry import Geometry

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import ruptures
 
-from hexacell.drift.carried_posterior import CarriedPosterior, step_gains
-from hexacell.drift.run_evidence import RunEvidence
+from hexacell.drift.run_evidence import CarriedPosterior, RunEvidence, step_gains
 from tests.hexacell.drift.synthetic_runs import CAUSES, LinearRobot
 
 DIFFUSE = CarriedPosterior.diffuse(6, 0)

@@ -55,7 +55,7 @@ def test_a_common_shift_of_parallel_sliders_is_no_zero(named: str) -> None:
     assert robot.unknowns == ZEROS[named]
     assert zero_columns(robot.mechanism, robot.drawing).shape[1] == ZEROS[named]
     assert replace(robot, identifies=ParameterChoice.ALL).unknowns == len(
-        robot.mechanism.convention.free_names()
+        robot.mechanism.convention.free_names
     )
 
 
@@ -86,7 +86,7 @@ def test_what_is_held_has_its_tolerance_for_its_uncertainty(named: str) -> None:
     found = identify(robot.problem(records_without_noise(example, truth)))
     zeros = robot.identified_zeros(found)
     assert zeros is not None
-    free = robot.mechanism.convention.free_names()
+    free = robot.mechanism.convention.free_names
     held = [row for row, name in enumerate(free) if name not in zeros.names]
     np.testing.assert_allclose(zeros.free[held], zeros.held[held], atol=1e-9)
     tolerances = np.sqrt(np.diag(robot.prior.covariance))[held]

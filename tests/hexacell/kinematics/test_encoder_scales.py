@@ -15,8 +15,8 @@ from hexacell.conformance.frame_checks import records_without_noise
 from hexacell.errors import FileError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.encoder_scales import WithEncoderScales
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.encoder_scales import WithEncoderScales
 from hexacell.robot.model import Robot, config_layout, robot_of
 
 CONFIGS = Path(__file__).parents[3] / "configs"
@@ -80,7 +80,7 @@ def test_drawing_and_true_machine_have_right_scales_where_nothing_is_said(cell_w
     assert settings.simulation is not None
     assert settings.simulation.geometry.model_dump()["encoder_scale"] == (0.0,) * 6
     robot = robot_of(load_cell(cell_with(True, True)))
-    assert len(robot.mechanism.convention.free_names()) == 45 + 6
+    assert len(robot.mechanism.convention.free_names) == 45 + 6
     assert robot.mechanism.convention.display_name("encoder_scale3") == "leg 3 encoder scale"
 
 

@@ -44,7 +44,7 @@ def clear_between(hexaglide, first, second, start, joints, steps=16):
     """
     poses = start
     for step in range(steps + 1):
-        geometry = first.interpolate(second, step / steps)
+        geometry = second.interpolate_from(first, step / steps)
         result = forward_kinematics(hexaglide, geometry, joints, poses)
         if (
             not result.found[0]
@@ -57,7 +57,7 @@ def clear_between(hexaglide, first, second, start, joints, steps=16):
 
 @given(POSES, GEOMETRY_ERRORS)
 def test_continuation_to_another_geometry_and_back_is_the_identity(hexaglide, paper, pose, errors):
-    built = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + hexaglide.convention.basis() @ errors)
+    built = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + hexaglide.convention.basis @ errors)
     at = PoseBatch.of([pose])
     joints = hexaglide.inverse(paper.nominal, paper.branch, at)
     assume(not np.isnan(joints).any())

@@ -57,7 +57,11 @@ def test_a_wrong_shape_is_refused_by_name(S, B, l, name):  # noqa: E741
 def test_differences_and_the_way_between_two_geometries(paper):
     assert paper.nominal.largest_difference(paper.actual) == pytest.approx(6.059)  # l1, Table 2
     assert paper.actual.largest_difference(paper.nominal) == pytest.approx(6.059)
-    np.testing.assert_array_equal(paper.nominal.interpolate(paper.actual, 0.0).vector, paper.nominal.vector)
-    np.testing.assert_array_equal(paper.nominal.interpolate(paper.actual, 1.0).vector, paper.actual.vector)
-    quarter = paper.nominal.interpolate(paper.actual, 0.25)
+    np.testing.assert_array_equal(
+        paper.actual.interpolate_from(paper.nominal, 0.0).vector, paper.nominal.vector
+    )
+    np.testing.assert_array_equal(
+        paper.actual.interpolate_from(paper.nominal, 1.0).vector, paper.actual.vector
+    )
+    quarter = paper.actual.interpolate_from(paper.nominal, 0.25)
     assert quarter["l"][0] == pytest.approx(590 - 0.25 * 6.059)

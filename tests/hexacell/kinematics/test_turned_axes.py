@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hexacell.kinematics.turned_axes import SERIES, TurnedAxes, turns_of
+from hexacell.kinematics.rotations import SERIES, TurnedAxes, turns_of
 
 turn = st.floats(-2.0, 2.0)
 small = st.floats(-2.0 * SERIES, 2.0 * SERIES)

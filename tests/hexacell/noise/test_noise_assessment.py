@@ -23,7 +23,7 @@ from hexacell.noise.noise_assessment import (
     worthwhile_windows,
 )
 from hexacell.robot.model import noise_of, robot_of
-from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.stated import stated_effects
 from hexacell.uncertainty.effects import Occurrence
 from tests.small_cell import changed
 

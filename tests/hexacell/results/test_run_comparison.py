@@ -134,7 +134,7 @@ def test_too_few_runs_tell_no_trend(days: tuple[int, ...]) -> None:
 
 def test_parameters_that_the_convention_ties_count_once() -> None:
     """B2z, B3z and B5z are one number, as are B2y and B5y: of 38 that change 35 are free."""
-    basis = Hexaglide().convention.basis()
+    basis = Hexaglide().convention.basis
     random = np.random.default_rng(4)
     factor = 0.01 * random.standard_normal((35, 35))
     free = factor @ factor.T

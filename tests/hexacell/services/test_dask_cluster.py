@@ -16,9 +16,8 @@ import pytest
 
 from hexacell import __version__
 from hexacell.errors import UsageError
-from hexacell.services.study.dask_cluster import ClusterError, dask_cluster
-from hexacell.services.study.studies import NewExecutor
-from hexacell.study.tasks import results_of
+from hexacell.study.dask_cluster import ClusterError, dask_cluster
+from hexacell.study.tasks import NewExecutor, results_of
 from tests.dask_processes import DaskProcesses, dask_processes
 from tests.waiting import wait_until
 
@@ -186,7 +185,7 @@ def test_a_worker_with_another_version_is_named(tmp_path: Path, content: str, wo
 
 def test_a_worker_that_comes_later_with_another_version_is_named(cluster, monkeypatch) -> None:
     executor = dask_cluster(cluster.address, patience_s=LATE_S)()
-    monkeypatch.setattr("hexacell.services.study.dask_cluster.__version__", "9.9")
+    monkeypatch.setattr("hexacell.study.dask_cluster.__version__", "9.9")
     with (
         executor,
         pytest.raises(ClusterError, match=rf"tcp://127.*: has hexacell {__version__}, the study 9.9"),

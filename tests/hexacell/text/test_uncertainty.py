@@ -11,7 +11,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.robot.model import make_robot
-from hexacell.robot.stated_effects import stated_effects
+from hexacell.robot.stated import stated_effects
 from hexacell.text.identification import budget_table
 from hexacell.verdict.assessment import assess
 from hexacell.verdict.fit_document import fit_document

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.legs import Legs, axes_through, by_pose
 from hexacell.kinematics.mechanism import (
     Branch,
@@ -85,7 +85,7 @@ class Ring:
     frame_freedom = FrameFreedom(shift="z", base="z")
 
     def residual_and_jacobian(
-        self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+        self, geometry: Geometries, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
         b, v = _leg_vectors(geometry, poses, joints)
         length = np.linalg.norm(v, axis=-1)
@@ -140,32 +140,30 @@ class Ring:
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         return None
 
-    def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
+    def legs(self, geometry: Geometries, poses: PoseBatch, joints: Array) -> Legs:
         b, v = _leg_vectors(geometry, poses, joints)
         at_platform = poses.positions[:, None, :] + b
         return Legs(at_platform + v, at_platform, poses.rotations)
 
-    def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
+    def platform_radius(self, geometry: Geometries) -> Array:
         radius: Array = np.mean(np.linalg.norm(geometry["B"], axis=-1), axis=-1)
         return radius
 
 
-def _platform(geometry: Geometry | GeometryBatch, poses: PoseBatch) -> Array:
+def _platform(geometry: Geometries, poses: PoseBatch) -> Array:
     """R b_i (n, 6, 3), mm."""
     vectors: Array = geometry["B"] @ np.swapaxes(poses.rotations, -1, -2)
     return vectors
 
 
-def _angles(geometry: Geometry | GeometryBatch, joints: Array) -> Array:
+def _angles(geometry: Geometries, joints: Array) -> Array:
     """Where the carriages are on the ring (n, 6), rad."""
     ring = geometry["ring"]
     angles: Array = (ring[..., 1] + joints) / ring[..., 0]
     return angles
 
 
-def _leg_vectors(
-    geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
-) -> tuple[Array, Array]:
+def _leg_vectors(geometry: Geometries, poses: PoseBatch, joints: Array) -> tuple[Array, Array]:
     """R b_i (n, 6, 3), and the vectors (n, 6, 3) from platform joint to carriage joint, mm."""
     b, angle, ring = _platform(geometry, poses), _angles(geometry, joints), geometry["ring"]
     radius, height = ring[..., 0], np.broadcast_to(ring[..., 2], angle.shape)

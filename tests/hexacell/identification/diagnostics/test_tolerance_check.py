@@ -122,7 +122,7 @@ def test_robots_at_the_ends_of_their_tolerances_are_not_refused_for_the_noise_of
         ends = random.choice([-1.0, 1.0], 42)
         errors = np.where(random.random(42) < 1.0 / 3.0, ends, random.uniform(-1.0, 1.0, 42))
         known = estimate(Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + widths * errors), sigma=0.3)
-        free = MECHANISM.convention.basis() @ random.normal(0.0, 0.3, 35)
+        free = MECHANISM.convention.basis @ random.normal(0.0, 0.3, 35)
         moved = Geometry(HEXAGLIDE_PARAMETERS, known.geometry.vector + free)
         refused += bool(names(replace(known, geometry=moved), paper.nominal, THREE_MM))
     assert refused == 0

@@ -64,7 +64,7 @@ def test_some_of_these_data_need_the_solver_around_singularities(visit, make_pro
 @pytest.mark.parametrize("seed", range(4))
 def test_other_robots_within_the_tolerances(hexaglide, paper, visit, make_problem, seed):
     errors = np.random.default_rng(seed).uniform(-7.0, 7.0, 35)
-    true = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + hexaglide.convention.basis() @ errors)
+    true = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + hexaglide.convention.basis @ errors)
     found = identify(make_problem(visit(true, seed=seed).measured()))
     assert_exact(found, true, records=55)
 

@@ -59,7 +59,7 @@ def test_by_its_own_tolerance_a_parameter_is_as_uncertain_as_drawn(hexaglide, pa
     tolerances = Tolerances({"S": 3.0, "B": 4.0, "l": 1.5}, ball_mm=3.0)
     prior = Prior.of(hexaglide, paper.nominal, tolerances)
     expected = {"S": 3.0, "B": 5.0, "l": 1.5}
-    for name, sigma in zip(hexaglide.convention.free_names(), prior.sigma, strict=True):
+    for name, sigma in zip(hexaglide.convention.free_names, prior.sigma, strict=True):
         assert sigma == pytest.approx(expected[name[0]] / np.sqrt(3.0))
 
 
@@ -73,7 +73,7 @@ def test_the_prior_is_released_where_the_data_determine_the_parameters(paper, vi
 def test_another_drawing_gives_the_same_result(hexaglide, paper, visit, make_problem):
     measured = visit(seed=2).measured(0.01, seed=4)
     errors = np.random.default_rng(1).uniform(-3.0, 3.0, 35)
-    other = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + hexaglide.convention.basis() @ errors)
+    other = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + hexaglide.convention.basis @ errors)
     here, there = (identify(make_problem(measured, drawing=drawing)) for drawing in (paper.nominal, other))
     assert here.geometry.largest_difference(there.geometry) < 1e-5
 

@@ -99,7 +99,7 @@ def test_encoder_noise_and_gauge_noise_both_reduce_accuracy(noisy, make_problem)
 
 def test_pairs_are_those_of_repeated_measurements(repeated, hexaglide):
     """Against the correlation of 40 estimates, good to (1 - rho^2) / sqrt(40)."""
-    names = hexaglide.convention.free_names()
+    names = hexaglide.convention.free_names
     seen = np.corrcoef(np.array([found.free for found in repeated]).T)
     pairs = repeated[0].strongly_correlated()
     assert pairs

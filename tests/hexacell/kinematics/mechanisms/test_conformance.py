@@ -10,7 +10,7 @@ import numpy as np
 from hexacell.cell.loader import load_cell
 from hexacell.conformance import MechanismConformance, MechanismExample
 from hexacell.kinematics.mechanisms.six_rails import SixRails
-from hexacell.kinematics.turned_axes import turns_of
+from hexacell.kinematics.rotations import turns_of
 from hexacell.robot.model import robot_of
 from tests.geometries import six_rails_geometry
 

@@ -123,14 +123,14 @@ def test_a_geometry_in_other_frames_predicts_the_same_differences(hexaglide, pap
 
 
 def test_the_free_parameters_are_35_and_named(hexaglide):
-    free = hexaglide.convention.free_names()
+    free = hexaglide.convention.free_names
     assert len(free) == 35
     fixed = set(HEXAGLIDE_PARAMETERS.names) - set(free)
     assert fixed == {"S2x", "S2y", "S2z", "S3z", "B3z", "B5z", "B5y"}
 
 
 def test_the_basis_spreads_free_parameters_over_all(hexaglide):
-    basis, free = hexaglide.convention.basis(), hexaglide.convention.free_names()
+    basis, free = hexaglide.convention.basis, hexaglide.convention.free_names
     assert basis.shape == (42, 35)
     geometry = Geometry(HEXAGLIDE_PARAMETERS, basis @ np.arange(1.0, 36.0))
     assert obeys_the_rules(geometry)
@@ -154,7 +154,7 @@ def test_the_rank_of_the_sensitivity_does_not_give_the_number_of_free_parameters
 
     visible = np.linalg.svd(differences, compute_uv=False)
     assert (visible > 1e-9 * visible[0]).sum() == rank
-    free = np.linalg.svd(differences @ hexaglide.convention.basis(), compute_uv=False)
+    free = np.linalg.svd(differences @ hexaglide.convention.basis, compute_uv=False)
     assert free[-1] > 1e-4 * free[0]
 
 
@@ -186,7 +186,7 @@ def a_small_change(column: int, size: float = 1e-3) -> FrameTransform:
 def test_just_the_free_changes_of_frames_leave_a_geometry_that_is_the_same_machine(mechanism: Mechanism):
     free = mechanism.frame_freedom.columns
     convention = mechanism.convention
-    assert len(mechanism.parameters) - len(convention.free_names()) == len(free)
+    assert len(mechanism.parameters) - len(convention.free_names) == len(free)
     random = np.random.default_rng(3)
     geometry = Geometry(mechanism.parameters, random.uniform(100.0, 300.0, len(mechanism.parameters)))
     poses = PoseBatch(

@@ -92,7 +92,7 @@ def test_offsets_of_zero_are_whole_lengths() -> None:
 
 def test_33_of_42_parameters_are_free() -> None:
     assert len(GOUGH_STEWART_PARAMETERS) == 42
-    assert len(THREE_LEGS_FRAME.free_names()) == 33
+    assert len(THREE_LEGS_FRAME.free_names) == 33
     assert not GOUGH_STEWART_PARAMETERS.has_branch
 
 

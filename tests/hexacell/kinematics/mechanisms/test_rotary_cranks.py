@@ -18,7 +18,7 @@ from hexacell.kinematics.mechanisms.rotary_cranks import (
 )
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.turned_axes import turns_of
+from hexacell.kinematics.rotations import turns_of
 from hexacell.robot.model import robot_of
 from tests.geometries import rotary_cranks_geometry
 
@@ -74,7 +74,7 @@ def test_a_larger_machine_has_the_same_angles(drawing: Geometry) -> None:
 
 def test_57_of_66_parameters_are_free() -> None:
     assert len(ROTARY_CRANKS_PARAMETERS) == 66
-    assert len(THREE_CENTRES_FRAME.free_names()) == 57
+    assert len(THREE_CENTRES_FRAME.free_names) == 57
 
 
 def test_an_axis_that_points_down_is_refused(drawing: Geometry) -> None:

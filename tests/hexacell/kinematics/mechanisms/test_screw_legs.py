@@ -13,8 +13,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.conformance import MechanismConformance, MechanismExample
 from hexacell.conformance.frame_checks import LEAST_DETERMINED, _by_parameters
 from hexacell.kinematics.forward import apply_twist
-from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart
-from hexacell.kinematics.mechanisms.screw_legs import ScrewLegs, Screws
+from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart, ScrewLegs, Screws
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import robot_of
@@ -76,12 +75,12 @@ class TestConformance(MechanismConformance):
             per_leg = MECHANISM.parameters.numbers_per_leg
             of_legs = found.parameters[:, :, None, :] * np.eye(6)[..., None]
             all_of_them = of_legs.reshape(*joints.shape, 6 * per_leg)[..., MECHANISM.parameters.leg_order]
-            compare(all_of_them @ convention.basis(), by_parameters, np.full(len(free), 1e-3))
+            compare(all_of_them @ convention.basis, by_parameters, np.full(len(free), 1e-3))
             compare(found.pose, by_twist, np.repeat([1e-3, 1e-6], 3))
 
     def test_the_free_parameters_are_those_that_poses_determine(self) -> None:
         """The others are derived as if their joints took no axes with them, so they tell nothing."""
-        sizes = _by_parameters(self.example, MECHANISM.convention.basis())
+        sizes = _by_parameters(self.example, MECHANISM.convention.basis)
         assert sizes[-1] > LEAST_DETERMINED * sizes[0]
 
 

@@ -59,7 +59,7 @@ def drawing() -> Geometry:
 
 @pytest.fixture(scope="module")
 def truth(drawing: Geometry) -> Geometry:
-    errors = np.random.default_rng(4).uniform(-1.0, 1.0, len(CONVENTION.free_names()))
+    errors = np.random.default_rng(4).uniform(-1.0, 1.0, len(CONVENTION.free_names))
     return CONVENTION.geometry(CONVENTION.free_parameters(drawing) + errors)
 
 

@@ -17,7 +17,7 @@ from hexacell.kinematics.mechanisms.six_rails import (
     SixRails,
 )
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.turned_axes import TurnedAxes, turns_of
+from hexacell.kinematics.rotations import TurnedAxes, turns_of
 from tests.geometries import six_rails_geometry
 
 STEP = 1e-30  # complex steps need no compromise between rounding and truncation
@@ -145,7 +145,7 @@ def test_a_pose_out_of_reach_is_nan() -> None:
 
 def test_45_of_54_parameters_are_free() -> None:
     assert len(SIX_RAILS_PARAMETERS) == 54
-    assert len(FIRST_RAIL_FRAME.free_names()) == 45
+    assert len(FIRST_RAIL_FRAME.free_names) == 45
 
 
 def test_rail_1_and_slider_3_are_the_base_frame() -> None:

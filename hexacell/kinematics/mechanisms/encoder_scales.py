@@ -12,11 +12,10 @@ shows it. How large it is, the tolerances alone determine (``size`` of
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import overload
 
 import numpy as np
 
-from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometries, GeometriesType, Geometry
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
     Branch,
@@ -41,8 +40,8 @@ ENCODER_SCALE = ParameterKind(
 )
 
 
-class WithEncoderScales:
-    """A :class:`~hexacell.kinematics.mechanism.Mechanism`: another one with errors of scale."""
+class WithEncoderScales(Mechanism):
+    """Another mechanism, the ``exact`` one, with errors of scale."""
 
     def __init__(self, exact: Mechanism) -> None:
         self.exact = exact
@@ -54,14 +53,14 @@ class WithEncoderScales:
         self.frame_freedom = replace(exact.frame_freedom, size=True)
 
     def residual_and_jacobian(
-        self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+        self, geometry: Geometries, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
-        """Length errors of the legs (n, 6), mm, and their derivatives by the pose (n, 6, 6)."""
-        return self.exact.residual_and_jacobian(self._exact(geometry), poses, _actual(geometry, joints))
+        return self.exact.residual_and_jacobian(
+            self.without_scales(geometry), poses, _actual(geometry, joints)
+        )
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
-        """Derivatives of the legs' length errors by pose, joint variables and parameters."""
-        exact = self.exact.derivatives(self._exact(geometry), poses, _actual(geometry, joints))
+        exact = self.exact.derivatives(self.without_scales(geometry), poses, _actual(geometry, joints))
         by_scale = (exact.joints * joints)[..., None]
         return ConstraintDerivatives(
             pose=exact.pose,
@@ -70,64 +69,46 @@ class WithEncoderScales:
         )
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """Joint variables (n, 6) at n poses; NaN out of reach."""
-        actual = self.exact.inverse(self._exact(geometry), branch, poses)
+        actual = self.exact.inverse(self.without_scales(geometry), branch, poses)
         shown: Array = actual / (1.0 + geometry["encoder_scale"])
         return shown
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """The inverse solution, -1 or 1, that each leg is on (n, 6)."""
-        return self.exact.branch(self._exact(geometry), poses, _actual(geometry, joints))
+        return self.exact.branch(self.without_scales(geometry), poses, _actual(geometry, joints))
 
     def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
-        """The machine in the frames of the convention, and the change of frames."""
-        exact, change = self.exact.normalize_frames(self._exact(geometry))
+        exact, change = self.exact.normalize_frames(self.without_scales(geometry))
         return self.with_scales(exact, geometry["encoder_scale"]), change
 
     def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
-        """The geometry of the machine in other frames."""
-        changed = self.exact.change_frames(self._exact(geometry), change)
+        changed = self.exact.change_frames(self.without_scales(geometry), change)
         return self.with_scales(changed, geometry["encoder_scale"])
 
     def encoder_zeros(self, geometry: Geometry) -> Array:
         """The exact mechanism's, by as much as an encoder stands for that shows 1 less."""
-        exact = self.exact.encoder_zeros(self._exact(geometry)) * (1.0 + geometry["encoder_scale"])
-        return np.vstack([exact, np.zeros((len(self.parameters) - len(exact), exact.shape[1]))])
+        zeros = self.exact.encoder_zeros(self.without_scales(geometry)) * (1.0 + geometry["encoder_scale"])
+        return np.vstack([zeros, np.zeros((len(self.parameters) - len(zeros), zeros.shape[1]))])
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
-        """The guides of the sliders at n poses."""
-        return self.exact.guides(self._exact(geometry), poses, _actual(geometry, joints))
+        return self.exact.guides(self.without_scales(geometry), poses, _actual(geometry, joints))
 
-    def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
-        """The legs in space at n poses."""
-        return self.exact.legs(self._exact(geometry), poses, _actual(geometry, joints))
+    def legs(self, geometry: Geometries, poses: PoseBatch, joints: Array) -> Legs:
+        return self.exact.legs(self.without_scales(geometry), poses, _actual(geometry, joints))
 
-    def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
-        """Mean distance of the platform joints from the ball, mm."""
-        return self.exact.platform_radius(self._exact(geometry))
+    def platform_radius(self, geometry: Geometries) -> Array:
+        return self.exact.platform_radius(self.without_scales(geometry))
 
     def with_scales(self, exact: Geometry, scales: Array) -> Geometry:
         """A geometry of the exact mechanism with errors of scale (6,)."""
         return Geometry(self.parameters, np.concatenate([exact.vector, scales]))
 
-    def without_scales(self, geometry: Geometry) -> Geometry:
-        """The geometry of the exact mechanism."""
-        return Geometry(self.exact.parameters, geometry.vector[: len(self.exact.parameters)])
-
-    @overload
-    def _exact(self, geometry: Geometry) -> Geometry: ...
-
-    @overload
-    def _exact(self, geometry: Geometry | GeometryBatch) -> Geometry | GeometryBatch: ...
-
-    def _exact(self, geometry: Geometry | GeometryBatch) -> Geometry | GeometryBatch:
-        if isinstance(geometry, Geometry):
-            return self.without_scales(geometry)
+    def without_scales(self, geometry: GeometriesType) -> GeometriesType:
+        """The geometry of the exact mechanism, or one for each pose."""
         own = self.exact.parameters
-        return GeometryBatch(own, geometry.vectors[:, : len(own)])
+        return geometry.with_numbers(own, geometry.vector[..., : len(own)])
 
 
-def _actual(geometry: Geometry | GeometryBatch, joints: Array) -> Array:
+def _actual(geometry: Geometries, joints: Array) -> Array:
     """The joint variables (n, 6) of those that the encoders show."""
     actual: Array = joints * (1.0 + geometry["encoder_scale"])
     return actual

@@ -25,7 +25,7 @@ from distributed.scheduler import KilledWorker
 
 from hexacell import __version__
 from hexacell.errors import ExitCode, HexacellError, UsageError
-from hexacell.services.study.studies import NewExecutor
+from hexacell.study.tasks import NewExecutor
 
 PATIENCE_S = 30.0
 """For a scheduler that does not answer, and for one that has no workers."""

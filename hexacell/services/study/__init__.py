@@ -1,1 +1,0 @@
-"""A study carried out by processes of this computer or by a Dask cluster."""

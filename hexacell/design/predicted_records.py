@@ -16,14 +16,13 @@ from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.forward import assembly_mode
+from hexacell.kinematics.forward import modes_of
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.rows import Rows
 from hexacell.kinematics.sensitivity import (
     POSITION,
     free_sensitivity,
-    pose_jacobian,
     sensitivity_and_margin,
 )
 from hexacell.limits.limits import Limits
@@ -64,7 +63,7 @@ class GaugeZero:
     def mode(self, belief: RobotBelief) -> Array:
         """The assembly mode (1,) of the estimated robot at the reference."""
         target = self.target
-        return assembly_mode(pose_jacobian(belief.mechanism, belief.estimate, target.poses, target.joints))
+        return modes_of(belief.mechanism, belief.estimate, target.poses, target.joints)
 
 
 def estimate_gauge_zero(

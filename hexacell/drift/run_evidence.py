@@ -42,7 +42,7 @@ from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.linear_model import systematic_errors
 from hexacell.identification.solver.measurement_model import NuisanceElimination, predict
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import position_sensitivity
+from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
 
 DIFFUSE = 1e2
 """Standard deviation of a free parameter of which nothing is known, mm or rad."""
@@ -132,7 +132,7 @@ def whiten_records(
     residuals = prediction.residuals
     if expansion is not None:
         at = problem.mechanism, problem.geometry(prediction.free), prediction.poses, kept.joints
-        by_parameters, _ = position_sensitivity(*at)
+        by_parameters = pose_sensitivity(*at, POSITION).parameters
         residuals = residuals + np.einsum("nip,np->ni", by_parameters, expansion[solved.found])
     shared = systematic_errors(kept, prediction)
     own = systematic_errors(replace(kept, systematic=of_this_run), prediction)

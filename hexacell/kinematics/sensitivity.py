@@ -42,9 +42,9 @@ POSE = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """Derivatives of a pose by the joint variables (n, 6, 6) and the parameters (n, 6, P).
+    """Derivatives of a pose by the joint variables (n, m, 6) and the parameters (n, m, P).
 
-    Rows are the ball's position, mm, then the rotation vector in the base frame, rad.
+    Rows are the ball's position, mm, then, if m is 6, the rotation vector in the base frame, rad.
     """
 
     joints: Array
@@ -64,23 +64,8 @@ class FreeSensitivity(Rows):
     mode: Array
 
 
-def pose_jacobian(mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array) -> Array:
-    """Derivatives of the constraints by the pose.
-
-    Args:
-        mechanism: of the robot.
-        geometry: one for all poses, or one for each.
-        poses: n poses.
-        joints: joint variables (n, 6), in their unit.
-
-    Returns:
-        Derivatives (n, 6, 6) by the ball's position, mm, and the rotation vector, rad.
-    """
-    return mechanism.residual_and_jacobian(geometry, poses, joints)[1]
-
-
 def pose_sensitivity(
-    mechanism: Mechanism, geometry: Geometry, poses: PoseBatch, joints: Array
+    mechanism: Mechanism, geometry: Geometry, poses: PoseBatch, joints: Array, coordinates: int = POSE
 ) -> Sensitivity:
     """Derivatives ``-J_pose^-1 J`` of n poses that close the mechanism, by joints and all parameters.
 
@@ -89,45 +74,24 @@ def pose_sensitivity(
         geometry: of the robot.
         poses: n poses.
         joints: joint variables (n, 6), in their unit.
+        coordinates: ``POSITION`` or ``POSE``.
 
     Raises:
         LinAlgError: a pose is exactly at a singularity.
     """
     linear = mechanism.derivatives(geometry, poses, joints)
-    by_constraints = -np.linalg.inv(linear.pose)
+    by_constraints = -np.linalg.inv(linear.pose)[:, :coordinates]
+    of_legs = _by_numbers_of_legs(by_constraints, linear)
     return Sensitivity(
         joints=by_constraints * linear.joints[..., None, :],
-        parameters=_by_parameters(mechanism, by_constraints, linear),
+        parameters=np.take(of_legs, mechanism.parameters.leg_order, axis=-1),
     )
 
 
-def position_sensitivity(
-    mechanism: Mechanism, geometry: Geometry, poses: PoseBatch, joints: Array
-) -> tuple[Array, Array]:
-    """Derivatives of the ball's position at n poses that close the mechanism.
-
-    Args:
-        mechanism: of the robot.
-        geometry: of the robot.
-        poses: n poses.
-        joints: joint variables (n, 6), in their unit.
-
-    Returns:
-        Derivatives (n, 3, P) by all parameters and (n, 3, 6) by the joint variables, mm per unit of each.
-
-    Raises:
-        LinAlgError: a pose is exactly at a singularity.
-    """
-    linear = mechanism.derivatives(geometry, poses, joints)
-    by_constraints = -np.linalg.inv(linear.pose)[:, :3]
-    return _by_parameters(mechanism, by_constraints, linear), by_constraints * linear.joints[..., None, :]
-
-
-def _by_parameters(mechanism: Mechanism, by_constraints: Array, linear: ConstraintDerivatives) -> Array:
-    """Derivatives (n, m, P) by the parameters, from those by the constraints (n, m, 6)."""
+def _by_numbers_of_legs(by_constraints: Array, linear: ConstraintDerivatives) -> Array:
+    """Derivatives (n, m, P) by the numbers of leg 1, 2, ..., from those by the constraints (n, m, 6)."""
     products = by_constraints[..., None] * linear.parameters[..., None, :, :]
-    flat: Array = products.reshape(*by_constraints.shape[:2], len(mechanism.parameters))
-    return np.take(flat, mechanism.parameters.leg_order, axis=-1)
+    return products.reshape(*by_constraints.shape[:2], -1)
 
 
 def free_sensitivity(
@@ -182,8 +146,7 @@ def _by_inverse(
 ) -> FreeSensitivity:
     """The sensitivity by the inverses (n, 6, 6) of the pose Jacobians."""
     by_constraints = -inverse[:, :coordinates]
-    products = by_constraints[..., None] * linear.parameters[..., None, :, :]
-    of_legs = products.reshape(*by_constraints.shape[:2], len(mechanism.parameters))
+    of_legs = _by_numbers_of_legs(by_constraints, linear)
     order, convention = mechanism.parameters.leg_order, mechanism.convention
     by_free: Array = np.take(of_legs, order[convention.free_rows], axis=-1)
     for row, column in convention.dependent:
@@ -251,6 +214,6 @@ def _inverse_has_margin(inverse: Array, margin: float) -> Mask:
 
 def _dimensionless(mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array) -> Array:
     """The pose Jacobian with rotations scaled by the platform's mean radius."""
-    scaled = pose_jacobian(mechanism, geometry, poses, joints).copy()
+    scaled = mechanism.residual_and_jacobian(geometry, poses, joints)[1].copy()
     scaled[..., 3:] /= np.reshape(mechanism.platform_radius(geometry), (-1, 1, 1))
     return scaled

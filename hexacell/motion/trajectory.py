@@ -23,12 +23,11 @@ from itertools import pairwise
 import numpy as np
 
 from hexacell.kinematics import rotations
-from hexacell.kinematics.forward import assembly_mode, forward_kinematics
+from hexacell.kinematics.forward import forward_kinematics, modes_of
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import SAME_FRAMES, Branch, FrameTransform, Mechanism
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import pose_jacobian
 
 PIECES = 12
 PIECES_BETWEEN_WAYPOINTS = 4
@@ -102,8 +101,7 @@ def trace_path(
         The poses (pieces + 1, n), and the lines (n,) along which the robot stays on its assembly mode;
         on the others the poses are undefined.
     """
-    jacobian = pose_jacobian(mechanism, geometry, start, joints[0, :1])
-    robot = _Robot(mechanism, geometry, assembly_mode(jacobian))
+    robot = _Robot(mechanism, geometry, modes_of(mechanism, geometry, start, joints[0, :1]))
     actual, converged = robot.correct(joints, _predict(commands[:1], commands, start.reshape(1, 1)))
     confirmed: Mask = np.all(converged, axis=0)
     suspect = np.flatnonzero(confirmed & _may_have_jumped(commands, actual))

@@ -21,7 +21,7 @@ from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import position_sensitivity
+from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
 from hexacell.noise.approach_scatter import RepeatedApproaches, approach_scatter
 from hexacell.noise.measured_noise import (
     AveragingForecast,
@@ -114,7 +114,8 @@ class _NoiseAssessment:
         robot, visits, least = self.plan.robot, self.readings.visits, self._at_least(self.stated)
         commands = robot.from_commands([self.readings.reference])
         joints = robot.mechanism.inverse(robot.commanding, robot.branch, commands)
-        _, by_joints = position_sensitivity(robot.mechanism, robot.commanding, commands, joints)
+        at = robot.mechanism, robot.commanding, commands, joints
+        by_joints = pose_sensitivity(*at, POSITION).joints
         in_base = robot.frames.base.T @ by_joints[0]
         unit = robot.mechanism.words.joint_unit
         return approach_scatter(visits[:, :3], visits[:, 3:], in_base, least[3:], least[:3], unit)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hexacell.cell.limits import LimitSettings
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import (
-    CommonUncertaintySettings,
     LinearUncertaintySettings,
     RotaryUncertaintySettings,
     UncertaintySettings,
@@ -18,7 +16,7 @@ from hexacell.config.interface import ControllerGeometry, ControllerLimits
 from hexacell.errors import ReachError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.legs import Legs
-from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, MechanismWords, joint_zeros
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, joint_zeros
 from hexacell.kinematics.parameters import LEGS, MachinePart
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -52,6 +50,7 @@ def stated_limits(settings: CellSettings, controller: ControllerGeometry, frames
     """
     limits = settings.limits
     lowest, highest, zeroed = _joint_ranges(settings, controller)
+    axes = controller.limits.narrowed(ControllerLimits(axes=limits.axes.ranges)).axes or ()
     return Limits(
         limits.gauge_travel_mm,
         float(np.radians(limits.tilt_deg)),
@@ -60,7 +59,7 @@ def stated_limits(settings: CellSettings, controller: ControllerGeometry, frames
         limits.singularity_margin,
         frames,
         float(np.radians(limits.turn_deg)),
-        _axis_limits(limits, controller.limits),
+        AxisLimits(*zip(*(axis or (-np.inf, np.inf) for axis in axes), strict=True)),
         _leg_limits(settings, controller),
         gauge_travel_of(settings),
         shown_joints=zeroed,
@@ -93,13 +92,6 @@ def _joint_ranges(
     if not settings.controller.joints_include_zeros:
         return *zeroed.at(np.zeros(6)), None
     return *zeroed.at(joint_zeros(settings.mechanism, controller.geometry)), zeroed
-
-
-def _axis_limits(limits: LimitSettings, of_controller: ControllerLimits) -> AxisLimits:
-    both = of_controller.narrowed(ControllerLimits(axes=limits.axes.ranges))
-    ranges = [axis or (-np.inf, np.inf) for axis in both.axes or ()]
-    lowest, highest = zip(*ranges, strict=True)
-    return AxisLimits(lowest, highest)
 
 
 def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLimits | None:
@@ -163,71 +155,51 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
         settings: the cell's.
         measured_range_k: range of the temperatures read while measuring; None without thermometers.
     """
-    stated = settings.uncertainty
-    return (
-        *_of_encoders(stated, are_identified=settings.robot.encoder_scales),
-        _of_stops(stated, settings.mechanism.words),
-        *_of_guides(stated, settings.limits.joint_max - settings.limits.joint_min),
-        gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True, source="noise.gauge_scale"),
-        ball_roundness(stated.ball_roundness_um, stated.source("ball_roundness_um")),
-        ball_beside_tool(stated.ball_beside_tool_mm, stated.source("ball_beside_tool_mm")),
-        *_of_environment(stated, measured_range_k),
-    )
+    stated, words, limits = settings.uncertainty, settings.mechanism.words, settings.limits
 
+    def size_and_source(key: str) -> tuple[float, str]:
+        return getattr(stated, key), stated.source(key)
 
-def _of_encoders(stated: CommonUncertaintySettings, *, are_identified: bool) -> tuple[Effect, ...]:
-    # Where the scales are identified, what is not known of them is in the covariance of the parameters.
+    effects: list[Effect] = []
     if isinstance(stated, LinearUncertaintySettings):
-        common, each = "common_encoder_scale_um_m", "encoder_scale_um_m"
-        of_each = encoder_scales(stated.encoder_scale_um_m, stated.source(each))
-        return (
-            common_encoder_scale(stated.common_encoder_scale_um_m, stated.source(common)),
-            *(() if are_identified else (of_each,)),
+        effects.append(common_encoder_scale(*size_and_source("common_encoder_scale_um_m")))
+        # Where the scales are identified, what is not known of them is in the covariance of the parameters.
+        if not settings.robot.encoder_scales:
+            effects.append(encoder_scales(*size_and_source("encoder_scale_um_m")))
+    elif isinstance(stated, RotaryUncertaintySettings):
+        effects.append(encoder_eccentricities(*size_and_source("encoder_eccentricity_mdeg")))
+    effects.append(
+        stop_repeatability(
+            *size_and_source(repeatability_key(words.joint_unit)),
+            is_in_noise=stated.stop_repeatability_acts == "at work",
+            joint=words.joint,
+            unit=words.joint_unit,
         )
-    if isinstance(stated, RotaryUncertaintySettings):
-        key = "encoder_eccentricity_mdeg"
-        return (encoder_eccentricities(stated.encoder_eccentricity_mdeg, stated.source(key)),)
-    return ()
-
-
-def _of_stops(stated: CommonUncertaintySettings, words: MechanismWords) -> Effect:
-    key = repeatability_key(words.joint_unit)
-    return stop_repeatability(
-        getattr(stated, key),
-        stated.source(key),
-        is_in_noise=stated.stop_repeatability_acts == "at work",
-        joint=words.joint,
-        unit=words.joint_unit,
     )
-
-
-def _of_guides(stated: CommonUncertaintySettings, range_mm: float) -> tuple[Effect, ...]:
-    if not isinstance(stated, UncertaintySettings):
-        return ()
-    short, long = "rail_wave_short_um", "rail_wave_long_um"
-    return (
-        rail_directions(stated.rail_direction_mrad, stated.source("rail_direction_mrad")),
-        rail_waves(stated.rail_wave_short_um, stated.rail_wave_short_mm, stated.source(short)),
-        rail_waves(stated.rail_wave_long_um, stated.rail_wave_long_mm, stated.source(long)),
-        common_sag(stated.rail_sag_um, 0.5 * range_mm, stated.source("rail_sag_um")),
-    )
-
-
-def _of_environment(
-    stated: CommonUncertaintySettings, measured_range_k: float | None
-) -> tuple[Effect, ...]:
+    if isinstance(stated, UncertaintySettings):
+        short, long = stated.source("rail_wave_short_um"), stated.source("rail_wave_long_um")
+        half_mm = 0.5 * (limits.joint_max - limits.joint_min)
+        effects += [
+            rail_directions(*size_and_source("rail_direction_mrad")),
+            rail_waves(stated.rail_wave_short_um, stated.rail_wave_short_mm, short),
+            rail_waves(stated.rail_wave_long_um, stated.rail_wave_long_mm, long),
+            common_sag(stated.rail_sag_um, half_mm, stated.source("rail_sag_um")),
+        ]
     expansion = {
         MachinePart.BASE: stated.expansion_base_um_m_k,
         MachinePart.PLATFORM: stated.expansion_platform_um_m_k,
         MachinePart.LEGS: stated.expansion_legs_um_m_k,
     }
-    change, source = stated.temperature_measuring_k, stated.source("temperature_measuring_k")
+    change_k, source = size_and_source("temperature_measuring_k")
     if measured_range_k is not None:
-        change, source = measured_range_k, "thermometers"
+        change_k, source = measured_range_k, "thermometers"
+    at_work_k, at_work_source = size_and_source("temperature_at_work_k")
     return (
-        temperature_at_work(
-            stated.temperature_at_work_k, expansion, stated.source("temperature_at_work_k")
-        ),
-        temperature_while_measuring(change, expansion, source),
+        *effects,
+        gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True, source="noise.gauge_scale"),
+        ball_roundness(*size_and_source("ball_roundness_um")),
+        ball_beside_tool(*size_and_source("ball_beside_tool_mm")),
+        temperature_at_work(at_work_k, expansion, at_work_source),
+        temperature_while_measuring(change_k, expansion, source),
         load_at_work(stated.load_n, stated.leg_compliance_um_n, stated.source("load_n")),
     )

@@ -45,16 +45,7 @@ SWEEPS = {
 
 @dataclass(frozen=True, slots=True)
 class DesignTrial:
-    """One robot, and how it is calibrated.
-
-    Attributes:
-        number: number of the robot.
-        choice: how its orientations are chosen.
-        travel_mm: travel of the gauges, to either side.
-        tilt_deg: largest tilt.
-        noise_mm: noise of encoders and gauges.
-        points: among which the records are divided.
-    """
+    """One robot, by its number, and how it is calibrated; its records are divided among the points."""
 
     number: int
     choice: OrientationChoice = OrientationChoice.ADAPTIVE
@@ -75,7 +66,6 @@ class RecordsAccuracy:
     """How well some records determine the robot.
 
     Attributes:
-        records: number of records.
         largest_mm: largest error of a parameter.
         sigma_mm: root mean square of the parameters' standard deviations by the records alone, without the
             drawing: the noise on them; infinite where they do not determine all.
@@ -178,14 +168,9 @@ def _cell(travel_mm: float, tilt_deg: float, noise_mm: float, points: int) -> tu
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """The spread over several robots.
+    """Medians of :class:`RecordsAccuracy` over several robots that were identified.
 
-    Attributes:
-        robots: number of robots that were identified.
-        largest_mm: median of the largest error of a parameter.
-        most_mm: largest error of a parameter that 90 % of the robots stay within.
-        sigma_mm: median of the noise on the parameters.
-        task_mm: median of the error at the worst task pose, one standard deviation.
+    ``most_mm`` is the largest error of a parameter that 90 % of them stay within.
     """
 
     robots: int
@@ -209,14 +194,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class ChoiceCurve:
-    """One way to choose orientations.
-
-    Attributes:
-        tried: number of robots.
-        by_records: with the records of the first two points, three, and so on.
-        deviation_mm: median of the largest that a gauge had to show.
-        outside: poses of all robots at which the ball left the travel.
-    """
+    """One way to choose orientations, as :class:`DesignOutcome`, over all robots that were ``tried``."""
 
     tried: int
     by_records: Mapping[int, Spread]

@@ -146,13 +146,7 @@ def _table_four() -> tuple[Robot, Geometry, Array]:
 
 @dataclass(frozen=True, slots=True)
 class Reduction:
-    """Medians over the draws of the mean difference at some points, mm.
-
-    Attributes:
-        before: with the drawing in the controller.
-        paper: with the geometry by the paper's estimator, of the draws in which that ends, else NaN.
-        ours: with that by this program's.
-    """
+    """Medians over the draws of the means of :class:`Differences`, mm; NaN where the paper's never ends."""
 
     before: float
     paper: float
@@ -161,11 +155,7 @@ class Reduction:
     @classmethod
     def of(cls, found: Sequence[Differences]) -> Reduction:
         """The medians of the draws' differences."""
-        return cls(
-            _median(one.before for one in found),
-            _median(one.paper for one in found),
-            _median(one.ours for one in found),
-        )
+        return cls(*(_median(getattr(one, name) for one in found) for name in ("before", "paper", "ours")))
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import position_sensitivity
+from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
 from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.length_records import (
@@ -83,7 +83,8 @@ class LengthCheck:
         """
         placement = records.placement
         mechanism, geometry = placement.mechanism, placement.geometry
-        by_all, by_joints = position_sensitivity(mechanism, geometry, placement.poses, placement.joints)
+        found = pose_sensitivity(mechanism, geometry, placement.poses, placement.joints, POSITION)
+        by_all, by_joints = found.parameters, found.joints
         jacobian = by_all @ mechanism.convention.basis
         acting = [one for one in effects if one.occurrence.is_in_records and one.name != COMMON_SCALE]
         shared = {one.name: shared_errors(records, jacobian, judged, one) for one in acting}

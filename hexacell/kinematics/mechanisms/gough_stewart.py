@@ -53,6 +53,16 @@ from hexacell.kinematics.parameters import MachinePart, ParameterKind, Parameter
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
+PLATFORM_JOINT = ParameterKind(
+    "platform",
+    ("x", "y", "z"),
+    meaning="joints on the platform in the platform frame (origin: the ball), mm",
+    tolerance_meaning="every coordinate of a joint on the platform",
+    part=MachinePart.PLATFORM,
+    default_tolerance=1.0,
+    has_ball_offset=True,
+)
+
 GOUGH_STEWART_PARAMETERS = ParameterSet(
     (
         ParameterKind(
@@ -63,15 +73,7 @@ GOUGH_STEWART_PARAMETERS = ParameterSet(
             part=MachinePart.BASE,
             default_tolerance=1.0,
         ),
-        ParameterKind(
-            "platform",
-            ("x", "y", "z"),
-            meaning="joints on the platform in the platform frame (origin: the ball), mm",
-            tolerance_meaning="every coordinate of a joint on the platform",
-            part=MachinePart.PLATFORM,
-            default_tolerance=1.0,
-            has_ball_offset=True,
-        ),
+        PLATFORM_JOINT,
         ParameterKind(
             "offset",
             (),

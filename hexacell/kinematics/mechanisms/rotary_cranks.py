@@ -40,6 +40,7 @@ from hexacell.kinematics.mechanism import (
     FrameTransform,
     MechanismWords,
 )
+from hexacell.kinematics.mechanisms.gough_stewart import PLATFORM_JOINT
 from hexacell.kinematics.mechanisms.jointed_legs import JointedLegs
 from hexacell.kinematics.parameters import (
     JointUnit,
@@ -88,15 +89,7 @@ ROTARY_CRANKS_PARAMETERS = ParameterSet(
             default_tolerance=0.5,
             display="crank {leg} zero",
         ),
-        ParameterKind(
-            "platform",
-            ("x", "y", "z"),
-            meaning="joints on the platform in the platform frame (origin: the ball), mm",
-            tolerance_meaning="every coordinate of a joint on the platform",
-            part=MachinePart.PLATFORM,
-            default_tolerance=0.5,
-            has_ball_offset=True,
-        ),
+        replace(PLATFORM_JOINT, default_tolerance=0.5),
         ParameterKind(
             "rod",
             (),

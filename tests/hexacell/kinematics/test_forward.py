@@ -8,11 +8,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hexacell.kinematics.forward import apply_twist, assembly_mode, continue_solution, forward_kinematics
+from hexacell.kinematics.forward import apply_twist, continue_solution, forward_kinematics, modes_of
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.sensitivity import pose_jacobian, singularity_margin
+from hexacell.kinematics.sensitivity import singularity_margin
 from tests.hexacell.kinematics.numeric import MARGIN, POSES, numeric_jacobian, turned_about
 
 SMALL = st.floats(-1.0, 1.0)
@@ -192,7 +192,7 @@ def test_nan_joints_do_not_affect_other_poses(hexaglide, paper, inverse):
     joints = inverse(paper.nominal, at)
     joints[1] = np.nan
     displaced = apply_twist(at, np.full((3, 6), 0.01))
-    mode = assembly_mode(pose_jacobian(hexaglide, paper.nominal, at, joints[[0, 0, 2]]))
+    mode = modes_of(hexaglide, paper.nominal, at, joints[[0, 0, 2]])
     found = forward_kinematics(hexaglide, paper.nominal, joints, displaced, mode=mode)
     assert found.found.tolist() == [True, False, True]
     np.testing.assert_allclose(found.poses.positions[[0, 2]], at.positions[[0, 2]], atol=1e-8)

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from hexacell.design.candidates import orientations
-from hexacell.kinematics.forward import assembly_mode, continue_solution, forward_kinematics
+from hexacell.kinematics.forward import continue_solution, forward_kinematics, modes_of
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.sensitivity import pose_jacobian
 from hexacell.motion import trajectory as module
 from hexacell.motion.trajectory import interpolate_lines, trace_path
 
@@ -41,7 +40,7 @@ def here(hexaglide, paper, commanded):
 
 def stepwise(hexaglide, geometry, ways, joints, here, row, fineness=8):
     """One line in much smaller steps, one after the other; none where the assembly mode is left."""
-    mode = assembly_mode(pose_jacobian(hexaglide, geometry, here, joints[0, [row]]))
+    mode = modes_of(hexaglide, geometry, here, joints[0, [row]])
     pose, found = here, []
     for piece in range(len(joints) - 1):
         for share in np.arange(1, fineness + 1) / fineness:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.sensitivity import position_sensitivity
+from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
 from hexacell.noise.approach_scatter import ALONE, ScatterSource, approach_scatter
 
 NOISE = 0.01
@@ -19,7 +19,7 @@ VISITS = 7
 def by_joints(hexaglide, paper):
     poses = PoseBatch.of([Pose(0.0, 0.0, 550.0)])
     joints = hexaglide.inverse(paper.nominal, paper.branch, poses)
-    return position_sensitivity(hexaglide, paper.nominal, poses, joints)[1][0]
+    return pose_sensitivity(hexaglide, paper.nominal, poses, joints, POSITION).joints[0]
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.pose import Pose
-from hexacell.kinematics.sensitivity import position_sensitivity
+from hexacell.kinematics.sensitivity import pose_sensitivity
 from hexacell.noise.approach_scatter import ScatterSource
 from hexacell.noise.measured_noise import AveragingForecast, with_measured_noise
 from hexacell.noise.noise_assessment import (
@@ -51,7 +51,7 @@ def jacobian(plan: Plan) -> np.ndarray:
     robot = plan.robot
     commands = robot.from_commands([REFERENCE])
     joints = robot.mechanism.inverse(robot.commanding, robot.branch, commands)
-    by_joints = position_sensitivity(robot.mechanism, robot.commanding, commands, joints)[1][0]
+    by_joints = pose_sensitivity(robot.mechanism, robot.commanding, commands, joints).joints[0, :3]
     return np.asarray(robot.frames.base.T @ by_joints)
 
 

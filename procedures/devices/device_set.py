@@ -36,6 +36,7 @@ OTHERS_PERIOD_S = 1.0
 T = TypeVar("T")
 
 Result = TypeVar("Result")
+Opened = DeviceIdentity | tuple[DeviceIdentity, ...] | None
 
 _log = logging.getLogger(__name__)
 
@@ -146,10 +147,11 @@ class Devices:
         Raises:
             SeveralErrors: one or more do not answer as they must; all are named.
         """
-        calls: list[Awaitable[tuple[DeviceIdentity, ...]]] = [_alone(m.gauge.open()) for m in self.gauges]
-        calls += [self.encoders.open(), _alone(self.controller.open()), _if_any(self.stop_input.open())]
+        gauges: list[Awaitable[Opened]] = [mounted.gauge.open() for mounted in self.gauges]
+        calls = [*gauges, self.encoders.open(), self.controller.open(), self.stop_input.open()]
         found = await gather_errors("devices do not answer as they must", calls)
-        return tuple(identity for identities in found for identity in identities)
+        several = (one if isinstance(one, tuple) else (one,) for one in found)
+        return tuple(identity for some in several for identity in some if identity is not None)
 
     async def read_gauges(self, on_answer: Callable[[], object] = lambda: None) -> list[GaugeReading]:
         """One reading of each gauge, in the order of ``gauges``; ``on_answer`` is called at each."""
@@ -175,7 +177,11 @@ class Devices:
 
     async def stop_reason(self) -> str:
         """Why motion is forbidden; empty while it is not."""
-        return await self.live.stop_reason.of(self._stop_reason)
+
+        async def read() -> str:
+            return await self.stop_input.active_reason() or ""
+
+        return await self.live.stop_reason.of(read)
 
     async def close(self) -> None:
         """Let all of them go, whatever happens to one."""
@@ -186,18 +192,6 @@ class Devices:
             self.stop_input,
         ]
         await asyncio.gather(*(port.close() for port in ports), return_exceptions=True)
-
-    async def _stop_reason(self) -> str:
-        return await self.stop_input.active_reason() or ""
-
-
-async def _alone(identity: Awaitable[DeviceIdentity]) -> tuple[DeviceIdentity, ...]:
-    return (await identity,)
-
-
-async def _if_any(identity: Awaitable[DeviceIdentity | None]) -> tuple[DeviceIdentity, ...]:
-    found = await identity
-    return () if found is None else (found,)
 
 
 async def gather_errors(problem: str, calls: Sequence[Awaitable[Result]]) -> list[Result]:

@@ -107,11 +107,20 @@ async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> 
         looks += 1
         look_s = clock.now()
         moving = await _look(devices, timing, clock, window)
-        if not moving and _is_full(window, timing):
+        if (
+            len(window) >= timing.readings
+            and window[-1].at_s - window[0].at_s >= timing.window_s
+            and not moving
+        ):
             return Settled(tuple(window))
         # Counted too, because a slow device or a machine under load must not run out of time unread.
         if looks >= LEAST_WINDOWS * timing.readings and clock.now() - begun > timing.give_up_s:
-            raise _never_settled(timing, moving)
+            words = ", ".join(moving) or "the window of readings is longer than that"
+            raise NeverSettled(
+                f"the readings did not settle within {timing.give_up_s:g} s: {words}",
+                action="Look for vibration or a slipping gauge; the limits are in [timing] of the "
+                "cell file",
+            )
         await clock.sleep_until(look_s + timing.interval_s)
 
 
@@ -138,23 +147,14 @@ async def _look(
     try:
         window.append(await read_all(devices, clock))
     except HexacellError as error:
-        if not _still_swings(error):
-            raise
+        is_unsteady = any(isinstance(one, GaugeUnsteady) for one in flatten_errors(error))
+        if not is_unsteady or not consists_only_of(error, GaugeUnsteady, GaugeAtEnd):
+            raise  # otherwise the ball only moves, which may reach an end of the travel too
         window.clear()
         return [f"{one.subject}: {one.problem}" for one in flatten_errors(error)]
     while len(window) > timing.readings and window[-1].at_s - window[1].at_s >= timing.window_s:
         window.popleft()
     return _moving(devices, timing, Settled(tuple(window)))
-
-
-def _is_full(window: deque[DeviceSnapshot], timing: TimingSettings) -> bool:
-    return len(window) >= timing.readings and window[-1].at_s - window[0].at_s >= timing.window_s
-
-
-def _still_swings(error: HexacellError) -> bool:
-    """Whether it only means that the ball moves, which may reach an end of the travel too."""
-    unsteady = any(isinstance(one, GaugeUnsteady) for one in flatten_errors(error))
-    return unsteady and consists_only_of(error, GaugeUnsteady, GaugeAtEnd)
 
 
 def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[str]:
@@ -169,11 +169,3 @@ def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[
     return moving + [
         f"encoder {leg} by {spread:.3f} {unit}" for leg, spread in legs if spread > timing.spread_encoder
     ]
-
-
-def _never_settled(timing: TimingSettings, moving: list[str]) -> NeverSettled:
-    words = ", ".join(moving) or "the window of readings is longer than that"
-    return NeverSettled(
-        f"the readings did not settle within {timing.give_up_s:g} s: {words}",
-        action="Look for vibration or a slipping gauge; the limits are in [timing] of the cell file",
-    )

@@ -156,11 +156,17 @@ class Engine:
         return None
 
     async def _advance(self) -> bool:
-        """Decide on a step and execute it; False if none is left."""
-        await self._obey_commands()
+        """Obey the commands that waited, decide on a step and execute it; False if none is left."""
+        self._commands.catch_up()
+        self._obey_requests()
+        flags = self._commands.flags
+        if flags.pausing and (flags.at_once or not isinstance(self._last, _BEFORE_SAMPLING)):
+            await self._pause(at_once=flags.at_once)
         step: Step | None = None
         try:
-            await self._prepare()
+            if not self._is_prepared:
+                await self._commands.run_cancellable(self._executor.prepare(self.state))
+                self._is_prepared = True
             step = await self._commands.run_cancellable(self._decide())
             if step is None:
                 return False
@@ -174,11 +180,6 @@ class Engine:
         except HexacellError as error:
             await self._recovery.recover(error, step, self.state)
         return True
-
-    async def _prepare(self) -> None:
-        if not self._is_prepared:
-            await self._commands.run_cancellable(self._executor.prepare(self.state))
-            self._is_prepared = True
 
     async def _decide(self) -> Step | None:
         """The next step; raises ``OutOfTime`` where the run was recalled and the robot is back."""
@@ -214,8 +215,10 @@ class Engine:
             if stop_failure and isinstance(raised, HexacellError) and not may_still_move(raised):
                 raised = RobotNotStopped(stop_failure, raised)
         finally:
-            reason, code = str(raised) or type(raised).__name__, int(_exit_code(raised))
-            self._record_if_possible(events.Interrupted(reason=reason, exit_code=code))
+            code = ExitCode.FAULT if isinstance(raised, Exception) else ExitCode.INTERRUPTED
+            code = raised.exit_code if isinstance(raised, HexacellError) else code
+            reason = str(raised) or type(raised).__name__
+            self._record_if_possible(events.Interrupted(reason=reason, exit_code=int(code)))
         return raised
 
     async def _revert(self, reversal: Reversal, cause: BaseException) -> BaseException:
@@ -234,14 +237,6 @@ class Engine:
     def _record_if_possible(self, event: events.Event) -> None:
         with suppress(HexacellError):
             self.record(event)
-
-    async def _obey_commands(self) -> None:
-        """Between two steps: obey the commands that waited for the end of a step."""
-        self._commands.catch_up()
-        self._obey_requests()
-        flags = self._commands.flags
-        if flags.pausing and (flags.at_once or not isinstance(self._last, _BEFORE_SAMPLING)):
-            await self._pause(at_once=flags.at_once)
 
     async def _pause(self, *, at_once: bool) -> None:
         if at_once:
@@ -303,10 +298,3 @@ def _final_code(state: RunState) -> ExitCode:
         if not state.accepted.asked:
             return ExitCode.ANSWER_NEEDED
     return ExitCode.OUT_OF_LIMITS
-
-
-def _exit_code(error: BaseException) -> ExitCode:
-    """The code to leave with."""
-    if isinstance(error, HexacellError):
-        return error.exit_code
-    return ExitCode.FAULT if isinstance(error, Exception) else ExitCode.INTERRUPTED

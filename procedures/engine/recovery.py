@@ -167,7 +167,8 @@ class Recovery:
             if stop_failure := await self.halt():
                 if failure.action is not Action.ASK:
                     raise error  # without a person nothing is tried while the robot may still move
-                failure = failure.model_copy(update={"reason": _unstopped(stop_failure, error)})
+                unstopped = error if may_still_move(error) else RobotNotStopped(stop_failure, error)
+                failure = failure.model_copy(update={"reason": str(unstopped)})
             if (decided := await self._decide(failure)) is None:
                 raise error
             state = self._recorded(decided, error)
@@ -218,22 +219,14 @@ class Recovery:
         if is_zero_lost:
             return _invalidated(state.sets_with_zero, "a gauge was opened again, its zero is void")
         if failure.action is Action.REDO_SET:
-            return _invalidated(_failed_sets(failure, state), failure.reason)
+            step = failure.step  # without a set of its own, all that are open are concerned
+            keys = [key for key in state.open_sets if not isinstance(step, StepOfSet) or key == step.at]
+            return _invalidated(keys, failure.reason)
         return []
-
-
-def _unstopped(stop_failure: HexacellError, error: HexacellError) -> str:
-    return str(error if may_still_move(error) else RobotNotStopped(stop_failure, error))
 
 
 def _invalidated(keys: Sequence[SetKey], reason: str) -> list[events.SetInvalidated]:
     return [events.SetInvalidated(at=key, reason=reason) for key in keys]
-
-
-def _failed_sets(failure: events.Failed, state: RunState) -> list[SetKey]:
-    """The set of the failed step; all open sets if it has none."""
-    step = failure.step
-    return [key for key in state.open_sets if not isinstance(step, StepOfSet) or key == step.at]
 
 
 @dataclass(frozen=True, slots=True)

@@ -145,26 +145,18 @@ class Guards:
         encoders: bool = True,
         gauges: tuple[WatchedGauge, ...] = (),
     ) -> PolledDevices:
-        devices = self._devices
-        return PolledDevices(
-            gauges=self._gauge_pollers(gauges),
-            encoders=DevicePoller("encoders", devices.read_encoders) if encoders else None,
-            controller=DevicePoller("controller", self._watched_controller().status)
-            if controller
-            else None,
-            stop_input=DevicePoller(STOP_LINE, devices.stop_reason),
-        )
-
-    def _watched_controller(self) -> WatchedController:
-        guards = self._settings.guards
-        return WatchedController(self._devices, self._clock, guards.following, guards.stale_s)
-
-    def _gauge_pollers(self, gauges: tuple[WatchedGauge, ...]) -> tuple[DevicePoller[GaugeDeviation], ...]:
-        """One poller a gauge; gauges behind one multiplexer share a port and so a line."""
+        devices, guards = self._devices, self._settings.guards
+        watched = WatchedController(devices, self._clock, guards.following, guards.stale_s)
+        # Gauges behind one multiplexer share a port and so a line.
         ports = {f"gauge {one.name}": one.port or one.name for one in self._settings.gauges}
         lines: defaultdict[str, LineActivity] = defaultdict(LineActivity)
-        return tuple(
-            DevicePoller(gauge.device, gauge.read_deviation, lines[ports[gauge.device]]) for gauge in gauges
+        return PolledDevices(
+            gauges=tuple(
+                DevicePoller(one.device, one.read_deviation, lines[ports[one.device]]) for one in gauges
+            ),
+            encoders=DevicePoller("encoders", devices.read_encoders) if encoders else None,
+            controller=DevicePoller("controller", watched.status) if controller else None,
+            stop_input=DevicePoller(STOP_LINE, devices.stop_reason),
         )
 
     def _watched_gauges(self, watched: WatchedSet) -> tuple[WatchedGauge, ...]:

@@ -170,7 +170,10 @@ class GuardMonitor:
         answers are in: the trip then names every faulty device, not only the first one.
         """
         before = [(poller, poller.answer_count) for poller in self.devices.all()]
-        while not self._is_waiting_useless() and any(poller.answer_count <= n for poller, n in before):
+        while any(poller.answer_count <= n for poller, n in before):
+            is_silent = self.trip is not None and self.trip.guard is Guard.STALE
+            if is_silent or self._failure is not None:
+                break
             self._updated.clear()
             await self._updated.wait()
         self._raise_failure()
@@ -194,10 +197,6 @@ class GuardMonitor:
         if self.trip is not None:
             self._ended.set()
         self._updated.set()
-
-    def _is_waiting_useless(self) -> bool:
-        """Whether a device is silent, or the monitor itself failed."""
-        return self._failure is not None or (self.trip is not None and self.trip.guard is Guard.STALE)
 
     def _raise_failure(self) -> None:
         if self._failure is not None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
-from typing import Any, ParamSpec, TypeVar
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -27,17 +27,11 @@ from procedures.devices.settling import DeviceSnapshot, Settled, read_series, se
 from procedures.guards.guards import Guards
 from procedures.guards.position_check import PositionReports
 from procedures.resources.controller_config import ConfigChanges, ConfigEdits, Startup
-from procedures.run.cancellation import in_thread
 from procedures.run.keys import SixNumbers
 from procedures.run.questions import Operator, Question
 from procedures.run.readings import Reading, ReadingSeries, Temperature
 from procedures.run.state import RunState
 from procedures.run.trips import Guard, Trip, WatchedSet
-
-Arguments = ParamSpec("Arguments")
-Result = TypeVar("Result")
-
-SKEW_DECIMALS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,12 +86,6 @@ class RunResources:
         """Make sure that nobody edited the config; raises ``FileError``."""
         self.edits.require_none(state)
 
-    async def in_thread(
-        self, work: Callable[Arguments, Result], *args: Arguments.args, **kwargs: Arguments.kwargs
-    ) -> Result:
-        """Compute in a thread; a cancelled caller waits for its end."""
-        return await in_thread(work, *args, **kwargs)
-
     # Where the robot is, and how it moves.
 
     async def locate(self) -> PositionReports:
@@ -146,14 +134,13 @@ class RunResources:
         commanding = self.current_config.geometry()
         lines = LineDurations(self.settings.mechanism, commanding.geometry, commanding.branch)
         duration_s = lines.of(start, target, speed_limits(self.settings.speed, at_gauges=at_gauges))
-        await self.guards.move(target, duration_s, watched, partial(self._joints_at, target))
 
-    def _joints_at(self, target: Pose) -> Array:
-        """The joint variables (6,) of a pose by the geometry that the controller has now."""
-        commanding = self.current_config.geometry()
-        mechanism = self.calibration.robot.mechanism
-        joints: Array = mechanism.inverse(commanding.geometry, commanding.branch, PoseBatch.of([target]))[0]
-        return joints
+        def commanded() -> Array:
+            now, mechanism = self.current_config.geometry(), self.calibration.robot.mechanism
+            joints: Array = mechanism.inverse(now.geometry, now.branch, PoseBatch.of([target]))[0]
+            return joints
+
+        await self.guards.move(target, duration_s, watched, commanded)
 
     async def ask_at_standstill(self, question: Question) -> str | None:
         """Ask a person while the robot must not move."""
@@ -217,5 +204,5 @@ def _raw(snapshots: Sequence[DeviceSnapshot]) -> dict[str, Any]:
     return {
         "answers": tuple(tuple(reading.raw for reading in one.gauges) for one in snapshots),
         "counts": tuple(one.encoders.counts for one in snapshots),
-        "skews_s": tuple(round(one.skew_s, SKEW_DECIMALS) for one in snapshots),
+        "skews_s": tuple(round(one.skew_s, 6) for one in snapshots),
     }

@@ -83,19 +83,6 @@ class SetState:
             return self
         return replace(self, reference_unverified=True, probes=(), tried=False)
 
-    def with_sample(self, sample: RecordTaken) -> SetState:
-        """One more record."""
-        again = tuple(pair for pair in self.again if pair[0] != sample.orientation)
-        return replace(self, samples=(*self.samples, sample), again=again, has_left=False)
-
-    def with_visit(self, visit: ReferenceRepeated) -> SetState:
-        """One more visit of the reference."""
-        return replace(self, visits=(*self.visits, visit), has_left=False, piloted=0)
-
-    def with_pilot(self, pilot: PilotTaken) -> SetState:
-        """One more pilot reading."""
-        return replace(self, pilots=(*self.pilots, pilot), piloted=self.piloted + 1)
-
     def with_rejection(self, orientation: int) -> SetState:
         """One more rejected record; its orientation is chosen again."""
         again = tuple(pair for pair in self.again if pair[0] != orientation)
@@ -165,10 +152,6 @@ class RunState:
         """The last event of a class that has no field here; None if there was none."""
         found = self.others.get(kind)
         return found if isinstance(found, kind) else None
-
-    def with_latest(self, event: BaseEvent) -> RunState:
-        """The state in which an event is the last of its class."""
-        return replace(self, others={**self.others, type(event): event})
 
     def with_set(self, key: SetKey, value: SetState) -> RunState:
         """The state with another content of one set."""
@@ -276,14 +259,19 @@ class RunState:
 
     def held_out(self, phase: Phase) -> list[tuple[float, float, float]]:
         """Deviations, mm, at the held-out poses that are measured before and after; no references."""
-        return [sample.deviation_mm for sample in self.samples(phase) if self._is_compared(sample)]
-
-    def _is_compared(self, sample: RecordTaken) -> bool:
-        if sample.orientation == 1 or self.identified is None:
-            return sample.orientation > 1
-        if not self.refused.allows(sample.pose):
-            return False  # it may have been refused in the other phase
-        return sample.orientation <= len(self.identified.held_out[sample.at.point - 1])
+        found = self.identified
+        return [
+            sample.deviation_mm
+            for sample in self.samples(phase)
+            if sample.orientation > 1
+            and (
+                found is None  # a refused pose may have been refused in the other phase
+                or (
+                    self.refused.allows(sample.pose)
+                    and sample.orientation <= len(found.held_out[sample.at.point - 1])
+                )
+            )
+        ]
 
 
 def fold(history: Iterable[BaseEvent]) -> RunState:

@@ -7,10 +7,12 @@ the kind of each are part of the journal.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 from hexacell.campaign.pilots import pilot_number
 from hexacell.cell.fields import Frozen
+from procedures.run.cancellation import in_thread
 from procedures.run.keys import SetKey, SixNumbers
 
 if TYPE_CHECKING:  # whoever reads a journal needs no devices
@@ -25,7 +27,7 @@ class BaseEvent(Frozen):
 
     def applied_to(self, state: RunState) -> RunState:
         """The state after the event; one without a rule of its own is kept as the latest of its class."""
-        return state.with_latest(self)
+        return replace(state, others={**state.others, type(self): self})
 
     def text(self, state: RunState) -> str | None:
         """What it reports, None if nothing; ``state`` includes the event."""
@@ -81,16 +83,13 @@ class StepOfSet(BaseStep):
 
     @property
     def key(self) -> str:
-        """Stable name of the step."""
         return f"{self.at}/{self.kind}"
 
     @property
     def place(self) -> str:
-        """Where its failures are counted: in its set."""
         return str(self.at)
 
     def activity(self) -> str | None:
-        """The set, and what for."""
         return f"{self.at.name}, {self.purpose}" if self.purpose else None
 
 
@@ -105,13 +104,11 @@ class StepAtPose(StepOfSet):
 
     @property
     def key(self) -> str:
-        """Stable name of the step."""
         pilot = pilot_number(self.orientation)
         pose = f"o{self.orientation:02d}" if pilot is None else f"pilot{pilot:02d}"
         return f"{self.at}/{pose}/{self.kind}"
 
     def activity(self) -> str | None:
-        """The pose."""
         return self.at.pose_name(self.orientation)
 
 
@@ -122,7 +119,6 @@ class StepWithoutMotion(BaseStep):
     is_reproducible: ClassVar[bool] = True
 
     def activity(self) -> str:
-        """What is done."""
         return self.doing
 
 
@@ -130,8 +126,7 @@ class Computation(StepWithoutMotion):
     """A step that only computes, in a thread; it writes files of the run folder and nothing else."""
 
     async def perform(self, run: RunResources, state: RunState) -> BaseEvent:
-        """Compute in a thread."""
-        return await run.in_thread(self.compute, run, state)
+        return await in_thread(self.compute, run, state)
 
     @abstractmethod
     def compute(self, run: RunResources, state: RunState) -> BaseEvent:

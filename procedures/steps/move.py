@@ -15,6 +15,7 @@ from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import joints_of
+from procedures.run.cancellation import in_thread
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.trips import GuardTripped, WatchedSet
 from procedures.steps.base import BaseEvent, BaseStep, StepAtPose
@@ -222,7 +223,7 @@ class Move(StepAtPose):
             axis=refusal.axis,
             is_highest=refusal.is_highest,
         )
-        return await run.in_thread(_with_replacements, excluded, run, state)
+        return await in_thread(_with_replacements, excluded, run, state)
 
 
 def _with_replacements(refusal: PoseExcluded, run: RunResources, state: RunState) -> PoseExcluded:

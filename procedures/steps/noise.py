@@ -54,7 +54,9 @@ class ReferenceRepeated(BaseEvent):
     reading: Reading
 
     def applied_to(self, state: RunState) -> RunState:
-        return state.with_set(self.at, state.set(self.at).with_visit(self))
+        measured = state.set(self.at)
+        visits = (*measured.visits, self)
+        return state.with_set(self.at, replace(measured, visits=visits, has_left=False, piloted=0))
 
 
 class Repeat(StepOfSet):
@@ -84,7 +86,9 @@ class PilotTaken(BaseEvent):
         return Record(self.at.point, self.orientation, Pose(*self.pose), self.reading.joints, deviation)
 
     def applied_to(self, state: RunState) -> RunState:
-        return state.with_set(self.at, state.set(self.at).with_pilot(self))
+        measured = state.set(self.at)
+        pilots = (*measured.pilots, self)
+        return state.with_set(self.at, replace(measured, pilots=pilots, piloted=measured.piloted + 1))
 
 
 class Pilot(StepAtPose):

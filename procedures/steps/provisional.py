@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from hexacell.cell.fields import GeometryDocument
 from hexacell.config.write_record import WriteKind
 from hexacell.errors import HexacellError
+from procedures.run.cancellation import in_thread
 from procedures.steps.base import BaseEvent, StepWithoutMotion
 
 if TYPE_CHECKING:
@@ -49,10 +50,10 @@ class Lend(StepWithoutMotion):
     async def perform(self, run: RunResources, state: RunState) -> ProvisionalApplied:
         """Write the config and have it read; raises ``WriteBackUndone`` if the controller does not."""
         known = run.calibration.known(state)
-        geometry = await run.in_thread(known.provisional_geometry, state)
+        geometry = await in_thread(known.provisional_geometry, state)
         config, written = run.config, run.calibration.robot.for_controller(geometry)
         await config.apply(
-            await run.in_thread(config.change_to, written, state),
+            await in_thread(config.change_to, written, state),
             config.provisional_backup,
             config.cause(WriteKind.PROVISIONAL, "to measure the remaining points with it"),
             action="Correct that, or run without `provisional`",
@@ -100,7 +101,7 @@ class TakeBack(StepWithoutMotion):
             provisional = run.calibration.provisional_of(state)
             if is_written and provisional is not None:
                 geometry = run.calibration.robot.for_controller(provisional)
-                change = await run.in_thread(config.change_to, geometry, state)
+                change = await in_thread(config.change_to, geometry, state)
                 cause = config.cause(WriteKind.PROVISIONAL, "the controller does not take the old one here")
                 await config.write(change, config.provisional_backup, cause)
             raise

@@ -77,7 +77,10 @@ class RecordTaken(BaseEvent):
         )
 
     def applied_to(self, state: RunState) -> RunState:
-        return state.with_set(self.at, state.set(self.at).with_sample(self))
+        measured = state.set(self.at)
+        again = tuple(pair for pair in measured.again if pair[0] != self.orientation)
+        samples = (*measured.samples, self)
+        return state.with_set(self.at, replace(measured, samples=samples, again=again, has_left=False))
 
 
 class RecordRejected(BaseEvent):

@@ -107,11 +107,8 @@ async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> 
         looks += 1
         look_s = clock.now()
         moving = await _look(devices, timing, clock, window)
-        if (
-            len(window) >= timing.readings
-            and window[-1].at_s - window[0].at_s >= timing.window_s
-            and not moving
-        ):
+        is_full = len(window) >= timing.readings and window[-1].at_s - window[0].at_s >= timing.window_s
+        if is_full and not moving:
             return Settled(tuple(window))
         # Counted too, because a slow device or a machine under load must not run out of time unread.
         if looks >= LEAST_WINDOWS * timing.readings and clock.now() - begun > timing.give_up_s:

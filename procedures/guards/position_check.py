@@ -20,7 +20,7 @@ differs a little: one that was edited, or not read again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -32,7 +32,6 @@ from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism, joint_zeros
-from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from procedures.devices.device_set import Devices
@@ -106,18 +105,7 @@ def position_mismatch(
     reports: PositionReports,
     tolerances: AgreementTolerances,
 ) -> PositionMismatch | None:
-    """How the reports of where the robot is disagree under the controller's geometry.
-
-    Args:
-        mechanism: of the robot.
-        geometry: of the controller.
-        branch: of each leg.
-        reports: at one standstill.
-        tolerances: differences up to which reports agree.
-
-    Returns:
-        The mismatch at the leg with the largest one; None where the reports agree.
-    """
+    """How reports disagree under the controller's geometry, at the leg where most; None if they agree."""
     by_pose, rounding = _joints_of(mechanism, geometry, branch, reports.pose, tolerances.position_mm)
     from_encoders = _excess(by_pose - reports.encoders, rounding + tolerances.encoders)
     odd: PositionSource | None = None
@@ -176,8 +164,8 @@ class CheckedPosition:
     """
 
     reports: PositionReports | None
-    trip: Trip | None = field(default=None)
-    odd: PositionSource | None = field(default=None)
+    trip: Trip | None = None
+    odd: PositionSource | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +186,7 @@ class PositionCheck:
         try:
             found = await self._compared(encoders or await self.devices.read_encoders())
         except NotHomedError:
-            return CheckedPosition(None, _not_homed())
+            return CheckedPosition(None, _NOT_HOMED)
         for _ in range(1, ATTEMPTS):
             if found.trip is None or found.reports is None:
                 break
@@ -207,38 +195,24 @@ class PositionCheck:
         return found
 
     async def _compared(self, encoders: EncoderSample) -> CheckedPosition:
-        reports = await self._reports(encoders)
-        if reports is None:
-            return CheckedPosition(None, _not_homed())
-        mismatch = self._mismatch(reports)
+        reported = await self.devices.controller.position()
+        if reported is None:
+            return CheckedPosition(None, _NOT_HOMED)
+        mechanism, commanding = self.settings.mechanism, self.config.geometry()
+        joints = None if reported.joints is None else np.array(reported.joints)
+        if joints is not None and self.settings.controller.joints_include_zeros:
+            joints = joints - joint_zeros(mechanism, commanding.geometry)
+        reports = PositionReports(reported.pose, joints, np.array(encoders.positions))
+        tolerances = AgreementTolerances(
+            self.settings.controller.position_tolerance_mm, self.settings.guards.following
+        )
+        mismatch = position_mismatch(mechanism, commanding.geometry, commanding.branch, reports, tolerances)
         if mismatch is None:
             return CheckedPosition(reports)
         return CheckedPosition(reports, self._trip(mismatch, reports), mismatch.odd)
 
-    async def _reports(self, encoders: EncoderSample) -> PositionReports | None:
-        reported = await self.devices.controller.position()
-        if reported is None:
-            return None
-        joints = None if reported.joints is None else np.array(reported.joints) - self._zeros_in_reports()
-        return PositionReports(reported.pose, joints, np.array(encoders.positions))
-
-    def _zeros_in_reports(self) -> Array:
-        """By how much the joints that the controller reports exceed the joint variables (6,)."""
-        if not self.settings.controller.joints_include_zeros:
-            return np.zeros(6)
-        return joint_zeros(self.settings.mechanism, self.config.geometry().geometry)
-
-    def _mismatch(self, reports: PositionReports) -> PositionMismatch | None:
-        commanding = self.config.geometry()
-        tolerances = AgreementTolerances(
-            self.settings.controller.position_tolerance_mm, self.settings.guards.following
-        )
-        return position_mismatch(
-            self.settings.mechanism, commanding.geometry, commanding.branch, reports, tolerances
-        )
-
     def _trip(self, found: PositionMismatch, reports: PositionReports) -> Trip:
-        joint = f"{self._joint} {found.leg}"
+        joint = f"{self.settings.mechanism.words.joint} {found.leg}"
         match found.odd:
             case PositionSource.POSE:
                 return self._odd_pose(found, reports)
@@ -251,8 +225,8 @@ class PositionCheck:
             case PositionSource.ENCODERS:
                 problem = (
                     f"shows {joint} at {self._place(found.encoder)} where the controller's pose and joints "
-                    f"have it at {self._place(found.joint)} "
-                    f"(limit {self.settings.guards.following:g} {self._unit})"
+                    f"have it at {self._place(found.joint)} (limit {self.settings.guards.following:g} "
+                    f"{self.settings.mechanism.words.joint_unit})"
                 )
                 action = "See whether it slipped or lost its zero, or the controller was homed wrongly"
                 return _position_trip(f"encoder {found.leg}", problem, f"{action}; then retry")
@@ -285,29 +259,21 @@ class PositionCheck:
         )
         return _position_trip("controller", problem, action)
 
-    @property
-    def _joint(self) -> str:
-        return self.settings.mechanism.words.joint
-
-    @property
-    def _unit(self) -> JointUnit:
-        return self.settings.mechanism.words.joint_unit
-
     def _place(self, value: float | None) -> str:
-        return "no place" if value is None else f"{value:.3f} {self._unit}"
+        return "no place" if value is None else f"{value:.3f} {self.settings.mechanism.words.joint_unit}"
 
     def _at_pose(self, found: PositionMismatch) -> str:
         name = self.config.path.name
         if found.by_pose is None:
             return f"which leg {found.leg} cannot reach by {name}"
-        return f"where {name} has {self._joint} {found.leg} at {self._place(found.by_pose)}"
+        joint = self.settings.mechanism.words.joint
+        return f"where {name} has {joint} {found.leg} at {self._place(found.by_pose)}"
 
 
 def _position_trip(device: str, problem: str, action: str) -> Trip:
     return Trip(Guard.POSITION, device, problem, action)
 
 
-def _not_homed() -> Trip:
-    return _position_trip(
-        "controller", "is not homed: where the robot is, is not known", "Home it, then retry"
-    )
+_NOT_HOMED = _position_trip(
+    "controller", "is not homed: where the robot is, is not known", "Home it, then retry"
+)

@@ -112,8 +112,11 @@ class Journal:
         except OSError as error:
             raise self._cannot_open(error) from error
         try:
-            self._hold()
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._events, self._whole = self._read()
+        except BlockingIOError:
+            os.close(self._descriptor)
+            raise CellBusy("another process writes this journal", subject=path) from None
         except OSError as error:
             os.close(self._descriptor)
             raise self._cannot_open(error) from error
@@ -181,12 +184,6 @@ class Journal:
         """Remove what a failure left of a line, perhaps now that it can be done."""
         os.ftruncate(self._descriptor, self._whole)
         self._is_torn = False
-
-    def _hold(self) -> None:
-        try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise CellBusy("another process writes this journal", subject=self.path) from None
 
     def _cannot_open(self, error: OSError) -> FileError:
         return atomic_files.os_error_to_file_error("the journal cannot be opened", self.path, error)

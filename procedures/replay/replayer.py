@@ -108,13 +108,9 @@ class ReplayReport:
 
     def counts(self, difference: Difference) -> bool:
         """Whether a difference means that the replay failed; see ``docs/interface.md``."""
-        match difference.aspect:
-            case Aspect.WORDS:
-                return False
-            case Aspect.DECISION:
-                return self.is_same_software
-            case Aspect.RESULT:
-                return True
+        if difference.aspect is Aspect.DECISION:
+            return self.is_same_software
+        return difference.aspect is Aspect.RESULT
 
 
 def changes(recorded: BaseModel, replayed: BaseModel, tolerance: float) -> list[Change]:
@@ -147,15 +143,13 @@ def _changes(field: str, recorded: object, replayed: object, tolerance: float) -
             for place, (first, second) in enumerate(zip(recorded, replayed, strict=True)):
                 yield from _changes(f"{field}[{place}]", first, second, tolerance)
         case _:
-            if not _same(recorded, replayed, tolerance):
+            is_same = recorded == replayed
+            if isinstance(recorded, float) and isinstance(replayed, int | float):
+                both_nan = math.isnan(recorded) and math.isnan(replayed)
+                is_close = math.isclose(recorded, replayed, rel_tol=tolerance, abs_tol=tolerance)
+                is_same = both_nan or is_close
+            if not is_same:
                 yield Change(field, recorded, replayed)
-
-
-def _same(recorded: object, replayed: object, tolerance: float) -> bool:
-    if isinstance(recorded, float) and isinstance(replayed, int | float):
-        both_nan = math.isnan(recorded) and math.isnan(replayed)
-        return both_nan or math.isclose(recorded, replayed, rel_tol=tolerance, abs_tol=tolerance)
-    return recorded == replayed
 
 
 def _short(value: object) -> str:
@@ -220,7 +214,9 @@ class Replayer:
     async def _compare(self, event: events.Event, before: Sequence[Entry]) -> None:
         match event:
             case events.StepBegun():
-                await self._decision(event)
+                if self._scope.decides:
+                    self.report.decisions += 1
+                    self._compare_with(Aspect.DECISION, event.step.key, event.step, await self._decided())
                 self._current_step = event.step
                 return
             case events.Interrupted():
@@ -235,16 +231,8 @@ class Replayer:
         if isinstance(event, CANCELLING):
             self._current_step = None
 
-    async def _decision(self, event: events.StepBegun) -> None:
-        if not self._scope.decides:
-            return
-        self.report.decisions += 1
-        decided = await self._decided()
-        self._compare_with(Aspect.DECISION, event.step.key, event.step, decided)
-
     async def _decided(self) -> Step | Exception | None:
-        deciding = asyncio.to_thread(self._executor.next_step, self._state)
-        return await _result_or_error(deciding)
+        return await _result_or_error(asyncio.to_thread(self._executor.next_step, self._state))
 
     async def _outcome(self, step: Step, event: events.Event) -> None:
         if not self._scope.derives(step):

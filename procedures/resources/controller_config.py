@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import zip_longest
 from pathlib import Path
@@ -150,7 +150,7 @@ class ConfigChanges:
         )
 
     def cause(self, kind: WriteKind, why: str, *, by: str = THE_RUN) -> WriteCause:
-        """Why this run writes."""
+        """The cause of a write by this run."""
         return WriteCause(kind, by, self.folder.name, why)
 
     async def apply(
@@ -162,46 +162,46 @@ class ConfigChanges:
             WriteBackUndone: the controller did not read the new geometry; its config is as before.
             HexacellError: the config cannot be written or read.
         """
-        receipt = await in_thread(self._commit, change, backup, cause)
+        receipt = await self.write(change, backup, cause)
         try:
             await self.startup.reload()
         except HexacellError as error:
             undoing = self.cause(_UNDOES[cause.kind], f"the controller did not take it: {error}")
-            await in_thread(self._roll_back, receipt, undoing)
+            await self._roll_back(receipt, undoing)
+            has_old_geometry = False
+            with suppress(HexacellError):
+                await self.startup.controller.reload(self.startup.stated)
+                has_old_geometry = (await self.startup.guards.position.read()).trip is None
             raise WriteBackUndone(
                 f"the controller did not take {_NAMES[cause.kind]} ({error}); its config is restored",
                 subject=receipt.path,
-                action=action if await self._reads_again() else "Restart the controller before it moves",
+                action=action if has_old_geometry else "Restart the controller before it moves",
             ) from error
 
-    async def write(self, change: ConfigChange, backup: Path, cause: WriteCause) -> None:
-        """Write a change that the controller is not to read yet."""
-        await in_thread(self._commit, change, backup, cause)
+    async def write(self, change: ConfigChange, backup: Path, cause: WriteCause) -> Receipt:
+        """Write a change; the controller is not made to read it yet."""
+
+        def written() -> Receipt:
+            with self._recorded(cause):
+                return commit(change, backup)
+
+        return await in_thread(written)
 
     async def restore(self, backup: Path, cause: WriteCause) -> None:
         """Restore what a backup keeps; the controller is not made to read it yet."""
-        await in_thread(self._roll_back, Receipt.of(backup), cause)
+        await self._roll_back(Receipt.of(backup), cause)
 
     def require_begun_with(self, state: RunState) -> None:
         """Make sure that the config is the one that the run began with; raises ``FileError``."""
         if state.started and fingerprint(*self.cell.config_paths) != state.started.config_sha256:
             raise _edited(self.cell.config_path)
 
-    async def _reads_again(self) -> bool:
-        """Reload the restored config; whether the controller is known to have its old geometry."""
-        try:
-            await self.startup.controller.reload(self.startup.stated)
-            return (await self.startup.guards.position.read()).trip is None
-        except HexacellError:
-            return False
+    async def _roll_back(self, receipt: Receipt, cause: WriteCause) -> None:
+        def restored() -> None:
+            with self._recorded(cause):
+                rollback(receipt)
 
-    def _commit(self, change: ConfigChange, backup: Path, cause: WriteCause) -> Receipt:
-        with self._recorded(cause):
-            return commit(change, backup)
-
-    def _roll_back(self, receipt: Receipt, cause: WriteCause) -> None:
-        with self._recorded(cause):
-            rollback(receipt)
+        await in_thread(restored)
 
     @contextmanager
     def _recorded(self, cause: WriteCause) -> Iterator[None]:

@@ -259,19 +259,11 @@ class RunState:
 
     def held_out(self, phase: Phase) -> list[tuple[float, float, float]]:
         """Deviations, mm, at the held-out poses that are measured before and after; no references."""
-        found = self.identified
-        return [
-            sample.deviation_mm
-            for sample in self.samples(phase)
-            if sample.orientation > 1
-            and (
-                found is None  # a refused pose may have been refused in the other phase
-                or (
-                    self.refused.allows(sample.pose)
-                    and sample.orientation <= len(found.held_out[sample.at.point - 1])
-                )
-            )
-        ]
+        compared = [sample for sample in self.samples(phase) if sample.orientation > 1]
+        if found := self.identified:  # a pose of one phase may have been refused in the other
+            counts, allows = [len(poses) for poses in found.held_out], self.refused.allows
+            compared = [s for s in compared if s.orientation <= counts[s.at.point - 1] and allows(s.pose)]
+        return [sample.deviation_mm for sample in compared]
 
 
 def fold(history: Iterable[BaseEvent]) -> RunState:

@@ -46,10 +46,7 @@ class LengthSteps:
         """All poses with their names, if the fixture is where the cell file has it."""
         keys = [SetKey(phase=Phase.LENGTH, point=mounting) for mounting in (1, 2)]
         return tuple(
-            (
-                f"length check, seat {key.seat}, orientation {number}",
-                self._pose(key, number, np.zeros(3)),
-            )
+            (f"length check, seat {key.seat}, orientation {number}", self._pose(key, number, np.zeros(3)))
             for key in keys
             for number in range(1, self._records + 1)
         )
@@ -76,7 +73,10 @@ class LengthSteps:
             return self.sets.at_reference(state, key) or self.sets.to_reference(
                 state, key, self._zero(state, key)
             )
-        pose = self._pose(key, orientation, self._off(state, key)).as_tuple()
+        samples = measured.samples  # where the seat is beside its stated place, by the first reading in it
+        is_known = key.point != 1 and bool(samples)
+        off = BESIDE_MM - np.array(samples[0].deviation_mm) if is_known else np.zeros(3)
+        pose = self._pose(key, orientation, off).as_tuple()
         move = Move(at=key, orientation=orientation, pose=pose)
         if not self.sets.robot.refused.allows(pose):
             raise NoSafePath(
@@ -96,14 +96,6 @@ class LengthSteps:
         tilt = self.fixture.tilt_deg if tilts > 0 else 0.0
         x, y, z = position.tolist()
         return Pose(x, y, z, float(tilt * np.cos(about)), float(tilt * np.sin(about)))
-
-    def _off(self, state: RunState, key: SetKey) -> Array:
-        """Where the seat is (3,), mm, beside its stated place, by the first reading in it."""
-        samples = state.set(key).samples
-        if key.point == 1 or not samples:
-            return np.zeros(3)
-        off: Array = BESIDE_MM - np.array(samples[0].deviation_mm)
-        return off
 
     def _zero(self, state: RunState, key: SetKey) -> Array | None:
         """Where the ball is (3,), mm, with the gauges at zero, by what is known now."""

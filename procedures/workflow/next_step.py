@@ -59,7 +59,9 @@ def next_step(calibration: Calibration, state: RunState) -> BaseStep | None:
     if state.recalled is not None:
         return _way_back(measuring, state)
     if calibration.mode in {Mode.LENGTH, Mode.CHECK}:
-        return None if state.judged else _measure_and_judge(calibration.mode, measuring, state)
+        is_length = calibration.mode is Mode.LENGTH
+        measure = measuring.length_step if is_length else measuring.points.next_step
+        return None if state.judged else measure(state) or Judge()
     if state.identified is None:
         step = measuring.points.next_step(state)
         return step or (TakeBack() if state.provisional_active else Identify())
@@ -87,12 +89,6 @@ class Measuring:
     def length_step(self, state: RunState) -> BaseStep | None:
         """The next step of the length check; None when it is done."""
         return None if self.length is None else self.length.next_step(state)
-
-
-def _measure_and_judge(mode: Mode, measuring: Measuring, state: RunState) -> BaseStep:
-    """The next step of a check or of a length check."""
-    is_length = mode is Mode.LENGTH
-    return (measuring.length_step(state) if is_length else measuring.points.next_step(state)) or Judge()
 
 
 def length_poses(calibration: Calibration) -> tuple[tuple[str, Pose], ...]:
@@ -129,16 +125,12 @@ def _write_back(measuring: Measuring, state: RunState, *, has_length_check: bool
         return RollBack()
     if state.committed is None:
         return Commit()
-    return _verifying(measuring, state, has_length_check=has_length_check) or Judge()
-
-
-def _verifying(measuring: Measuring, state: RunState, *, has_length_check: bool) -> BaseStep | None:
-    """The next step of what the verdict on the written geometry needs; None if all is measured."""
-    if after := measuring.held_out.next_step(state, Phase.AFTER):
-        return after
-    if has_length_check and (length := measuring.length_step(state)):
-        return length
-    return None if state.confirmation is None else measuring.held_out.next_step(state, Phase.CONFIRM)
+    step = measuring.held_out.next_step(state, Phase.AFTER)
+    if step is None and has_length_check:
+        step = measuring.length_step(state)
+    if step is None and state.confirmation is not None:
+        step = measuring.held_out.next_step(state, Phase.CONFIRM)
+    return step or Judge()
 
 
 def _after_verdict(state: RunState, judged: ResultValidated) -> BaseStep | None:

@@ -15,7 +15,6 @@ import numpy as np
 from hexacell.campaign.decisions import FinishPoint, MeasurePose, StartPoint
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.campaign.planner import Plan
-from hexacell.cell.measuring import NoiseSettings
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
@@ -43,25 +42,21 @@ class NoiseSteps:
     plan: Plan
     sets: SetSteps
 
-    @property
-    def settings(self) -> NoiseSettings:
-        """What is to be measured."""
-        return self.plan.settings.noise
-
     def next_step(self, state: RunState, key: SetKey, known: Known | None) -> Step | None:
         """The next step at the open set; None if the noise is measured, or not to be.
 
         ``known`` is the robot, and where the ball was when the gauges were zeroed, if that is known.
         """
         measured = state.set(key)
-        is_asked = self.settings.standstill_readings or self.settings.revisits
+        wanted = self.plan.settings.noise
+        is_asked = wanted.standstill_readings or wanted.revisits
         if state.noise is not None or not is_asked or len(measured.samples) != 1:
             return None
         if state.at_pose != (key, 1):
             return self._away(state, key) or self.sets.way_back(state, key, known)
         if measured.has_left:
             return Repeat(at=key)
-        if self.settings.standstill_readings and measured.standstill is None:
+        if wanted.standstill_readings and measured.standstill is None:
             return Standstill(at=key)
         return self._leave(state, key, known) or AssessNoise()
 
@@ -89,15 +84,16 @@ class NoiseSteps:
     def _leave(self, state: RunState, key: SetKey, known: Known | None) -> Move | None:
         """The move away from the reference before its next visit; None after the last one."""
         done = len(state.set(key).visits)
-        if done >= self.settings.revisits:
+        if done >= self.plan.settings.noise.revisits:
             return None
         if pilot := self._to_pilot(state, key):
             return pilot
-        reference = reference_pose(state, key)
-        beside = [pose for pose in self._beside(reference) if self._is_clear(state, key, pose, known)]
-        if not beside:
-            return None
-        return Move(at=key, orientation=0, pose=beside[done % len(beside)])
+        beside = [
+            pose
+            for pose in self._beside(reference_pose(state, key))
+            if self._is_clear(state, key, pose, known)
+        ]
+        return Move(at=key, orientation=0, pose=beside[done % len(beside)]) if beside else None
 
     def _beside(self, reference: SixNumbers) -> Iterable[SixNumbers]:
         """Poses on all sides of the reference, each followed by the opposite one."""
@@ -131,7 +127,11 @@ class IdentificationSteps:
             return step
         match self.plan.decide(campaign_state(state, key)):
             case StartPoint() as start:
-                return self._start_point(state, start)
+                if self._applies_provisional(state):
+                    return Lend()
+                at = SetKey(phase=Phase.IDENTIFY, point=start.point)
+                move = Move(at=at, orientation=1, pose=start.pose.as_tuple())
+                return Locate() if state.position_unknown else self.sets.paths.towards(state, move)
             case MeasurePose() as pose:
                 return move_to_chosen(state, pose)
             case FinishPoint() as finish:
@@ -158,13 +158,6 @@ class IdentificationSteps:
             return None
         move = Move(at=key, orientation=orientation, pose=pose)
         return self.sets.paths.towards(state, move, self._ball(state, key))
-
-    def _start_point(self, state: RunState, start: StartPoint) -> Step:
-        if self._applies_provisional(state):
-            return Lend()
-        at = SetKey(phase=Phase.IDENTIFY, point=start.point)
-        move = Move(at=at, orientation=1, pose=start.pose.as_tuple())
-        return Locate() if state.position_unknown else self.sets.paths.towards(state, move)
 
     def _applies_provisional(self, state: RunState) -> bool:
         """Whether the controller gets a provisional geometry now, between two points."""
@@ -201,16 +194,12 @@ class IdentificationSteps:
         return None if known is None else known[1].reference
 
     def _known(self, state: RunState, key: SetKey) -> Known | None:
+        """The belief by now and the gauges' zero under it; None if there is no estimate."""
         try:
-            return self._estimated(state, key)
+            estimate = self.plan.estimate(campaign_state(state, key))
+            return estimate.belief.zeroed_at(state.zero_shown(key)), estimate.gauge_zero(key.point)
         except HexacellError:
             return None
-
-    def _estimated(self, state: RunState, key: SetKey) -> Known:
-        """The belief by now and the gauges' zero under it; raises ``HexacellError`` if there is none."""
-        estimate = self.plan.estimate(campaign_state(state, key))
-        belief = estimate.belief.zeroed_at(state.zero_shown(key))
-        return belief, estimate.gauge_zero(key.point)
 
 
 def open_set(state: RunState) -> SetKey | None:

@@ -39,7 +39,11 @@ def _plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[li
     is_check = calibration.mode is Mode.CHECK
     is_known = is_check or calibration.mode is Mode.QUICK
     failures = [*feasibility.reach_failures(calibration.plan)]
-    failures += [] if is_check else _held_out_failures(calibration)
+    held_out = () if is_check else calibration.settings.verification.points
+    for number, point in enumerate(held_out, start=1):
+        failures += feasibility.pose_failures(
+            calibration.plan, f"verification point {number}", Pose(*point)
+        )
     yield failures
     too_few = [] if is_check else [*feasibility.too_few_records(calibration.plan)]
     yield too_few
@@ -65,11 +69,6 @@ def _length_failures(calibration: Calibration, *, unattended: bool) -> Iterator[
             "unattended running is not possible: the gauges are mounted in the two seats by hand",
             action='Run it attended, or set mounting = "fixed" in [length_check] if no person is needed',
         )
-
-
-def _held_out_failures(calibration: Calibration) -> Iterator[HexacellError]:
-    for number, point in enumerate(calibration.settings.verification.points, start=1):
-        yield from feasibility.pose_failures(calibration.plan, f"verification point {number}", Pose(*point))
 
 
 async def device_failures(devices: Devices) -> list[HexacellError]:

@@ -5,6 +5,7 @@ A move follows checked straight lines from wherever the robot is, or is not made
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -56,7 +57,9 @@ class RunPathPlanner:
     def towards(self, state: RunState, goal: Move, reference: Array | None = None) -> Move:
         """The next move towards ``goal``: ``goal`` itself if the straight line to it is clear.
 
-        See :meth:`_next_move`. After an interruption the robot may be far from the set's gauges.
+        With gauges zeroed where the ball was at ``reference`` (3,), mm, the ball stays inside their
+        travel on the path, unless it is outside already. After an interruption the robot may be far from
+        the set's gauges.
 
         Raises:
             NoSafePath: there is no path.
@@ -71,17 +74,12 @@ class RunPathPlanner:
         return move.model_copy(update={"from_elsewhere": True})
 
     def _next_move(self, state: RunState, goal: Move, belief: RobotBelief, reference: Array | None) -> Move:
-        """The next move towards ``goal`` from where the robot was commanded or located last.
-
-        With gauges zeroed where the ball was at ``reference`` (3,), mm, the ball stays inside their
-        travel on the path, unless it is outside already. Intermediate poses are level ones, poses that
-        the set has visited, and waypoints.
-
-        Raises:
-            NoSafePath: there is no path.
-        """
+        """Intermediate poses are level ones, poses that the set has visited, and waypoints."""
         assert state.target is not None  # noqa: S101 - otherwise there is nothing to plan from
-        via = self._intermediate(state, goal)
+        levels = (Pose(*pose).level.as_tuple() for pose in (state.target, goal.pose))
+        samples = state.set(goal.at).samples
+        visited = [(s.orientation, s.pose) for s in samples if s.orientation != goal.orientation]
+        via = [*((0, pose) for pose in levels), *visited]
         start, end = self._command(state.target), self._command(goal.pose)
         if reference is not None and not _is_inside(belief, start, reference):
             reference = None
@@ -95,7 +93,11 @@ class RunPathPlanner:
         for path in paths:
             if path is not None:
                 return self._waypoint(goal.at, path.waypoints[0])
-        raise _no_safe_path(state.target, goal)
+        raise NoSafePath(
+            f"{goal.at}: the robot is at {Pose(*state.target)}, and no straight line within the limits "
+            f"leads from there to {goal.target}; it was not moved",
+            action="Bring it near that pose with its own controller, then continue",
+        )
 
     def back(
         self, state: RunState, key: SetKey, known: tuple[RobotBelief, GaugeZero] | None
@@ -125,45 +127,24 @@ class RunPathPlanner:
         """A move to a pose in the convention's frames at which nothing is measured."""
         return Move(at=key, orientation=0, pose=self.robot.to_command(command).as_tuple())
 
-    def _intermediate(self, state: RunState, goal: Move) -> list[tuple[int, SixNumbers]]:
-        """Poses that a route may use as waypoints, with their orientations; 0 where nothing is measured."""
-        samples = state.set(goal.at).samples
-        visited = [(s.orientation, s.pose) for s in samples if s.orientation != goal.orientation]
-        ends = (Pose(*pose) for pose in (state.target, goal.pose) if pose is not None)
-        return [*((0, pose.level.as_tuple()) for pose in ends), *visited]
-
     def _command(self, pose: SixNumbers) -> PoseBatch:
         return self.robot.from_commands([Pose(*pose)])
 
     def _belief(self, state: RunState) -> RobotBelief:
-        """What is known by now."""
         if state.identified is None:
-            return self._by_records(state)
+            measurements = with_pilots(state.measurements(), state.pilots)
+            with suppress(HexacellError):
+                if len(measurements):
+                    return self.robot.belief(estimate_online(self.robot.problem(measurements)))
+            return self.robot.belief()
         geometry = state.identified.result.identified(self.robot.mechanism.parameters)
         free = self.robot.mechanism.convention.free_parameters(geometry)
         return replace(self.robot.belief(), free=np.asarray(free))
-
-    def _by_records(self, state: RunState) -> RobotBelief:
-        measurements = with_pilots(state.measurements(), state.pilots)
-        if not len(measurements):
-            return self.robot.belief()
-        try:
-            return self.robot.belief(estimate_online(self.robot.problem(measurements)))
-        except HexacellError:
-            return self.robot.belief()
 
 
 def _is_inside(belief: RobotBelief, command: PoseBatch, reference: Array, share: float = 1.0) -> bool:
     ball = ball_position(belief, command)
     return ball is not None and bool(belief.limits.within_travel(ball - reference, share=share))
-
-
-def _no_safe_path(here: SixNumbers, goal: Move) -> NoSafePath:
-    return NoSafePath(
-        f"{goal.at}: the robot is at {Pose(*here)}, and no straight line within the limits "
-        f"leads from there to {goal.target}; it was not moved",
-        action="Bring it near that pose with its own controller, then continue",
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,7 +51,9 @@ class TrialSteps:
         pose = _beside(reference_pose(state, key), moved)
         if state.off_plan and state.target == pose:
             return Probe(at=key, moved_mm=moved)
-        if state.at_pose != (key, 1) and not _is_beside(state, key):
+        probed = [_beside(reference_pose(state, key), probe.moved_mm) for probe in measured.probes[-1:]]
+        is_beside = state.off_plan and not state.position_unknown and state.target in probed
+        if state.at_pose != (key, 1) and not is_beside:
             return self.sets.to_reference(state, key, ball)
         return Move(at=key, orientation=0, pose=pose)
 
@@ -75,13 +77,6 @@ class TrialSteps:
         )
         ball = ball_position(belief, here)
         return is_clear(belief, here, there, ball) and is_clear(belief, there, here, ball)
-
-
-def _is_beside(state: RunState, key: SetKey) -> bool:
-    """Whether the robot is where the last probe was read."""
-    probes = state.set(key).probes
-    beside = [_beside(reference_pose(state, key), probe.moved_mm) for probe in probes[-1:]]
-    return state.off_plan and not state.position_unknown and state.target in beside
 
 
 def _beside(reference: SixNumbers, moved: ThreeNumbers) -> SixNumbers:

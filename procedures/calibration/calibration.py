@@ -76,10 +76,8 @@ class Calibration:
 
     Attributes:
         listed: the poses to measure, if a file lists them.
-        accepted: the result that the controller has, of which a check starts; None where that is the
-            drawing. A length check and the quick level have one.
+        accepted: the result from which anything but a calibration starts; None where that is the drawing.
         length_check: whether the length scale of a calibration is checked.
-        effort: of the search for poses.
     """
 
     settings: CellSettings
@@ -153,11 +151,6 @@ class Knowledge:
 
     calibration: Calibration
     learnt: Learnt
-
-    @property
-    def noise(self) -> MeasuredNoise | None:
-        """What was measured of the noise; None before that."""
-        return self.learnt.noise
 
     @cached_property
     def settings(self) -> CellSettings:
@@ -244,9 +237,6 @@ class Knowledge:
         """The estimate by now, or the provisional geometry that the run applied before an interruption.
 
         A run has only one, because poses that were commanded with it are visited again.
-
-        Raises:
-            HexacellError: the records so far give no estimate.
         """
         lent = self.calibration.provisional_of(state)
         return self.plan.estimate(campaign_state(state, None)).belief.estimate if lent is None else lent

@@ -42,13 +42,7 @@ _log = logging.getLogger(__name__)
 
 
 class LiveValue(Generic[T]):
-    """The latest of one device.
-
-    Attributes:
-        value: what it answered last; None before the first answer.
-        problem: why it failed to answer after that; empty if it did not.
-        at_s: when it answered, by the clock of all values.
-    """
+    """The latest value of one device, or the problem that it had after that."""
 
     def __init__(self, live: LiveValues) -> None:
         self.value: T | None = None
@@ -81,7 +75,10 @@ class LiveValue(Generic[T]):
 
 
 class LiveValues:
-    """The latest values of all devices; ``now`` gives seconds.
+    """The latest values of all devices, for screens; ``now`` gives seconds.
+
+    They are the answers that the run needs anyway. No device is asked for a screen, so watching changes
+    neither the traffic nor the timing of a run. A slow subscriber misses values and delays nothing.
 
     Attributes:
         encoders: the six joint variables.
@@ -142,11 +139,7 @@ class Devices:
     live: LiveValues = field(default_factory=LiveValues)
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
-        """Connect to all of them at once; nothing moves.
-
-        Raises:
-            SeveralErrors: one or more do not answer as they must; all are named.
-        """
+        """Connect to all at once; nothing moves. Raises ``HexacellError``, which names all that fail."""
         gauges: list[Awaitable[Opened]] = [mounted.gauge.open() for mounted in self.gauges]
         calls = [*gauges, self.encoders.open(), self.controller.open(), self.stop_input.open()]
         found = await gather_errors("devices do not answer as they must", calls)

@@ -32,9 +32,7 @@ class DeviceReplaced(DeviceError):
 async def reconnect(devices: Devices, error: HexacellError, known: Sequence[DeviceIdentity]) -> bool:
     """Reopen the devices that are lost by an error; True if a gauge is among them: its zero is void.
 
-    Raises:
-        DeviceReplaced: another device answers.
-        HexacellError: a device cannot be opened.
+    Raises ``DeviceReplaced`` if another device answers, another ``HexacellError`` if none does.
     """
     errors = causes_of(error)
     gauges = [mounted for mounted in devices.gauges if _concerns(mounted, errors)]
@@ -53,8 +51,7 @@ async def reconnect(devices: Devices, error: HexacellError, known: Sequence[Devi
 def require_known(found: Iterable[DeviceIdentity], known: Sequence[DeviceIdentity]) -> None:
     """Refuse devices with another protocol, serial number or description than the run began with.
 
-    Raises:
-        DeviceReplaced: names both. Devices that were not known before pass.
+    Raises ``DeviceReplaced``, which names both. Devices that were not known before pass.
     """
     before = {identity.name: identity for identity in known}
     for now in found:

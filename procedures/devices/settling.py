@@ -96,10 +96,7 @@ async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:
 async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> Settled:
     """Read until the last window of readings agrees, and give that window.
 
-    A gauge that moves too much to be read counts as not settled.
-
-    Raises:
-        DeviceError: it never did within the time allowed; the message names what kept moving.
+    A gauge that moves too much to be read counts as not settled. Raises ``NeverSettled`` with what moved.
     """
     window: deque[DeviceSnapshot] = deque()
     begun, looks = clock.now(), 0
@@ -122,11 +119,7 @@ async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> 
 
 
 async def read_series(devices: Devices, timing: TimingSettings, clock: CellClock, count: int) -> Settled:
-    """``count`` readings one after the other, begun when the readings are settled.
-
-    Raises:
-        DeviceError: they did not settle, or a device cannot be read.
-    """
+    """``count`` readings one after the other, once the readings are settled; raises ``DeviceError``."""
     await settle(devices, timing, clock)
     series: list[DeviceSnapshot] = []
     look_s = clock.now()

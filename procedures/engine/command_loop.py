@@ -92,11 +92,7 @@ class StepCancelled(Exception):
 class CommandLoop:
     """Takes commands out of the queue and keeps the flags that they set.
 
-    Args:
-        queue: where commands are put.
-        broker: where questions are open, for answers.
-        state: gives the present state of the run.
-        reject: called with every command that is refused, and the reason.
+    ``state`` gives the present state of the run; ``reject`` is called with each refused command, and why.
     """
 
     def __init__(
@@ -126,11 +122,7 @@ class CommandLoop:
                 watcher(now)
 
     async def run_cancellable(self, work: Coroutine[Any, Any, Result]) -> Result:
-        """Run a coroutine to its end, taking commands meanwhile.
-
-        Raises:
-            StepCancelled: a command cancelled it; it has ended.
-        """
+        """Run a coroutine to its end, taking commands; raises ``StepCancelled`` if one cancelled it."""
         task, listening = asyncio.ensure_future(work), asyncio.ensure_future(self._until_cancelled())
         try:
             await asyncio.wait([task, listening], return_when=asyncio.FIRST_COMPLETED)
@@ -156,10 +148,7 @@ class CommandLoop:
             self._take(command)
 
     def take_invalidations(self) -> list[Invalidation]:
-        """What undo commands made invalid, oldest first; only once.
-
-        Each refers to the records that were there when it was requested, not to those taken meanwhile.
-        """
+        """What commands made invalid, oldest first, of the records of then; only once."""
         taken, self._invalidations = self._invalidations, []
         return taken
 

@@ -129,9 +129,14 @@ class CommandQueue:
 
 def invalidation_event(command: Undo | MeasureAgain, state: RunState) -> Invalidation:
     """The event of a command; raises ``UsageError`` where no such record is, or a result depends on it."""
-    key, orientation = (
-        _last_record(state) if isinstance(command, Undo) else (command.at, command.orientation)
-    )
+    if isinstance(command, Undo):
+        measured = [key for key in state.open_sets if state.set(key).samples]
+        if not measured:
+            raise UsageError("there is no record to undo in the set that is being measured")
+        key = state.at_pose[0] if state.at_pose and state.at_pose[0] in measured else measured[-1]
+        orientation: int | None = state.sets[key].samples[-1].orientation
+    else:
+        key, orientation = command.at, command.orientation
     samples = state.set(key).samples
     if not samples or (orientation is not None and orientation not in {s.orientation for s in samples}):
         raise UsageError(f"{key} has no such record")
@@ -140,14 +145,6 @@ def invalidation_event(command: Undo | MeasureAgain, state: RunState) -> Invalid
     if orientation is None or orientation == 1:
         return events.SetInvalidated(at=key, reason=REASON)
     return events.RecordDiscarded(at=key, orientation=orientation)
-
-
-def _last_record(state: RunState) -> tuple[SetKey, int]:
-    measured = [key for key in state.open_sets if state.set(key).samples]
-    if not measured:
-        raise UsageError("there is no record to undo in the set that is being measured")
-    key = state.at_pose[0] if state.at_pose and state.at_pose[0] in measured else measured[-1]
-    return key, state.sets[key].samples[-1].orientation
 
 
 def _dependent_result(phase: Phase, state: RunState) -> str | None:

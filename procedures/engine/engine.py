@@ -126,8 +126,7 @@ class Engine:
     def reopen_sets(self) -> None:
         """Continue after an interruption: discard the sets that cannot be continued.
 
-        A run that was killed has no ``Interrupted`` in its journal; it is added, since the position of
-        the robot is unknown.
+        The journal of a run that was killed gets an ``Interrupted``: the robot's position is unknown.
         """
         is_moving = self.state.target is not None and not self.state.position_unknown
         if is_moving or self.state.recalled is not None:

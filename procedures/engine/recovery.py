@@ -231,7 +231,7 @@ def _invalidated(keys: Sequence[SetKey], reason: str) -> list[events.SetInvalida
 
 @dataclass(frozen=True, slots=True)
 class Reversal:
-    """A transaction to revert.
+    """A change of the config to revert although no decision of the procedure asks for it.
 
     Attributes:
         step: the step that reverts it.

@@ -1,9 +1,4 @@
-"""Polling of the supervised devices: their latest answers, from which the rules are evaluated.
-
-- :class:`DevicePoller`, one task a device: read it, keep the answer, pause, read again.
-- :class:`LineActivity`, one a communication line: the time since the last answer on it. Devices on
-  one line are read one after the other, so an answer of one shows that the line works for all.
-"""
+"""Polling of the supervised devices: their latest answers, from which the rules are evaluated."""
 
 from __future__ import annotations
 
@@ -34,7 +29,10 @@ _FRESH_SAMPLES = 2
 
 @dataclass(slots=True, eq=False)
 class LineActivity:
-    """Time since the last answer on a communication line, s of real time."""
+    """Time since the last answer on a communication line, s of real time.
+
+    Devices on one line are read in turn, so an answer of one shows that the line works for all.
+    """
 
     silent_s: float = 0.0
 
@@ -111,11 +109,7 @@ class WatchedController:
         self._restart()
 
     async def status(self) -> ControllerStatus:
-        """Its status now.
-
-        Raises:
-            ControllerFrozen: its heartbeat stands although a joint moves.
-        """
+        """Its status now; raises ``ControllerFrozen``: its heartbeat stands although a joint moves."""
         sample = self._devices.live.encoders.value  # before the heartbeat, which may only be newer
         status = await self._devices.controller_status()
         if not status.heartbeat or status.heartbeat != self._heartbeat:

@@ -67,12 +67,7 @@ class PositionReports:
 
 @dataclass(frozen=True, slots=True)
 class AgreementTolerances:
-    """Differences up to which reports agree, mm.
-
-    Attributes:
-        position_mm: of a position that the controller reports.
-        encoders: of an encoder from the controller's joint variable.
-    """
+    """Differences up to which reports agree, mm: of a reported position, and of an encoder from a joint."""
 
     position_mm: float
     encoders: float
@@ -178,11 +173,7 @@ class PositionCheck:
     config: CurrentConfig
 
     async def read(self, encoders: EncoderSample | None = None) -> CheckedPosition:
-        """Where the robot is, if ``encoders`` were read already with that sample of them.
-
-        Raises:
-            HexacellError: a device or the config cannot be read.
-        """
+        """Where the robot is, by this sample of the ``encoders`` or a new one; raises ``HexacellError``."""
         try:
             found = await self._compared(encoders or await self.devices.read_encoders())
         except NotHomedError:

@@ -42,11 +42,7 @@ MAX_DELAY_S = 0.02
 
 
 class MotionSupervisor:
-    """Supervises actions. A trip is latched: no further action starts until ``clear`` is called.
-
-    Attributes:
-        latched: the latched trip, if any.
-    """
+    """Supervises actions. A trip is latched: no further action starts until ``clear`` is called."""
 
     def __init__(self, controller: Controller, clock: CellClock, folder: Path, free_disk_mb: float) -> None:
         self.latched: Trip | None = None
@@ -60,11 +56,7 @@ class MotionSupervisor:
         self.latched = None
 
     def check(self) -> None:
-        """Refuse to start while a trip is latched or the disk is nearly full.
-
-        Raises:
-            GuardTripped: the reason.
-        """
+        """Raise ``GuardTripped`` while a trip is latched or the disk is nearly full."""
         if self.latched is not None:
             raise self.latched.as_error()
         if trip := low_disk_space(self._folder, self._free_disk_mb):
@@ -211,27 +203,14 @@ class GuardMonitor:
 
 
 def low_disk_space(folder: Path, limit_mb: float) -> Trip | None:
-    """The free disk space of a folder, which need not exist yet, is below its limit.
-
-    Raises:
-        FileError: it cannot be determined.
-    """
-    free_mb = _free_bytes(folder) / 1e6
-    if free_mb >= limit_mb:
-        return None
-    return Trip(
-        Guard.DISK,
-        str(folder),
-        f"only {free_mb:.0f} MB are free where the run is kept, less than {limit_mb:g} MB",
-        "Free some space, then resume",
-    )
-
-
-def _free_bytes(folder: Path) -> int:
+    """The trip of a folder, which need not exist yet, with too little free space; raises ``FileError``."""
     there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
     try:
-        return shutil.disk_usage(there).free
+        free_mb = shutil.disk_usage(there).free / 1e6
     except OSError as error:
-        raise atomic_files.os_error_to_file_error(
-            "its free space cannot be determined", there, error
-        ) from error
+        problem = "its free space cannot be determined"
+        raise atomic_files.os_error_to_file_error(problem, there, error) from error
+    if free_mb >= limit_mb:
+        return None
+    problem = f"only {free_mb:.0f} MB are free where the run is kept, less than {limit_mb:g} MB"
+    return Trip(Guard.DISK, str(folder), problem, "Free some space, then resume")

@@ -39,7 +39,7 @@ from procedures.steps.events import Event
 _log = logging.getLogger(__name__)
 
 LONGEST_LINE = 16 << 20
-"""Bytes; no event comes near it. A file without line ends must not fill the memory."""
+"""Most bytes of a line; no event comes near it. A file without line ends must not fill the memory."""
 
 # A link would lead what is appended to another file.
 _APPENDING = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK | os.O_NOFOLLOW
@@ -78,32 +78,27 @@ class Entry:
     event: Event
 
 
-def read_journal(path: Path) -> tuple[Event, ...]:
-    """All events of a journal.
+def read_journal(path: Path, longest_line: int = LONGEST_LINE) -> tuple[Event, ...]:
+    """All events of a journal, none of which has more than ``longest_line`` bytes.
 
     Raises:
         FileError: absent, written by a newer program, or damaged before its last line; the message
             names the line.
     """
-    return tuple(entry.event for entry in read_entries(path))
+    return tuple(entry.event for entry in read_entries(path, longest_line))
 
 
-def read_entries(path: Path) -> tuple[Entry, ...]:
+def read_entries(path: Path, longest_line: int = LONGEST_LINE) -> tuple[Entry, ...]:
     """All events of a journal with number and time of each; raises ``FileError``."""
     try:
         with open(path, "rb", opener=_open_without_waiting) as stream:
-            return _parse(path, stream)[0]
+            return _parse(path, stream, longest_line)[0]
     except OSError as error:
         raise atomic_files.os_error_to_file_error("cannot be read", path, error) from error
 
 
 class Journal:
-    """A journal open for appending.
-
-    Raises:
-        CellBusy: another process writes it.
-        FileError: it cannot be opened, or is damaged.
-    """
+    """A journal open for appending; raises ``CellBusy`` if another process writes it, or ``FileError``."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -199,28 +194,25 @@ def _write_whole(descriptor: int, data: bytes) -> None:
         data = data[os.write(descriptor, data) :]
 
 
-def _parse(path: Path, stream: BinaryIO) -> tuple[tuple[Entry, ...], int]:
+def _parse(path: Path, stream: BinaryIO, longest_line: int = LONGEST_LINE) -> tuple[tuple[Entry, ...], int]:
     """The entries, and how many bytes of the file are whole lines."""
     if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
         raise FileError("this is not a file", subject=path, action="Check the path")
     entries: list[Entry] = []
     whole = 0
     with _collector_at_rest():
-        while line := stream.readline(LONGEST_LINE):
+        while line := stream.readline(longest_line):
             due = len(entries) + 1
             entry = decode(line, path, due)
             if entry is None:
-                if begins_whole(line) or _has_more_data(stream):
+                parts = iter(partial(stream.read, longest_line), b"")
+                if begins_whole(line) or any(part.strip(b"\0") for part in parts):
                     problem = "this line of the journal is damaged"
                     raise FileError(problem, subject=path, line=due, action=RESTORE)
                 break
             entries.append(entry)
             whole += len(line)
     return tuple(entries), whole
-
-
-def _has_more_data(stream: BinaryIO) -> bool:
-    return any(part.strip(b"\0") for part in iter(partial(stream.read, LONGEST_LINE), b""))
 
 
 @contextmanager

@@ -5,7 +5,6 @@ No robot moves, so there is nothing to supervise: the guards of a replay only ev
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Self, TypeVar
@@ -18,13 +17,11 @@ from drivers.interfaces import (
     DeviceIdentity,
     EncoderSample,
     ReportedPosition,
-    StartupActions,
 )
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
 from hexacell.errors import AnswerNeeded, DeviceError
 from hexacell.kinematics.pose import Pose
-from hexacell.kinematics.rotations import Array
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.calibration import Calibration
 from procedures.devices.device_set import Devices
@@ -34,7 +31,6 @@ from procedures.guards.supervision import Supervised
 from procedures.run.questions import Question
 from procedures.run.readings import Reading, ReadingSeries
 from procedures.run.state import RunState
-from procedures.run.trips import WatchedSet
 from procedures.steps import events
 from procedures.workflow.next_step import StepExecutor
 
@@ -90,12 +86,6 @@ class RecordedController:
         """Nothing to connect."""
         return DeviceIdentity("controller", PROTOCOL, "a controller in a journal")
 
-    async def prepare(self, permitted: StartupActions) -> None:
-        """Nothing to do."""
-
-    async def move(self, pose: Pose, duration_s: float) -> None:
-        """Nothing to do."""
-
     async def position(self) -> ReportedPosition | None:
         """Nothing is asked of it: see :meth:`RecordedStepExecutor.locate`."""
         return None
@@ -104,14 +94,10 @@ class RecordedController:
         """Enabled."""
         return ControllerStatus(estop=False, enabled=True)
 
-    async def stop(self) -> None:
+    async def _nothing(self, *_args: object, **_named: object) -> None:
         """Nothing to do."""
 
-    async def reload(self, permitted: StartupActions) -> None:
-        """Nothing to do."""
-
-    async def close(self) -> None:
-        """Nothing to release."""
+    prepare = move = stop = reload = close = _nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,26 +121,14 @@ class RecordedOperator:
 class InactiveGuards(Guards):
     """Guards without supervision."""
 
-    async def prepare(self, order: Supervised[None]) -> None:
+    async def _nothing(self, *_args: object, **_named: object) -> None:
         """Nothing to do."""
-        del order
 
-    async def move(
-        self, target: Pose, duration_s: float, watched: WatchedSet, commanded: Callable[[], Array]
-    ) -> None:
-        """Nothing to do."""
-        del target, duration_s, watched, commanded
+    prepare = move = while_not_ready = require_reloaded = _nothing
 
     async def at_standstill(self, action: Supervised[Result]) -> Result:
         """Run it."""
         return await action()
-
-    async def while_not_ready(self, order: Supervised[None]) -> None:
-        """Nothing to do."""
-        del order
-
-    async def require_reloaded(self) -> None:
-        """Nothing to do."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""The controller's config during a run: its changes, each a transaction, and edits by somebody else.
+"""The controller made ready, and its config during a run: changes, each a transaction, and edits.
 
 A run makes two changes: a provisional geometry while the points are measured, and the result. One step
 applies a change, another reverts it::
@@ -47,7 +47,13 @@ _RESETS = frozenset({StartupAction.RESET_INITIAL_ESTOP, StartupAction.RESET_ESTO
 
 @dataclass(eq=False)
 class Startup:
-    """What makes the controller of one run ready.
+    """Makes the controller of one run ready, by the word of the cell file or of a person.
+
+    An emergency stop is a person's to reset. The program does it only before a run begins: of a controller
+    that has been in one since it was started, where the cell file says so, of any other where a person
+    does. One that came during a run is reset at the controller, however the run is continued. Switching on
+    and homing need the cell file's word or a person's. A reload command may restart the controller, which
+    is then in the emergency stop that it starts in: the cell file's word counts for that as well.
 
     Attributes:
         stated: what the cell file permits.
@@ -61,12 +67,10 @@ class Startup:
     may_have_begun: bool = False
 
     async def prepare(self, state: RunState) -> None:
-        """Make it ready to move.
+        """Make it ready to move; raises ``HexacellError`` if that cannot be done.
 
-        Raises:
-            AnswerNeeded: a person must permit something, or do it, and there is none.
-            Interruption: a person did not permit it.
-            HexacellError: it cannot be made ready, or a guard tripped.
+        An ``AnswerNeeded`` is raised without a person to permit or to do something, an ``Interruption`` if
+        that person refuses.
         """
         is_during_run = self.may_have_begun or state.is_in_estop
         await self._prepare_asking(_RESETS if is_during_run else frozenset())
@@ -156,11 +160,9 @@ class ConfigChanges:
     async def apply(
         self, change: ConfigChange, backup: Path, cause: WriteCause, action: str | None = None
     ) -> None:
-        """Write a change and make the controller read it.
+        """Write a change and make the controller read it; raises ``HexacellError``.
 
-        Raises:
-            WriteBackUndone: the controller did not read the new geometry; its config is as before.
-            HexacellError: the config cannot be written or read.
+        That is a ``WriteBackUndone`` if the controller did not read it; its config is as before.
         """
         receipt = await self.write(change, backup, cause)
         try:
@@ -230,8 +232,7 @@ class ConfigEdits:
     def require_none(self, state: RunState) -> None:
         """Make sure that the config is as the run has it; while it is being changed, it may be either.
 
-        Raises:
-            FileError: it was edited; with the first line that differs, if this process has seen it before.
+        Raises ``FileError``, with the first line that differs if this process has seen it before.
         """
         expected = expected_fingerprints(self.folder, state)
         if not expected:

@@ -93,13 +93,9 @@ class RunResources:
         return await self.guards.locate()
 
     async def require_departure(self, state: RunState) -> None:
-        """Make sure that the robot is where the run left it; nothing moves.
+        """Make sure that the robot is where the run left it; nothing moves. Raises ``GuardTripped``.
 
-        While a run is paused, or waits for a person, somebody may have moved the robot with its own
-        controller.
-
-        Raises:
-            GuardTripped: it is somewhere else, or where it is, is not known.
+        While a run is paused or waits for a person, somebody may have moved it with its own controller.
         """
         supervisor = self.guards.supervisor
         supervisor.check()

@@ -5,14 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from hexacell.errors import (
-    DeviceError,
-    ExitCode,
-    HexacellError,
-    LimitError,
-    SeveralErrors,
-    flatten_errors,
-)
+from hexacell.errors import DeviceError, ExitCode, HexacellError, LimitError, SeveralErrors, flatten_errors
 
 
 class Guard(StrEnum):
@@ -71,10 +64,8 @@ class GuardTripped(DeviceError):
         super().__init__(trip.problem, subject=trip.device, action=trip.action)
 
     def __str__(self) -> str:
-        text = super().__str__()
-        return (
-            _MAY_STILL_MOVE.format(f"{self.trip.stop_failure}\n{text}") if self.trip.stop_failure else text
-        )
+        text, failure = super().__str__(), self.trip.stop_failure
+        return _MAY_STILL_MOVE.format(f"{failure}\n{text}") if failure else text
 
 
 class RobotNotStopped(SeveralErrors, DeviceError):

@@ -112,9 +112,7 @@ def require_response(settings: CellSettings, moved_mm: Array, shown_mm: Array) -
     """What each gauge showed per length of a move along each axis (3, 3), by gauge and axis.
 
     ``moved_mm`` (3, 3) are the moves in rows, ``shown_mm`` (3, 3) what the gauges x, y, z showed of them.
-
-    Raises:
-        MountingError: names the gauges that do not follow the ball as they should, and what to do.
+    Raises ``MountingError`` with the gauges that do not follow the ball as they should, and what to do.
     """
     response = response_of(moved_mm, shown_mm)
     if findings := judge_response(response):

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
 from drivers.errors import GaugeAtEnd
-from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.model import CellSettings
 from hexacell.errors import DeviceError, HexacellError, consists_only_of, joined
 from hexacell.kinematics.pose import Pose
@@ -158,18 +156,11 @@ async def read_inside(
 
 
 def require_room(settings: CellSettings, shown_mm: ThreeNumbers) -> None:
-    """Refuse gauges whose plungers stand too far from the middle of their travel.
+    """Raise ``MountingError`` for gauges whose plungers stand too far from the middle of their travel.
 
     ``shown_mm`` is what they show along base x, y, z. A gauge whose display does not show its place passes.
-
-    Raises:
-        MountingError: says which gauge must be moved, which way, and how far.
     """
-    if errors := list(_without_room(settings, shown_mm)):
-        raise joined("the gauges must be mounted again", errors)
-
-
-def _without_room(settings: CellSettings, shown_mm: ThreeNumbers) -> Iterator[MountingError]:
+    errors: list[MountingError] = []
     travel = gauge_travel_of(settings)
     room, needed = travel.room(shown_mm), travel.sure_room
     gauges = sorted(settings.gauges, key=lambda gauge: gauge.axis)
@@ -177,14 +168,13 @@ def _without_room(settings: CellSettings, shown_mm: ThreeNumbers) -> Iterator[Mo
         if place is None or abs(place) <= settings.stations.mounting_mm:
             continue
         left = room.upper[axis] if place > 0.0 else -room.lower[axis]
-        yield _off_the_middle(gauge, place, max(0.0, left), needed.upper[axis])
-
-
-def _off_the_middle(gauge: GaugeSettings, place: float, left_mm: float, needed_mm: float) -> MountingError:
-    side = f"{'+' if place > 0.0 else '-'}{gauge.axis}"
-    return MountingError(
-        f"its plunger stands {abs(place):.1f} mm from the middle of its travel: {left_mm:.1f} mm are left "
-        f"towards {side}, where {needed_mm:g} are needed",
-        subject=f"gauge {gauge.name}",
-        action=f"Move the gauge by {abs(place):.1f} mm along {side}, or correct its middle_mm",
-    )
+        side = f"{'+' if place > 0.0 else '-'}{gauge.axis}"
+        error = MountingError(
+            f"its plunger stands {abs(place):.1f} mm from the middle of its travel: {max(0.0, left):.1f} "
+            f"mm are left towards {side}, where {needed.upper[axis]:g} are needed",
+            subject=f"gauge {gauge.name}",
+            action=f"Move the gauge by {abs(place):.1f} mm along {side}, or correct its middle_mm",
+        )
+        errors.append(error)
+    if errors:
+        raise joined("the gauges must be mounted again", errors)

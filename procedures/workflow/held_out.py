@@ -36,11 +36,7 @@ class HeldOutSteps:
         return None
 
     def way_back(self, state: RunState, key: SetKey) -> Step:
-        """The next move to the reference of a set in which the robot is.
-
-        Raises:
-            HexacellError: no safe path leads there.
-        """
+        """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""
         is_in_order = self.sets.paths.is_in_order(state, key)
         return reference_move(state, key) if is_in_order else self._to_reference(state, key)
 

@@ -46,11 +46,7 @@ class StepExecutor(RunResources):
 
 
 def next_step(calibration: Calibration, state: RunState) -> BaseStep | None:
-    """The step to execute; None if the run is over.
-
-    Raises:
-        HexacellError: no step is possible.
-    """
+    """The step to execute; None if the run is over. Raises ``HexacellError`` if none is possible."""
     if state.ended is not None:
         return None
     if state.config_write_pending:
@@ -70,13 +66,7 @@ def next_step(calibration: Calibration, state: RunState) -> BaseStep | None:
 
 
 class Measuring:
-    """The stages that measure, for the geometries that command the robot of a plan.
-
-    Attributes:
-        points: the identification, or a check.
-        held_out: the held-out points.
-        length: the length check; None without a fixture.
-    """
+    """The stages that measure, for the geometries that command the robot of a plan."""
 
     def __init__(self, plan: Plan) -> None:
         sets, settings = SetSteps(plan.robot), plan.settings
@@ -99,9 +89,9 @@ def length_poses(calibration: Calibration) -> tuple[tuple[str, Pose], ...]:
 
 
 def _way_back(measuring: Measuring, state: RunState) -> BaseStep | None:
-    """The next move back to the reference of the set in which the robot is; None where it is there.
+    """The next move back to the reference of the set in which the robot is; None where there is none.
 
-    Nor is there one where the robot is in no set, is lost, or finds no safe path.
+    Such is a robot that is there, is in no set, is lost, or finds no safe path.
     """
     keys = [key for key in state.open_sets if state.set(key).samples]
     at_reference = state.at_pose is not None and state.at_pose[1] == 1

@@ -181,11 +181,7 @@ class IdentificationSteps:
         return step or self.sets.to_reference(state, key, self._ball(state, key))
 
     def way_back(self, state: RunState, key: SetKey) -> Step:
-        """The next move to the reference of a set in which the robot is.
-
-        Raises:
-            HexacellError: no safe path leads there.
-        """
+        """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""
         return self.sets.way_back(state, key, self._known(state, key))
 
     def _ball(self, state: RunState, key: SetKey) -> Array | None:

@@ -1,7 +1,4 @@
-"""The steps within one set of poses, whatever it is measured for, and the moves between its poses.
-
-A move follows checked straight lines from wherever the robot is, or is not made (:mod:`hexacell.motion`).
-"""
+"""The steps within a set of poses and the moves between them: along checked straight lines, or none."""
 
 from __future__ import annotations
 
@@ -102,10 +99,9 @@ class RunPathPlanner:
     def back(
         self, state: RunState, key: SetKey, known: tuple[RobotBelief, GaugeZero] | None
     ) -> Move | None:
-        """The next move back to a set's reference, the gauges being there.
+        """The next move back to a set's reference by the path on which the robot came; None if it did not.
 
-        See :func:`hexacell.motion.paths.next_return_move`. Where nothing is ``known`` the robot
-        returns by the path on which it came. None if it did not come from the reference.
+        Where something is ``known`` the path is shortened (:func:`hexacell.motion.paths.next_return_move`).
         """
         visited = state.path_from_reference
         if len(visited) < 2 or state.target != visited[-1][1] or visited[0][1] != state.set(key).pose(1):
@@ -159,10 +155,7 @@ class SetSteps:
         return RunPathPlanner(self.robot)
 
     def at_pose(self, state: RunState, key: SetKey, orientation: int | None = None) -> Step | None:
-        """Place the gauges or sample, if the robot is at the pose of the set's next record.
-
-        That is the one of an ``orientation``, by default the lowest without a record.
-        """
+        """Place the gauges or sample, if the robot is at an orientation: by default the lowest missing."""
         orientation = orientation or state.set(key).next_orientation
         if state.at_pose != (key, orientation) or state.target is None:
             return None
@@ -190,11 +183,7 @@ class SetSteps:
         return self.paths.towards(state, move, ball)
 
     def way_back(self, state: RunState, key: SetKey, known: Known | None) -> Move:
-        """The next move to the reference of the set in which the robot is.
-
-        Raises:
-            HexacellError: no safe path leads there.
-        """
+        """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""
         back = self.paths.back(state, key, known)
         return back or self.to_reference(state, key, None if known is None else known[1].reference)
 

@@ -1,9 +1,8 @@
-"""The steps that try the gauges: whenever they were placed or connected again, three small known moves.
+"""The steps that try the gauges, whenever they were placed or connected again.
 
-The reference of a set is recorded, the ball is moved a millimetre along each axis of the base, and the
-gauges are read. Back at the reference it is judged whether each of them follows the ball on its axis, with
-its sign and scale (:mod:`hexacell.noise.gauge_trial`). Only then is anything else
-measured.
+From a recorded reference the ball is moved a millimetre along each axis of the base, and the gauges are
+read. Back at the reference it is judged whether each of them follows the ball on its axis, with its sign
+and scale (:mod:`hexacell.noise.gauge_trial`). Only then is anything else measured.
 """
 
 from __future__ import annotations
@@ -33,12 +32,9 @@ class TrialSteps:
     sets: SetSteps
 
     def next_step(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
-        """The next step at a set with a reference; None if its gauges were tried, or are not to be.
+        """The next step; None if no trial is due. Raises ``LimitError`` where no small move is possible.
 
         ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
-
-        Raises:
-            LimitError: no small move is possible there.
         """
         measured = state.set(key)
         if not self.distance_mm or measured.tried or not measured.samples:

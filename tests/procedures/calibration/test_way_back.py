@@ -33,7 +33,7 @@ class ClearLines:
     ) -> None:
         self.clear_to = clear_to
         self.stops = stops
-        monkeypatch.setattr(IdentificationSteps, "_estimated", lambda *_: (None, self))
+        monkeypatch.setattr(IdentificationSteps, "_known", lambda *_: (None, self))
         monkeypatch.setattr(paths, "is_clear", self._is_clear)
         monkeypatch.setattr(paths, "PathPlanner", self._departure)
         self.reference = np.zeros(3)
@@ -126,7 +126,7 @@ def test_without_an_estimate_the_return_visits_every_previous_pose(make_rig, sto
     def unknown(*_: Any) -> Any:
         raise IdentifiabilityError("the records cannot be followed")
 
-    monkeypatch.setattr(IdentificationSteps, "_estimated", unknown)
+    monkeypatch.setattr(IdentificationSteps, "_known", unknown)
     step = next_step(make_rig().calibration, fold(story().whole(ORIENTATIONS)[:-2]))
     assert step.key == f"P1/o{ORIENTATIONS - 1:02d}/move"
 

@@ -9,7 +9,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hexacell.errors import FileError
-from procedures.journal import journal as journal_module
 from procedures.journal.journal import Journal, read_journal
 from tests.procedures.journal.told import TOLD, checked, write_told
 
@@ -105,10 +104,9 @@ def test_a_journal_cut_at_any_byte_keeps_all_whole_lines(path: Path, data) -> No
     assert read_journal(cut) == TOLD[:whole]
 
 
-def test_a_line_without_end_does_not_fill_the_memory(path: Path, written: bytes, monkeypatch) -> None:
-    monkeypatch.setattr(journal_module, "LONGEST_LINE", 2000)
+def test_a_line_without_end_does_not_fill_the_memory(path: Path, written: bytes) -> None:
     path.write_bytes(written + b"x" * 1000)
-    assert read_journal(path) == TOLD
+    assert read_journal(path, longest_line=2000) == TOLD
     path.write_bytes(written + b"x" * 5000)
     with pytest.raises(FileError, match=r":5: .*damaged"):
-        read_journal(path)
+        read_journal(path, longest_line=2000)

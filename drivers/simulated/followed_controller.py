@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from drivers.simulated.cell import SimulatedSensors
-from drivers.simulated.physics import GaugePlaces, Motion, RobotPhysics
+from drivers.simulated.physics import Motion, RobotPhysics
 from drivers.simulated.served_device import Closeable, ServedGroup
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
@@ -59,10 +59,7 @@ class JointSource(Closeable):
 
     def passed(self) -> list[Array]:
         """Where the joints (6,), mm, have been since the last call, in order."""
-        found = []
-        while self._passed:
-            found.append(self._passed.popleft())
-        return found
+        return [self._passed.popleft() for _ in range(len(self._passed))]
 
     def close(self) -> None:
         with self._lock:
@@ -105,55 +102,45 @@ def joints_in(line: str) -> Array | None:
     return numbers[:LEGS] if numbers[LEGS:].all() else None
 
 
-class KeptGauges:
-    """The file, beside the controller's config. It holds as long as the config is what it was then.
+class FollowingPhysics(RobotPhysics):
+    """Where the joints are is what ``source`` says; before it says anything, at the first point.
 
-    With another geometry the same command leads elsewhere, and a person would place the gauges anew.
+    Where the gauges are is kept in a file beside the controller's ``config``. It holds as long as the
+    config is what it was then: with another geometry the same command leads elsewhere, and a person would
+    place the gauges anew.
     """
 
-    def __init__(self, config: tuple[Path, ...]) -> None:
-        self.path = config[0].with_name(f".{config[0].name}.simulated-gauges")
-        self._config = config
-
-    def restore(self, places: GaugePlaces) -> None:
-        """Put the gauges where they were, if that is known, and note from now on where they are put."""
-        with suppress(OSError, FileError, ValueError, KeyError, TypeError):
-            kept = json.loads(self.path.read_text())
-            if kept["config"] == fingerprint(*self._config):
-                station, triad = np.array(kept["station"], float), np.array(kept["triad"], float)
-                places.stand(station.reshape(3), triad.reshape(3, 3))
-        places.on_placed = self._keep
-
-    def _keep(self, station: Array, triad: Array) -> None:
-        # A folder that cannot be written is no reason to have no gauges.
-        with suppress(FileError):
-            kept = {
-                "config": fingerprint(*self._config),
-                "station": station.tolist(),
-                "triad": triad.tolist(),
-            }
-            write_atomically(self.path, json.dumps(kept).encode())
-
-
-class FollowingPhysics(RobotPhysics):
-    """Where the joints are is what ``source`` says; before it says anything, at the first point."""
-
-    def __init__(self, source: JointSource, kept: KeptGauges, *arguments: Any) -> None:  # noqa: ANN401 - those of its base
+    def __init__(self, source: JointSource, config: tuple[Path, ...], *arguments: Any) -> None:  # noqa: ANN401 - those of its base
         super().__init__(*arguments)
         self._source = source
-        self._kept: KeptGauges | None = kept
+        self._config = config
+        self._kept = config[0].with_name(f".{config[0].name}.simulated-gauges")
+        self._is_first = True
         self._draw_noise()
 
     def _update(self) -> float:
         now = self._clock.now()
         for shown in self._source.passed():
             self._follow(shown / self._shown_per_mm, now)
-            if (
-                self._kept is not None
-            ):  # before, the ball was at the first point for want of anything better
-                self._kept.restore(self.gauges)
-                self._kept = None
+            if self._is_first:  # before, the ball was at the first point for want of anything better
+                self._is_first = False
+                self._restore_gauges()
         return now
+
+    def _restore_gauges(self) -> None:
+        """Put the gauges where they were, if that is known, and note from now on where they are put."""
+        with suppress(OSError, FileError, ValueError, KeyError, TypeError):
+            kept = json.loads(self._kept.read_text())
+            if kept["config"] == fingerprint(*self._config):
+                station, triad = np.array(kept["station"], float), np.array(kept["triad"], float)
+                self.gauges.stand(station.reshape(3), triad.reshape(3, 3))
+        self.gauges.on_placed = self._keep_gauges
+
+    def _keep_gauges(self, station: Array, triad: Array) -> None:
+        with suppress(FileError):  # a folder that cannot be written is no reason to have no gauges
+            places = {"station": station.tolist(), "triad": triad.tolist()}
+            kept = {"config": fingerprint(*self._config), **places}
+            write_atomically(self._kept, json.dumps(kept).encode())
 
     def encoder_positions(self) -> Array:
         with self._lock:
@@ -198,9 +185,8 @@ class FollowedController(ServedGroup):
         commanding, fixture = layout.read(*config), settings.length_check
         with ExitStack() as served:
             source = served.enter_context(JointSource(simulation.joints_command))
-            kept = KeptGauges(config)
             self.physics = FollowingPhysics(
-                source, kept, mechanism, simulation, clock, commanding, home, fixture
+                source, config, mechanism, simulation, clock, commanding, home, fixture
             )
             self.sensors = served.enter_context(
                 SimulatedSensors(settings, simulation, self.physics, clock, other_processes=other_processes)

@@ -204,13 +204,6 @@ class Connection:
 
     async def _greet(self) -> None:
         await self._write(self._encoded(f"hello {self.address.connect_password} {_CLIENT}"))
-        self.server = self._server_in(await self._first_line())
-        await self._write(self._encoded("set echo off"))
-        with suppress(TimeoutError):  # the only response, if any, is the echo
-            await self._line(loop_time() + self._timeouts.explanation)
-        await self.request("set verbose on")
-
-    async def _first_line(self) -> str:
         deadline = loop_time() + self._timeouts.answer
         try:
             while (line := await self._line(deadline)).lower().startswith("warning:"):
@@ -223,19 +216,21 @@ class Connection:
                 subject=self.address.name,
                 action="Check that linuxcncrsh listens there, and restart LinuxCNC",
             ) from None
-        return line
-
-    def _server_in(self, line: str) -> str:
         match line.split():
             case ["HELLO", "ACK", *server]:
-                return " ".join(server)
+                self.server = " ".join(server)
             case ["HELLO", "NAK"]:
                 raise DeviceError(
                     "refuses the connect password",
                     subject=self.address.name,
                     action="Set connect_password in the password_file to linuxcncrsh's own (--connectpw)",
                 )
-        raise self._not_linuxcncrsh(line)
+            case _:
+                raise self._not_linuxcncrsh(line)
+        await self._write(self._encoded("set echo off"))
+        with suppress(TimeoutError):  # the only response, if any, is the echo
+            await self._line(loop_time() + self._timeouts.explanation)
+        await self.request("set verbose on")
 
     def _not_linuxcncrsh(self, said: str) -> DeviceError:
         return DeviceError(

@@ -22,11 +22,12 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count, takewhile
 from pathlib import Path
+from typing import Self
 
 from hexacell.errors import HexacellError, UsageError
 
@@ -43,7 +44,89 @@ class _Configured:
 
     ini: Path
     server: argparse.Namespace
-    screen: str | None
+    screen: str | None = None
+
+    @classmethod
+    def by(cls, ini: Path) -> Self:
+        """What is started by an INI file, with linuxcncrsh's own defaults.
+
+        Raises:
+            UsageError: it does not start linuxcncrsh, or a screen that cannot come back.
+        """
+        parser = argparse.ArgumentParser(add_help=False)
+        parser.add_argument("-p", "--port", type=int, default=5007)
+        parser.add_argument("-w", "--connectpw", default="EMC")
+        parser.add_argument("-e", "--enablepw", default="EMCTOO")
+        program, *options = shlex.split(_variable(ini, "DISPLAY", "DISPLAY")) or [""]
+        display = Path(program).name
+        if display == SERVER:
+            return cls(ini, parser.parse_known_args(options)[0])
+        applications = (shlex.split(_variable(ini, "APPLICATIONS", "APP", number)) for number in count(1))
+        for program, *options in takewhile(bool, applications):
+            if Path(program).name == SERVER:
+                if not os.environ.get("DISPLAY"):
+                    raise UsageError(
+                        f"{display} needs a screen, and there is no DISPLAY here",
+                        action="Start hexacell on that screen, or restart LinuxCNC by your own command",
+                    )
+                return cls(ini, parser.parse_known_args(options)[0], display)
+        raise UsageError(
+            f"neither [DISPLAY] DISPLAY nor an [APPLICATIONS] APP of {ini} is {SERVER}",
+            action="Name the INI file that LinuxCNC runs, or restart it by a command of your own",
+        )
+
+    def greets(self) -> bool:
+        """Whether linuxcncrsh answers."""
+        try:
+            with self._connected() as connection:
+                return bool(connection.recv(64))
+        except OSError:
+            return False
+
+    def is_shut_down(self) -> bool:
+        """Whether it has ended; if not, it is asked to, perhaps again: another client may garble that."""
+        if screens := self._screens():
+            if self.screen == AXIS:
+                with suppress(subprocess.TimeoutExpired):
+                    subprocess.run(["axis-remote", "--quit"], timeout=ANSWER_S, check=False)  # noqa: S607
+                return False
+            for process in screens:
+                with suppress(ProcessLookupError):
+                    os.kill(process, signal.SIGTERM)
+            return False
+        if not self.greets():
+            return not LOCK.exists()
+        with suppress(OSError), self._connected() as connection:
+            connection.sendall(f"set enable {self.server.enablepw}\r\nshutdown\r\n".encode())
+            while connection.recv(64):
+                pass  # until it closes the connection
+        return False
+
+    def _connected(self) -> socket.socket:
+        connection = socket.create_connection(("127.0.0.1", self.server.port), timeout=ANSWER_S)
+        connection.sendall(f"hello {self.server.connectpw} restart 1.0\r\n".encode())
+        return connection
+
+    def _screens(self) -> list[int]:
+        """The processes of the screen, which LinuxCNC gives the name of its INI file, or of a copy."""
+        found: list[int] = []
+        inis = {str(self.ini), f"{self.ini}.expanded"}
+        for path in Path("/proc").glob("[0-9]*/cmdline") if self.screen else ():
+            with suppress(OSError):  # it has ended meanwhile
+                words = path.read_bytes().decode(errors="replace").split("\0")
+                if self.screen in {Path(word).name for word in words[:2]} and inis & {*words}:
+                    found.append(int(path.parent.name))
+        return found
+
+
+def _variable(ini: Path, section: str, name: str, number: int = 1) -> str:
+    """The value of a variable, as LinuxCNC finds it; of one that is there often that with this number."""
+    return subprocess.run(  # noqa: S603 - LinuxCNC's own program
+        ["inivar", "-ini", str(ini), "-sec", section, "-var", name, "-num", str(number)],  # noqa: S607
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout
 
 
 def main() -> int:
@@ -71,9 +154,8 @@ def restart(ini: Path, ended_s: float = ENDED_S, poll_s: float = POLL_S) -> subp
             does not start.
         OSError: LinuxCNC is not installed here, or its folder cannot be written.
     """
-    configured = _configured_in(ini)
-    server = configured.server
-    _wait(lambda: _is_shut_down(configured), ended_s, poll_s, "LinuxCNC does not end")
+    configured = _Configured.by(ini)
+    _wait(configured.is_shut_down, ended_s, poll_s, "LinuxCNC does not end")
     log = ini.with_name(LOG)
     with log.open("wb") as output:
         started = subprocess.Popen(  # noqa: S603 - LinuxCNC's own program
@@ -84,115 +166,12 @@ def restart(ini: Path, ended_s: float = ENDED_S, poll_s: float = POLL_S) -> subp
             stderr=output,
             start_new_session=True,
         )
-    _wait(
-        lambda: _greeting(server) or started.poll() is not None,
-        STARTED_S,
-        poll_s,
-        "LinuxCNC does not answer",
-    )
+    answer = "LinuxCNC does not answer"
+    _wait(lambda: configured.greets() or started.poll() is not None, STARTED_S, poll_s, answer)
     if started.poll() is not None:
         said = log.read_text(errors="replace").strip()[-SHOWN_CHARACTERS:]
         raise UsageError(f"LinuxCNC ended at once: {said}", action=f"Look at {log}")
     return started
-
-
-def _configured_in(ini: Path) -> _Configured:
-    program, *options = shlex.split(_variable(ini, "DISPLAY", "DISPLAY")) or [""]
-    display = Path(program).name
-    if display == SERVER:
-        return _Configured(ini, _server_with(options), screen=None)
-    applications = (shlex.split(_variable(ini, "APPLICATIONS", "APP", number)) for number in count(1))
-    for program, *options in takewhile(bool, applications):
-        if Path(program).name == SERVER:
-            if not os.environ.get("DISPLAY"):
-                raise UsageError(
-                    f"{display} needs a screen, and there is no DISPLAY here",
-                    action="Start hexacell on that screen, or restart LinuxCNC by a command of your own",
-                )
-            return _Configured(ini, _server_with(options), screen=display)
-    raise UsageError(
-        f"neither [DISPLAY] DISPLAY nor an [APPLICATIONS] APP of {ini} is {SERVER}",
-        action="Name the INI file that LinuxCNC runs, or restart it by a command of your own",
-    )
-
-
-def _variable(ini: Path, section: str, name: str, number: int = 1) -> str:
-    """The value of a variable, as LinuxCNC finds it; of one that is there often that with this number."""
-    done = subprocess.run(  # noqa: S603 - LinuxCNC's own program
-        ["inivar", "-ini", str(ini), "-sec", section, "-var", name, "-num", str(number)],  # noqa: S607
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    return done.stdout
-
-
-def _server_with(options: list[str]) -> argparse.Namespace:
-    """Port and passwords of linuxcncrsh, with its own defaults."""
-    parser = argparse.ArgumentParser(add_help=False)
-    parser.add_argument("-p", "--port", type=int, default=5007)
-    parser.add_argument("-w", "--connectpw", default="EMC")
-    parser.add_argument("-e", "--enablepw", default="EMCTOO")
-    return parser.parse_known_args(options)[0]
-
-
-def _greeting(server: argparse.Namespace) -> bool:
-    """Whether it answers."""
-    try:
-        with _connected(server) as connection:
-            return bool(connection.recv(64))
-    except OSError:
-        return False
-
-
-def _connected(server: argparse.Namespace) -> socket.socket:
-    connection = socket.create_connection(("127.0.0.1", server.port), timeout=ANSWER_S)
-    connection.sendall(f"hello {server.connectpw} restart 1.0\r\n".encode())
-    return connection
-
-
-def _is_shut_down(configured: _Configured) -> bool:
-    """Whether it has ended; if not, it is asked to, perhaps again: another client may garble that."""
-    server = configured.server
-    if screens := _screens(configured):
-        _end(configured.screen, screens)
-        return False
-    if not _greeting(server):
-        return not LOCK.exists()
-    with suppress(OSError), _connected(server) as connection:
-        connection.sendall(f"set enable {server.enablepw}\r\nshutdown\r\n".encode())
-        while connection.recv(64):
-            pass  # until it closes the connection
-    return False
-
-
-def _end(screen: str | None, processes: list[int]) -> None:
-    if screen == AXIS:
-        with suppress(subprocess.TimeoutExpired):
-            subprocess.run(["axis-remote", "--quit"], timeout=ANSWER_S, check=False)  # noqa: S607
-        return
-    for process in processes:
-        with suppress(ProcessLookupError):
-            os.kill(process, signal.SIGTERM)
-
-
-def _screens(configured: _Configured) -> list[int]:
-    """The processes of the screen, which LinuxCNC gives the name of its INI file, or of a copy of it."""
-    if configured.screen is None:
-        return []
-    inis = {str(configured.ini), f"{configured.ini}.expanded"}
-    return [
-        process
-        for process, words in _commands()
-        if configured.screen in {Path(word).name for word in words[:2]} and inis & {*words}
-    ]
-
-
-def _commands() -> Iterator[tuple[int, list[str]]]:
-    """Every process of this machine with its command."""
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        with suppress(OSError):  # it has ended meanwhile
-            yield int(path.parent.name), path.read_bytes().decode(errors="replace").split("\0")
 
 
 def _wait(condition: Callable[[], bool], limit_s: float, poll_s: float, problem: str) -> None:

@@ -66,7 +66,14 @@ def set_pins(files: Sequence[Path], settle_s: float = KINEMATICS_CYCLES_S) -> in
             "the HAL files set no pin to a number, or to a variable of these INI files",
             action="Name the files that have the geometry",
         )
-    before = _values(wanted)
+    shown = _shown("*")
+    if absent := sorted(wanted.keys() - shown.keys()):
+        raise UsageError(
+            f"the running LinuxCNC has no pin {absent[0]}",
+            action="Start it with this configuration, or name its own HAL files",
+        )
+    # LinuxCNC shows seven digits of them, which is enough to go back while the machine is off.
+    before = {pin: shown[pin] for pin in wanted}
     _set(wanted)
     time.sleep(settle_s)
     if failing := [pin for pin, value in _shown(FAILURE_PINS).items() if value == "TRUE"]:
@@ -90,26 +97,9 @@ def _wanted(hal: Iterable[Path], inis: Sequence[IniText]) -> Iterator[tuple[str,
                 if reference is None:
                     if not inis:
                         yield setp["pin"], setp["value"]
-                elif (ini := _with_section(reference["section"], inis)) is not None:
-                    yield setp["pin"], ini.number(f"{reference['section']}/{reference['name']}").text
-
-
-def _with_section(section: str, inis: Sequence[IniText]) -> IniText | None:
-    return next((ini for ini in inis if ini.has_section(section)), None)
-
-
-def _values(wanted: Iterable[str]) -> dict[str, str]:
-    """What the pins are now.
-
-    LinuxCNC shows seven digits of them, which is enough to go back while the machine is off.
-    """
-    shown = _shown("*")
-    if absent := sorted(set(wanted) - shown.keys()):
-        raise UsageError(
-            f"the running LinuxCNC has no pin {absent[0]}",
-            action="Start it with this configuration, or name its own HAL files",
-        )
-    return {pin: shown[pin] for pin in wanted}
+                elif with_it := [ini for ini in inis if ini.has_section(reference["section"])]:
+                    number = with_it[0].number(f"{reference['section']}/{reference['name']}")
+                    yield setp["pin"], number.text
 
 
 def _shown(pattern: str) -> Mapping[str, str]:

@@ -10,7 +10,7 @@ import asyncio
 import os
 import sys
 import tempfile
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from pathlib import Path
 
 from drivers.controllers.linuxcnc.commands import NO_REASON, ControllerCommands
@@ -22,6 +22,7 @@ from hexacell.errors import DeviceError
 Stopped = Callable[[], bool]
 
 _MODAL_ACTION = "Put it into RS274NGC_STARTUP_CODE, or send it in MDI"
+_LINEAR_UNITS_ACTION = "Set [TRAJ] LINEAR_UNITS = mm in its INI file"
 _OFFSET_MM = 1e-6
 _UNITS_MM = {"MM": 1.0, "CM": 10.0, "INCH": 25.4}
 _FULL_FEED_PERCENT = 100.0
@@ -60,7 +61,7 @@ async def leave_emergency_stop(commands: ControllerCommands, timeouts: Timeouts)
         DeviceError: It stays on, for example because a switch is still pressed.
     """
     await commands.set("estop off", timeouts.command)
-    if not await _becomes_true(lambda: _is(commands, "estop", on=False), timeouts):
+    if not await _becomes(commands, "estop", "OFF", timeouts):
         raise DeviceError(
             f"stays in emergency stop: {await commands.reason()}",
             subject=commands.subject,
@@ -80,7 +81,7 @@ async def switch_machine(commands: ControllerCommands, timeouts: Timeouts, *, on
     state, errors = "on" if on else "off", list[str]()
     for _ in range(_MOST_REQUESTS):
         await commands.set(f"machine {state}", timeouts.command)
-        if await _becomes_true(lambda: _is(commands, "machine", on=on), timeouts):
+        if await _becomes(commands, "machine", state.upper(), timeouts):
             return
         if errors := await commands.errors():
             break
@@ -146,13 +147,9 @@ async def enter_mdi_mode(commands: ControllerCommands, timeouts: Timeouts) -> No
     Raises:
         DeviceError: It stays in another mode.
     """
-
-    async def is_mdi() -> bool:
-        return (await commands.get("mode")).upper() == "MDI"
-
     for _ in range(_MOST_REQUESTS):
         await commands.set("mode mdi", timeouts.command)
-        if await _becomes_true(is_mdi, timeouts):
+        if await _becomes(commands, "mode", "MDI", timeouts):
             return
     problem = f"does not enter MDI mode: {await commands.reason()}"
     raise DeviceError(problem, subject=commands.subject)
@@ -167,50 +164,28 @@ async def check_coordinate_system(commands: ControllerCommands) -> str:
         DeviceError: It counts in another unit than the cell file says; or relative moves, a tool length, an
             offset or a feed override is active.
     """
+
+    def refusal(problem: str, action: str) -> DeviceError:
+        return DeviceError(problem, subject=commands.subject, action=action)
+
     units = (await commands.get_if_known("user_linear_units")).upper()
-    if units and _UNITS_MM.get(units) != commands.unit_mm:
-        raise DeviceError(
-            f"counts in {units.lower()}, controller.unit_mm is {commands.unit_mm:g}",
-            subject=commands.subject,
-            action=f"Set controller.unit_mm = {_UNITS_MM[units]:g}"
-            if units in _UNITS_MM
-            else "Set [TRAJ] LINEAR_UNITS = mm in its INI file",
-        )
+    if units and (unit_mm := _UNITS_MM.get(units)) != commands.unit_mm:
+        action = f"Set controller.unit_mm = {unit_mm:g}" if unit_mm else _LINEAR_UNITS_ACTION
+        raise refusal(f"counts in {units.lower()}, controller.unit_mm is {commands.unit_mm:g}", action)
     text = await commands.get_if_known("program_codes")
-    codes = text.upper().split()
-    for wrong, meaning, right in (
-        ("G91", "takes coordinates as relative", "G90"),
-        ("G43", "adds a tool length", "G49"),
-    ):
-        if wrong in codes:
-            raise DeviceError(
-                f"{meaning} ({wrong})",
-                subject=commands.subject,
-                action=f"{right} is needed. {_MODAL_ACTION}",
-            )
-    await _refuse_offsets(commands)
-    await _refuse_feed_override(commands)
-    return text
-
-
-async def _refuse_feed_override(commands: ControllerCommands) -> None:
+    if "G91" in (codes := text.upper().split()):
+        raise refusal("takes coordinates as relative (G91)", f"G90 is needed. {_MODAL_ACTION}")
+    if "G43" in codes:
+        raise refusal("adds a tool length (G43)", f"G49 is needed. {_MODAL_ACTION}")
+    offset = await commands.get_if_known("pos_offset")
+    if offset and any(abs(value) > _OFFSET_MM for value in parse_positions(offset)):
+        action = "Clear it: G10 L2 P1 X0 Y0 Z0 A0 B0 C0 and G92.1 in MDI"
+        raise refusal(f"adds an offset of {offset} to every coordinate (G54, G92)", action)
     percent = await commands.get_if_known("feed_override")
     if percent and parse_number(percent) > _FULL_FEED_PERCENT:
-        raise DeviceError(
-            f"moves {percent} % as fast as it is told (feed override)",
-            subject=commands.subject,
-            action="Set the feed override to 100 % or less",
-        )
-
-
-async def _refuse_offsets(commands: ControllerCommands) -> None:
-    text = await commands.get_if_known("pos_offset")
-    if text and any(abs(value) > _OFFSET_MM for value in parse_positions(text)):
-        raise DeviceError(
-            f"adds an offset of {text} to every coordinate (G54, G92)",
-            subject=commands.subject,
-            action="Clear it: G10 L2 P1 X0 Y0 Z0 A0 B0 C0 and G92.1 in MDI",
-        )
+        problem = f"moves {percent} % as fast as it is commanded (feed override)"
+        raise refusal(problem, "Set the feed override to 100 % or less")
+    return text
 
 
 def _raise_if_stopped(stopped: Stopped, commands: ControllerCommands) -> None:
@@ -218,13 +193,10 @@ def _raise_if_stopped(stopped: Stopped, commands: ControllerCommands) -> None:
         raise MotionInterrupted("was stopped before it was ready", subject=commands.subject)
 
 
-async def _is(commands: ControllerCommands, what: str, *, on: bool) -> bool:
-    return await commands.is_on(what) is on
-
-
-async def _becomes_true(condition: Callable[[], Awaitable[bool]], timeouts: Timeouts) -> bool:
+async def _becomes(commands: ControllerCommands, what: str, state: str, timeouts: Timeouts) -> bool:
+    """Whether the answer to a query is this state before the time for a switch is over."""
     deadline = loop_time() + timeouts.switch
-    while not await condition():
+    while (await commands.get(what)).upper() != state:
         if loop_time() > deadline:
             return False
         await asyncio.sleep(timeouts.poll)

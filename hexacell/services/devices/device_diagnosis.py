@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
-from contextlib import asynccontextmanager
-from dataclasses import dataclass, field
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, InvalidSampleError, WrongAnswer
-from drivers.interfaces import DeviceIdentity, Gauge
+from drivers.interfaces import DeviceIdentity, EncoderBank, Gauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.wire_trace import WireTrace
 from hexacell.cell.loader import Cell
@@ -20,7 +19,6 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError, UsageError
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.services.devices.device_setup import device_addresses, devices_of
-from procedures.devices.device_set import Devices
 from procedures.run.cancellation import shielded
 
 ENCODERS = "encoders"
@@ -80,11 +78,11 @@ class DeviceDiagnosis:
         problem: why it was not watched to the end, or what its settings are wrong by; empty if neither.
     """
 
-    device: str
-    identities: tuple[DeviceIdentity, ...]
-    seconds: float
-    readings: int
-    series: tuple[SeriesFigures, ...]
+    device: str = ""
+    identities: tuple[DeviceIdentity, ...] = ()
+    seconds: float = 0.0
+    readings: int = 0
+    series: tuple[SeriesFigures, ...] = ()
     failures: tuple[FailureFigures, ...] = ()
     problem: str = ""
     stated_noise: float = 0.0
@@ -107,22 +105,16 @@ async def diagnose(cell: Cell, device: str, seconds: float) -> DeviceDiagnosis:
     if device not in known:
         raise UsageError(f"the cell has no device '{device}'", action=f"Name one of {', '.join(known)}")
     with cell_lock(*cell.config_paths), device_addresses(cell, other_processes=False) as settings:
-        async with _devices(settings) as devices:
+        trace = WireTrace()
+        links = SharedSerialPorts(trace=trace)
+        try:  # of all drivers, only the one that is watched is opened
+            devices = devices_of(settings, links, trace)
             if device == ENCODERS:
-                return await _watch_encoders(devices, settings, seconds)
+                return await _watch_encoders(devices.encoders, settings, seconds)
             [mounted] = [one for one in devices.gauges if one.gauge.name == device]
             return await _watch_gauge(mounted.gauge, settings.noise.gauge_at(mounted.axis.index), seconds)
-
-
-@asynccontextmanager
-async def _devices(settings: CellSettings) -> AsyncIterator[Devices]:
-    """The drivers, of which only those that are watched are opened."""
-    trace = WireTrace()
-    links = SharedSerialPorts(trace=trace)
-    try:
-        yield devices_of(settings, links, trace)
-    finally:
-        await shielded(links.close())
+        finally:
+            await shielded(links.close())
 
 
 async def _watch_gauge(gauge: Gauge, stated_mm: float, seconds: float) -> DeviceDiagnosis:
@@ -131,79 +123,58 @@ async def _watch_gauge(gauge: Gauge, stated_mm: float, seconds: float) -> Device
 
     try:
         identity = await gauge.open()
-        watched = await _watched(read, seconds)
-        if not watched.problem:
+        seen = await _watched(read, seconds, [f"gauge {gauge.name}"], "mm")
+        if not seen.problem:
             try:
                 await gauge.check()
             except HexacellError as error:
-                watched.problem = str(error)
+                seen = replace(seen, problem=str(error))
     finally:
         await gauge.close()
-    return watched.diagnosis(gauge.name, (identity,), [f"gauge {gauge.name}"], "mm", stated_mm)
+    return replace(seen, device=gauge.name, identities=(identity,), stated_noise=stated_mm)
 
 
-async def _watch_encoders(devices: Devices, settings: CellSettings, seconds: float) -> DeviceDiagnosis:
+async def _watch_encoders(encoders: EncoderBank, settings: CellSettings, seconds: float) -> DeviceDiagnosis:
     async def read() -> tuple[float, ...]:
-        return (await devices.encoders.read()).positions
+        return (await encoders.read()).positions
 
     try:
-        identities = await devices.encoders.open()
-        watched = await _watched(read, seconds)
+        identities = await encoders.open()
+        names = [f"encoder {leg}" for leg in range(1, 7)]
+        seen = await _watched(read, seconds, names, str(settings.encoders.unit))
     finally:
-        await devices.encoders.close()
-    names, unit = [f"encoder {leg}" for leg in range(1, 7)], str(settings.encoders.unit)
-    return watched.diagnosis(ENCODERS, identities, names, unit, settings.noise.encoder)
+        await encoders.close()
+    return replace(seen, device=ENCODERS, identities=identities, stated_noise=settings.noise.encoder)
 
 
-@dataclass
-class _Watched:
-    """Readings as they come."""
+async def _watched(read: Read, seconds: float, names: Sequence[str], unit: str) -> DeviceDiagnosis:
+    """Read as fast as the device answers, at least once; ``names`` are those of its numbers.
 
-    seconds: float = 0.0
-    values: list[tuple[float, ...]] = field(default_factory=list)
-    failures: defaultdict[Failure, list[str]] = field(default_factory=lambda: defaultdict(list))
-    problem: str = ""
-
-    def diagnosis(
-        self,
-        device: str,
-        identities: tuple[DeviceIdentity, ...],
-        names: Sequence[str],
-        unit: str,
-        stated_noise: float,
-    ) -> DeviceDiagnosis:
-        """The figures of all readings; failures by kind, as each damaged answer is another one."""
-        columns = np.array(self.values).T if self.values else ()
-        return DeviceDiagnosis(
-            device,
-            identities,
-            self.seconds,
-            len(self.values),
-            tuple(_figures(name, unit, column) for name, column in zip(names, columns, strict=False)),
-            tuple(FailureFigures(kind, len(said), said[-1]) for kind, said in self.failures.items()),
-            self.problem,
-            stated_noise,
-        )
-
-
-async def _watched(read: Read, seconds: float) -> _Watched:
-    """Read as fast as the device answers, at least once."""
-    watched, begun = _Watched(), time.monotonic()
-    while not watched.problem and (not watched.seconds or watched.seconds < seconds):
+    Failures are kept by kind, as each damaged answer is another one.
+    """
+    begun, passed_s, problem = time.monotonic(), 0.0, ""
+    values: list[tuple[float, ...]] = []
+    failures: defaultdict[Failure, list[str]] = defaultdict(list)
+    while not problem and (not passed_s or passed_s < seconds):
         try:
-            watched.values.append(await read())
+            values.append(await read())
         except tuple(FAILURES) as error:
             kind = next(kind for base, kind in FAILURES.items() if isinstance(error, base))
-            watched.failures[kind].append(error.problem)
+            failures[kind].append(error.problem)
         except HexacellError as error:
-            watched.problem = str(error)
-        watched.seconds = time.monotonic() - begun
-    return watched
-
-
-def _figures(name: str, unit: str, values: np.ndarray) -> SeriesFigures:
-    lowest, highest, distinct = float(values.min()), float(values.max()), len(set(values.tolist()))
-    return SeriesFigures(name, unit, lowest, highest, _scatter(values), distinct)
+            problem = str(error)
+        passed_s = time.monotonic() - begun
+    series = []
+    for name, column in zip(names, np.array(values).T if values else (), strict=False):
+        lowest, highest, distinct = float(column.min()), float(column.max()), len(set(column.tolist()))
+        series.append(SeriesFigures(name, unit, lowest, highest, _scatter(column), distinct))
+    return DeviceDiagnosis(
+        seconds=passed_s,
+        readings=len(values),
+        series=tuple(series),
+        failures=tuple(FailureFigures(kind, len(said), said[-1]) for kind, said in failures.items()),
+        problem=problem,
+    )
 
 
 def _scatter(values: np.ndarray) -> float | None:

@@ -359,5 +359,5 @@ async def test_a_feed_override_that_makes_moves_faster_is_refused(play, percent,
     if not is_refused:
         await driver.prepare(frozenset())
         return
-    with pytest.raises(DeviceError, match=r"moves 120 % as fast as it is told \(feed override\)"):
+    with pytest.raises(DeviceError, match=r"moves 120 % as fast as it is commanded \(feed override\)"):
         await driver.prepare(frozenset())

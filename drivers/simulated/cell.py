@@ -114,7 +114,6 @@ class SimulatedCell(ServedGroup):
         home = Pose(*settings.identification.points[0])
         commanding, fixture = layout.read(*config), settings.length_check
         self.physics = RobotPhysics(mechanism, simulation, clock, commanding, home, fixture)
-        soft_limits = simulation.soft_limits
         self.machine = SimulatedMachine(
             mechanism,
             layout,
@@ -122,11 +121,14 @@ class SimulatedCell(ServedGroup):
             self.physics,
             clock,
             home,
-            soft_limits,
+            simulation.soft_limits,
             includes_zeros=settings.controller.joints_include_zeros,
         )
         with ExitStack() as served:
-            stop_file = _stop_file(settings, served)
+            if settings.guards.stop_file is not None:
+                stop_file = Path(settings.guards.stop_file)
+            else:  # one in a temporary folder that is removed at the end
+                stop_file = Path(served.enter_context(TemporaryDirectory(prefix="hexacell-"))) / "stop"
             sensors = served.enter_context(
                 SimulatedSensors(settings, simulation, self.physics, clock, other_processes=other_processes)
             )
@@ -136,22 +138,9 @@ class SimulatedCell(ServedGroup):
             self.schedule = served.enter_context(FaultSchedule(self.faults, clock, simulation.faults))
             self.physics.on_motion_start = self.schedule.on_motion_start
             self._served = served.pop_all()
+        address = {"host": "127.0.0.1", "port": self.controller.port, "startup": simulation.startup}
+        controller = settings.controller.model_copy(update=address)
+        guards = settings.guards.model_copy(update={"stop_file": str(stop_file)})
         self.settings = sensors.addressed(settings).model_copy(
-            update={
-                "controller": settings.controller.model_copy(
-                    update={
-                        "host": "127.0.0.1",
-                        "port": self.controller.port,
-                        "startup": simulation.startup,
-                    }
-                ),
-                "guards": settings.guards.model_copy(update={"stop_file": str(stop_file)}),
-            }
+            update={"controller": controller, "guards": guards}
         )
-
-
-def _stop_file(settings: CellSettings, served: ExitStack) -> Path:
-    """The stop file of the cell, or one in a temporary folder that is removed at the end."""
-    if settings.guards.stop_file is not None:
-        return Path(settings.guards.stop_file)
-    return Path(served.enter_context(TemporaryDirectory(prefix="hexacell-"))) / "stop"

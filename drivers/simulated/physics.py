@@ -48,11 +48,6 @@ class Motion:
     duration_s: float
     stopped_s: float = np.inf
 
-    @classmethod
-    def stationary(cls, joints: Array) -> Motion:
-        """Standstill at joint variables (6,)."""
-        return cls(np.stack([joints, joints]), -1e9, 0.0)
-
     @property
     def end_s(self) -> float:
         """When the joints reach standstill."""
@@ -195,7 +190,7 @@ class RobotPhysics:
         self._shown_per_mm = 1.0 + 1e-6 * settings.encoders.common_scale_um_m
         shown = inverse_kinematics(mechanism, commanding.geometry, commanding.branch, start)
         joints = shown / self._shown_per_mm
-        self._motion = Motion.stationary(joints[0])
+        self._motion = Motion(joints[[0, 0]], -1e9, 0.0)  # standstill
         self._joints = joints[0]
         self._rows_passed = 0
         first = continue_solution(
@@ -254,26 +249,17 @@ class RobotPhysics:
             measured: Array = shown + self._encoder_noise + flicker
             return measured
 
-    def true_joints(self) -> Array:
-        """Where the joints are (6,), mm, whatever the encoders show."""
-        with self._lock:
-            return self._motion.joints(self._clock.now())
-
     def gauge_displacement(self, axis: str) -> float:
         """The ball's displacement along a gauge's axis from the middle of its travel, with noise, mm."""
         with self._lock:
-            ball = self._ball()
+            now = self._update()
+            ball: Array = self._pose.positions[0]
+            if now >= self._motion.end_s:
+                ball = ball + self._ringing(now - self._motion.end_s)
+                self.gauges.follow(ball)
             displacement = self.gauges.triad @ (ball - self.gauges.station) + self._gauge_noise
             flicker = self._settings.gauges.flicker_mm * self._random.standard_normal()
             return float(displacement[AXES.index(axis)] + flicker)
-
-    def _ball(self) -> Array:
-        now = self._update()
-        ball: Array = self._pose.positions[0]
-        if now >= self._motion.end_s:
-            ball = ball + self._ringing(now - self._motion.end_s)
-            self.gauges.follow(ball)
-        return ball
 
     def _draw_noise(self) -> None:
         self._ringing_direction = self._random.standard_normal(3)
@@ -303,7 +289,6 @@ class RobotPhysics:
     def _ringing(self, since_s: float) -> Array:
         motion = self._settings.motion
         decay = np.exp(-since_s / motion.ringing_s) * np.cos(2.0 * np.pi * RINGING_HZ * since_s)
-        ringing: Array = (
-            motion.ringing_mm * decay * self._ringing_direction / np.linalg.norm(self._ringing_direction)
-        )
+        direction = self._ringing_direction
+        ringing: Array = motion.ringing_mm * decay * direction / np.linalg.norm(direction)
         return ringing

@@ -24,7 +24,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import ExitCode
-from hexacell.services.devices.device_search import SearchRequest
+from hexacell.services.devices.device_search import search_devices
 from tests.cli.terminal import ended, start_at
 from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 
@@ -71,7 +71,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulated instruments share a busy machine with other tests; real ones answer at once."""
     longer = SearchTimeouts(gauge=2.0, node=2.0, adapter=30.0, controller=10.0)
     monkeypatch.setattr(
-        "hexacell.cli.commands.devices.SearchRequest", partial(SearchRequest, timeouts=longer)
+        "hexacell.cli.commands.devices.search_devices", partial(search_devices, timeouts=longer)
     )
 
 

@@ -9,8 +9,8 @@ from functools import partial
 from typing import ClassVar
 
 from drivers.simulated.encoders.bank import JUMP, Positions, shown_positions
+from drivers.simulated.gauges.described import BROADCAST, WRITE_REGISTER, answer, refusal, split_requests
 from drivers.simulated.gauges.instruments import Instrument
-from drivers.simulated.gauges.modbus import BROADCAST, WRITE_REGISTER, answer, refusal, split_requests
 from drivers.simulated.gauges.server import LATE_TIMEOUTS, GaugeLineServer, LineFault, LineFaults
 from drivers.simulated.serial_line import PtyLine, SerialLine
 from drivers.simulated.served_device import Closeable, Switch, setting

@@ -90,7 +90,9 @@ def parse_block(block: str, current: Pose, modes: ModalState | None = None) -> P
     if not numbers and 1.0 not in codes:
         return ParsedBlock(after)
     system = ModalState() if _MACHINE_COORDINATES in codes else after
-    target = _in_machine(_with(_in_system(current, system), numbers), system)
+    turned = _rotated(_with(_in_system(current, system), numbers), system.rotation_deg)
+    pairs = zip(turned.as_tuple(), system.offsets, strict=True)
+    target = Pose(*(value + offset for value, offset in pairs))
     duration_s = _duration(after, feed, current, target)
     return ParsedBlock(after, target, duration_s) if numbers else ParsedBlock(after)
 
@@ -121,12 +123,6 @@ def _in_system(pose: Pose, system: ModalState) -> Pose:
     return _rotated(Pose(*(value - offset for value, offset in pairs)), -system.rotation_deg)
 
 
-def _in_machine(pose: Pose, system: ModalState) -> Pose:
-    """A pose in a coordinate system as one of the machine."""
-    pairs = zip(_rotated(pose, system.rotation_deg).as_tuple(), system.offsets, strict=True)
-    return Pose(*(value + offset for value, offset in pairs))
-
-
 def _rotated(pose: Pose, degrees: float) -> Pose:
     if degrees == 0.0:
         return pose
@@ -137,7 +133,8 @@ def _rotated(pose: Pose, degrees: float) -> Pose:
 
 def _modes_after(codes: Sequence[float], feed: float | None, before: ModalState) -> ModalState:
     for code in codes:
-        _check_code(code)
+        if code not in (*_MOTIONS, *_FEED_MODES, *_MODES, _MACHINE_COORDINATES):
+            raise BlockError("G-code out of range" if code >= 100 else "Unknown g code used")
     motion = _one_of_group(codes, _MOTIONS, before.motion)
     feed_mode = _one_of_group(codes, _FEED_MODES, before.feed_mode)
     kept = before.feed if feed_mode == before.feed_mode == PER_MINUTE else 0.0
@@ -178,8 +175,3 @@ def _words(block: str) -> list[tuple[str, float]]:
         if axes.count(letter) > 1:
             raise BlockError(f"Multiple {letter.lower()} words on one line")
     return found
-
-
-def _check_code(code: float) -> None:
-    if code not in (*_MOTIONS, *_FEED_MODES, *_MODES, _MACHINE_COORDINATES):
-        raise BlockError("G-code out of range" if code >= 100 else "Unknown g code used")

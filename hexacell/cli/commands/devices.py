@@ -14,7 +14,7 @@ from hexacell.cli.console import Console
 from hexacell.cli.terminal import is_interactive
 from hexacell.errors import AnswerNeeded, ExitCode, FileError, UsageError
 from hexacell.services.devices.device_diagnosis import diagnose
-from hexacell.services.devices.device_search import SearchFindings, SearchRequest, draft_of, search_devices
+from hexacell.services.devices.device_search import SearchFindings, draft_of, search_devices
 from hexacell.storage.atomic_files import require_creatable
 from hexacell.text.found_devices import (
     cell_lines,
@@ -60,13 +60,9 @@ def _set_node(options: argparse.Namespace, console: Console) -> ExitCode:
 def _search(options: argparse.Namespace, console: Console) -> ExitCode:
     if options.write is not None:
         _require_new(options.write)
-    request = SearchRequest(
-        tuple(options.ports),
-        tuple(_bus(words) for words in options.can),
-        options.bitrate,
-        _address(options.controller),
-    )
-    found = asyncio.run(search_devices(request))
+    buses = [_bus(words) for words in options.can]
+    address = _address(options.controller)
+    found = asyncio.run(search_devices(options.ports, buses, options.bitrate, address))
     console.document(search_document(found))
     for line in search_lines(found):
         console.print(wrapped(line))

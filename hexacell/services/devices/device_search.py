@@ -30,25 +30,6 @@ LEGS = 6
 
 
 @dataclass(frozen=True)
-class SearchRequest:
-    """Where to look.
-
-    Attributes:
-        ports: serial ports or pyserial URLs; all of this computer if there are none.
-        buses: settings of CAN buses beside those that are found.
-        bitrate: of the buses that are found, bit/s.
-        controller: host and port.
-        timeouts: longest waits.
-    """
-
-    ports: tuple[str, ...] = ()
-    buses: tuple[dict[str, Any], ...] = ()
-    bitrate: int = 500_000
-    controller: tuple[str, int] = ("127.0.0.1", 5007)
-    timeouts: SearchTimeouts = USUAL
-
-
-@dataclass(frozen=True)
 class SearchFindings:
     """What was found.
 
@@ -64,33 +45,41 @@ class SearchFindings:
     untried: tuple[str, ...] = ()
 
 
-async def search_devices(request: SearchRequest) -> SearchFindings:
-    """Ask at every place, all ports at once; takes some seconds."""
-    ports = tuple(SerialPortFound(port, port, "") for port in request.ports) or serial_ports()
+async def search_devices(
+    named_ports: Sequence[str],
+    named_buses: Sequence[dict[str, Any]],
+    bitrate: int,
+    controller: tuple[str, int],
+    timeouts: SearchTimeouts = USUAL,
+) -> SearchFindings:
+    """Ask at every place, all ports at once; takes some seconds.
+
+    Args:
+        named_ports: serial ports or pyserial URLs; all of this computer if there are none.
+        named_buses: settings of CAN buses beside those that are found.
+        bitrate: of the buses that are found, bit/s.
+        controller: host and port.
+        timeouts: longest waits.
+    """
+    ports = tuple(SerialPortFound(port, port, "") for port in named_ports) or serial_ports()
     factories = {name: load(Group.GAUGES, name) for name in names(Group.GAUGES)}
-    gauges, controller = await asyncio.gather(
-        asyncio.gather(*(search_port(port.port, factories, request.timeouts) for port in ports)),
-        search_controller(*request.controller, request.timeouts),
+    gauges, answering = await asyncio.gather(
+        asyncio.gather(*(search_port(port.port, factories, timeouts) for port in ports)),
+        search_controller(*controller, timeouts),
     )
+    # CAN buses: of the kernel, behind adapters on ports where no gauge answers, and those named.
     silent = [found.port for found in gauges if not found.gauges and not found.problem]
-    # Numbers that come unasked are reported in any case, and stream is what describes them.
-    untried = tuple(name for name in factories if probe_of(factories[name]) is None and name != "stream")
-    return SearchFindings(ports, tuple(gauges), await _buses(request, silent), controller, untried)
-
-
-async def _buses(request: SearchRequest, silent_ports: Sequence[str]) -> tuple[BusFindings, ...]:
-    """The CAN buses: of the kernel, behind adapters on ports where no gauge answers, and those named."""
-    timeouts = request.timeouts
-    adapters = await asyncio.gather(
-        *(asyncio.to_thread(speaks_slcan, port, timeouts) for port in silent_ports)
-    )
-    slcan = [port for port, answers in zip(silent_ports, adapters, strict=True) if answers]
+    adapters = await asyncio.gather(*(asyncio.to_thread(speaks_slcan, port, timeouts) for port in silent))
+    slcan = [port for port, answers in zip(silent, adapters, strict=True) if answers]
     buses: list[dict[str, Any]] = [
         *({"interface": "socketcan", "channel": name} for name in socketcan_interfaces()),
-        *({"interface": "slcan", "channel": port, "bitrate": request.bitrate} for port in slcan),
-        *request.buses,
+        *({"interface": "slcan", "channel": port, "bitrate": bitrate} for port in slcan),
+        *named_buses,
     ]
-    return tuple(await asyncio.gather(*(asyncio.to_thread(search_bus, bus, timeouts) for bus in buses)))
+    searched = await asyncio.gather(*(asyncio.to_thread(search_bus, bus, timeouts) for bus in buses))
+    # Numbers that come unasked are reported in any case, and stream is what describes them.
+    untried = tuple(name for name in factories if probe_of(factories[name]) is None and name != "stream")
+    return SearchFindings(ports, tuple(gauges), tuple(searched), answering, untried)
 
 
 def draft_of(found: SearchFindings, path: Path) -> CellDraft:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity
@@ -20,7 +19,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
 from hexacell.config.layout import CurrentConfig
-from hexacell.kinematics.mechanism import Mechanism, joint_zeros
+from hexacell.kinematics.mechanism import joint_zeros
 from hexacell.plugins import Group, load
 from hexacell.robot.model import config_layout
 from procedures.devices.device_set import Devices, MountedGauge, Thermometers
@@ -113,7 +112,8 @@ def devices_of(
         wiring = {"controller": controller}
         if settings.controller.joints_include_zeros:
             config = CurrentConfig(config_paths(settings, folder or Path()), config_layout(settings))
-            wiring["zeros"] = partial(_zeros, settings.mechanism, config)
+            # By how much joints that include zeros exceed what the encoders show, by the current config.
+            wiring["zeros"] = lambda: joint_zeros(settings.mechanism, config.geometry().geometry).tolist()
     encoders = load(Group.ENCODERS, settings.encoders.protocol)(encoders_with_speed(settings), **wiring)
     return Devices(
         gauges,
@@ -121,12 +121,6 @@ def devices_of(
         controller,
         stop_input_of(settings.guards, folder or Path()),
     )
-
-
-def _zeros(mechanism: Mechanism, config: CurrentConfig) -> list[float]:
-    """By how much joints that include zeros exceed what the encoders show, by the current config."""
-    zeros: list[float] = joint_zeros(mechanism, config.geometry().geometry).tolist()
-    return zeros
 
 
 def gauge_with_agreement(gauge: GaugeSettings, noise: NoiseSettings) -> GaugeSettings:

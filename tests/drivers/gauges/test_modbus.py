@@ -18,8 +18,8 @@ from drivers.errors import GaugeAtEnd, GaugeSilent, PortLost
 from drivers.gauges.described import ModbusGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, instrument_class
+from drivers.simulated.gauges.described import crc
 from drivers.simulated.gauges.instruments import Indicator
-from drivers.simulated.gauges.modbus import crc
 from drivers.wire_trace import WireTrace
 from hexacell.cell.described_devices import ModbusSettings
 from hexacell.cell.devices import GaugeSettings

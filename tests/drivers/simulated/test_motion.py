@@ -86,7 +86,7 @@ def test_a_stopped_motion_stays_at_its_position(stopped: float, later: float) ->
 
 
 def test_a_stationary_motion_is_complete_from_the_start() -> None:
-    rest = Motion.stationary(PATH[1])
+    rest = Motion(PATH[[1, 1]], -1e9, 0.0)
     assert rest.end_s < 0.0
     assert rest.fraction(0.0) == 1.0
     assert np.array_equal(rest.joints(0.0), PATH[1])

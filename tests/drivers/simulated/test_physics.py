@@ -200,7 +200,7 @@ def test_encoders_that_are_long_show_what_is_commanded_and_the_sliders_move_less
     true.machine.move(POSES[0])
     closed = true.physics.encoder_positions()
     assert closed == pytest.approx(shown, abs=1e-9)
-    assert twin.physics.true_joints() == pytest.approx(shown / 1.001, abs=1e-9)
+    assert twin.physics._motion.joints(twin.clock.now()) == pytest.approx(shown / 1.001, abs=1e-9)
 
 
 def test_slider_stops_scatter_by_the_repeatability(make_twin) -> None:

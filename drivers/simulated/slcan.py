@@ -76,7 +76,8 @@ class SlcanAdapter:
     def answer(self, command: str) -> bytes:
         """Execute one command (without CR) and return the answer."""
         if command in ("O", "L"):
-            return self._open(may_transmit=command == "O")
+            self.is_open, self._may_transmit = True, command == "O"
+            return _OK
         if command == "C":
             self.is_open = False
             return _OK
@@ -84,14 +85,6 @@ class SlcanAdapter:
             return _INFORMATION[command].encode() + _OK
         if _SET_UP.fullmatch(command):
             return _ERROR if self.is_open and command else _OK
-        return self._send(command)
-
-    def _open(self, *, may_transmit: bool) -> bytes:
-        self.is_open = True
-        self._may_transmit = may_transmit
-        return _OK
-
-    def _send(self, command: str) -> bytes:
         message = decode_frame(command)
         if message is None or not (self.is_open and self._may_transmit):
             return _ERROR
@@ -103,28 +96,24 @@ class SlcanServer(Closeable):
     """An adapter between a virtual CAN channel and a serial line, with one thread for each direction."""
 
     def __init__(self, channel: str, line: SerialLine) -> None:
-        self._url = line.url
+        self.bus_settings: dict[str, Any] = {
+            "interface": "slcan",
+            "channel": line.url,
+            "bitrate": BITRATE,
+            "sleep_after_open": 0,
+            "timeout": CLIENT_TIMEOUT_S,
+        }
         self._line = line
         self._bus = can.Bus(channel, interface="virtual")
         self._adapter = SlcanAdapter(self._bus.send)
         self._writing = threading.Lock()
         self._closing = threading.Event()
         self._threads = [
-            threading.Thread(target=target, name=f"slcan {self._url}", daemon=True)
+            threading.Thread(target=target, name=f"slcan {line.url}", daemon=True)
             for target in (self._receive_commands, self._send_frames)
         ]
         for thread in self._threads:
             thread.start()
-
-    @property
-    def bus_settings(self) -> dict[str, Any]:
-        return {
-            "interface": "slcan",
-            "channel": self._url,
-            "bitrate": BITRATE,
-            "sleep_after_open": 0,
-            "timeout": CLIENT_TIMEOUT_S,
-        }
 
     def close(self) -> None:
         if self._closing.is_set():

@@ -66,11 +66,7 @@ class ControllerCommands:
         self._messages = messages or ErrorMessages()
 
     async def get(self, what: str) -> str:
-        """The text after ``WHAT``.
-
-        Raises:
-            CommandRefused: The server does not know ``what``.
-        """
+        """The text after ``WHAT``; raises ``CommandRefused`` if the server does not know ``what``."""
         response = await self._query(what)
         if not response.accepted:
             raise CommandRefused(f"'get {what}'", "it does not know that", subject=self.subject)

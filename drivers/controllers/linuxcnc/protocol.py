@@ -52,11 +52,7 @@ class Address:
 
     @classmethod
     def of(cls, settings: ControllerSettings) -> Self:
-        """The address in a cell file.
-
-        Raises:
-            UsageError: It names no port.
-        """
+        """The address in a cell file; raises ``UsageError`` if it names no port."""
         if settings.port is None:
             raise UsageError("the cell file names no controller port", action="Set controller.port")
         connect, enable = settings.connect_password, settings.enable_password

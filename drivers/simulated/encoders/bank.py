@@ -55,10 +55,17 @@ class SimulatedEncoderBank(Closeable):
         self._clock = clock
         self._latency_s = latency_s
         usual = ROTARY if settings.unit is JointUnit.DEG else EVENTS_AND_SYNC
-        self._vendors = tuple(vendors or (usual,) * 6)
+        step = round(settings.step / NM)
+        if isinstance(settings, RotaryEncoderSettings):
+            step = settings.counts_per_turn
         serial_numbers = settings.serial_numbers or range(FIRST_SERIAL_NUMBER, FIRST_SERIAL_NUMBER + 6)
+        devices = (
+            DeviceData(node, serial_number, step, settings.signed)
+            for node, serial_number in zip(settings.nodes, serial_numbers, strict=True)
+        )
         self._encoders = tuple(
-            self._make(leg, serial_number) for leg, serial_number in enumerate(serial_numbers, 1)
+            SimulatedEncoder(self.bus, vendor, device, clock.real_seconds)
+            for vendor, device in zip(vendors or (usual,) * 6, devices, strict=True)
         )
         with self.bus.lock:
             self._sample()
@@ -86,19 +93,12 @@ class SimulatedEncoderBank(Closeable):
             "frozen": setting(encoder, "is_frozen"),
             "jumped": partial(encoder.set_shifted, round(JUMP / self._settings.step)),
         }
-        return {kind: partial(self._set_fault, switch) for kind, switch in switches.items()}
 
-    def _set_fault(self, switch: Switch, *, on: bool) -> None:
-        with self.bus.lock:
-            switch(on=on)
+        def locked(switch: Switch, *, on: bool) -> None:
+            with self.bus.lock:
+                switch(on=on)
 
-    def _make(self, leg: int, serial_number: int) -> SimulatedEncoder:
-        settings = self._settings
-        step = round(settings.step / NM)
-        if isinstance(settings, RotaryEncoderSettings):
-            step = settings.counts_per_turn
-        data = DeviceData(settings.nodes[leg - 1], serial_number, step, settings.signed)
-        return SimulatedEncoder(self.bus, self._vendors[leg - 1], data, self._clock.real_seconds)
+        return {kind: partial(locked, switch) for kind, switch in switches.items()}
 
     def _on_sync(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
         self._sample()

@@ -70,24 +70,19 @@ class SimulatedCanBus(canopen.Network):
         return PeriodicFrame(self, can_id, data, period)
 
     def _run(self) -> None:
+        left_s = SLICE_S
         try:
-            self._serve()
+            while not self._stopping.is_set() and self.bus is not None:
+                message = self.bus.recv(min(left_s, SLICE_S))
+                with self.lock:
+                    if message is not None:
+                        self.notify(message.arbitration_id, message.data, message.timestamp)
+                    self._now_s = time.monotonic()
+                    next_s = self._timers.run(blocking=False)
+                    left_s = SLICE_S if next_s is None else next_s
         except Exception:  # an error of the simulated physics appears as a silent bus
             _log.exception("the simulated encoders have failed")
             self._stopping.set()
-
-    def _serve(self) -> None:
-        left_s: float | None = None
-        while not self._stopping.is_set():
-            message = self._receive(SLICE_S if left_s is None else min(left_s, SLICE_S))
-            with self.lock:
-                if message is not None:
-                    self.notify(message.arbitration_id, message.data, message.timestamp)
-                self._now_s = time.monotonic()
-                left_s = self._timers.run(blocking=False)
-
-    def _receive(self, timeout_s: float) -> can.Message | None:
-        return None if self.bus is None else self.bus.recv(timeout_s)
 
 
 class PeriodicAction:

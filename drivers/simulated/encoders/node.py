@@ -171,8 +171,16 @@ class SimulatedEncoder:
         if command in _RESET_COMMANDS:
             self.boot()
         self._stop_event_timers()
-        if self.is_operational:
-            self._start_event_timers()
+        for number in range(1, len(self._vendor.tpdos) + 1) if self.is_operational else ():
+            is_on = not self._value(0x1800 + number - 1, 1) & object_dictionary.TPDO_OFF
+            period_ms = self._value(0x1800 + number - 1, 5)
+            if is_on and period_ms and self._value(0x1800 + number - 1, 2) not in _SYNCHRONOUS:
+                period_s, send = self._real_seconds(period_ms / 1000), partial(self._send_tpdo, number)
+                self._event_timers.append(PeriodicAction(self._bus, period_s, send))
+
+    def _send_tpdo(self, number: int) -> None:
+        for cob_id, data in self._frames(number):
+            self.send(cob_id, data)
 
     def _frames(self, number: int) -> Iterator[tuple[int, bytes]]:
         cob_id = self._value(0x1800 + number - 1, 1)
@@ -184,19 +192,6 @@ class SimulatedEncoder:
 
     def _value(self, index: int, subindex: int) -> int:
         return int.from_bytes(self._node.get_data(index, subindex), "little")
-
-    def _start_event_timers(self) -> None:
-        for number in range(1, len(self._vendor.tpdos) + 1):
-            is_on = not self._value(0x1800 + number - 1, 1) & object_dictionary.TPDO_OFF
-            period_ms = self._value(0x1800 + number - 1, 5)
-            if is_on and period_ms and self._value(0x1800 + number - 1, 2) not in _SYNCHRONOUS:
-                period_s = self._real_seconds(period_ms / 1000)
-                send = partial(self._send_tpdo, number)
-                self._event_timers.append(PeriodicAction(self._bus, period_s, send))
-
-    def _send_tpdo(self, number: int) -> None:
-        for cob_id, data in self._frames(number):
-            self.send(cob_id, data)
 
     def _stop_event_timers(self) -> None:
         for timer in self._event_timers:
@@ -220,11 +215,8 @@ class SimulatedEncoder:
             if not (old | value) & object_dictionary.TPDO_OFF and old != value:
                 raise SdoAbortedError(_WRONG_VALUE)
         if 0x1A00 <= index < 0x1C00:
-            self._check_mapping(index, subindex)
-
-    def _check_mapping(self, index: int, subindex: int) -> None:
-        if not self._vendor.mapping_writable:
-            raise SdoAbortedError(_READ_ONLY)
-        is_on = not self._value(index - 0x200, 1) & object_dictionary.TPDO_OFF
-        if is_on or (subindex and self._value(index, 0)):
-            raise SdoAbortedError(_NOT_NOW)
+            if not self._vendor.mapping_writable:
+                raise SdoAbortedError(_READ_ONLY)
+            is_on = not self._value(index - 0x200, 1) & object_dictionary.TPDO_OFF
+            if is_on or (subindex and self._value(index, 0)):
+                raise SdoAbortedError(_NOT_NOW)

@@ -105,7 +105,8 @@ class SimulatedGaugeBank(ServedGroup):
         del on
         names = list(self.indicators)
         other = names[(names.index(gauge) + 1) % len(names)]
-        self.indicators[gauge].exchange_with(self.indicators[other])
+        one, two = self.indicators[gauge], self.indicators[other]
+        one.plunger, two.plunger = two.plunger, one.plunger
 
     def _by_line(self, gauges: Sequence[GaugeSettings]) -> list[list[GaugeSettings]]:
         """The gauges grouped by line: those of one multiplexer (same protocol and port) together."""

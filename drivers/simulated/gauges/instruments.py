@@ -26,6 +26,7 @@ class Indicator:
     """One instrument. Its settings, its power and some faults are attributes.
 
     Attributes:
+        plunger: gives its position.
         held_mm: the value on hold.
         peak_mm: the largest value, while it shows that.
         is_at_end: the plunger is at an end of its travel.
@@ -39,7 +40,7 @@ class Indicator:
         self.preset_mm = 0.0
         self.powered = True
         self.held_mm: float | None = None
-        self._plunger = plunger
+        self.plunger = plunger
         self._travel_mm = travel_mm
         self._offset_mm = 0.0
         self.is_at_end = False
@@ -83,18 +84,14 @@ class Indicator:
 
     def set_frozen(self, *, on: bool) -> None:
         """Jam the plunger at its position, or free it; the instrument still answers."""
-        self._jammed_mm = self._plunger() if on else None
+        self._jammed_mm = self.plunger() if on else None
 
     def set_pushed(self, *, on: bool) -> None:
         """Push the plunger farther than a ball on its plate could, or release it."""
-        self._pushed_mm = -copysign(PUSH_MM, self._plunger()) if on else 0.0
-
-    def exchange_with(self, other: Indicator) -> None:
-        """Put each of two instruments where the other one is."""
-        self._plunger, other._plunger = other._plunger, self._plunger
+        self._pushed_mm = -copysign(PUSH_MM, self.plunger()) if on else 0.0
 
     def _live_mm(self) -> float | None:
-        free = self._plunger() + self.off_middle_mm + self._pushed_mm
+        free = self.plunger() + self.off_middle_mm + self._pushed_mm
         position = free if self._jammed_mm is None else self._jammed_mm
         if self.is_at_end or abs(position) > self._travel_mm / 2:
             return None

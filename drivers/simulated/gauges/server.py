@@ -167,27 +167,30 @@ class GaugeLineServer(Closeable):
 
     def _serve(self) -> None:
         try:
-            self._serve_until_stopped()
+            while not self._stopping:
+                self._wait_and_serve()
         except Exception:  # an error of the simulated physics appears as a broken line
             _log.exception("the simulated gauges on %s have failed", self.url)
             self._unplug()
 
-    def _serve_until_stopped(self) -> None:
-        while not self._stopping:
-            watched = [self._wake_read, *self._line.descriptors()]
-            ready, _, _ = select.select(watched, [], [], self._until_next_s())
-            if self._wake_read in ready:
-                os.read(self._wake_read, COMMAND_LIMIT)
-                self._do_jobs()
-            else:
-                data = self._received + self._line.receive(ready)
-                commands, rest = self.instrument.split(data)
-                self._received = rest[-COMMAND_LIMIT:]
-                for command in commands:
-                    self._answer(command)
-            self._prepare_unasked()
-            while self._answers and self._answers[0][0] <= self._clock.now():
-                self._line.send(self._answers.popleft()[1])
+    def _wait_and_serve(self) -> None:
+        times = [due for due, _ in self._answers][:1]
+        if self._next_unasked is not None:
+            times.append(self._next_unasked)
+        until_next_s = max(0.0, self._clock.real_seconds(min(times) - self._clock.now())) if times else None
+        watched = [self._wake_read, *self._line.descriptors()]
+        ready, _, _ = select.select(watched, [], [], until_next_s)
+        if self._wake_read in ready:
+            os.read(self._wake_read, COMMAND_LIMIT)
+            self._do_jobs()
+        else:
+            commands, rest = self.instrument.split(self._received + self._line.receive(ready))
+            self._received = rest[-COMMAND_LIMIT:]
+            for command in commands:
+                self._answer(command)
+        self._prepare_unasked()
+        while self._answers and self._answers[0][0] <= self._clock.now():
+            self._line.send(self._answers.popleft()[1])
 
     def _do_jobs(self) -> None:
         while not self._jobs.empty():
@@ -208,12 +211,6 @@ class GaugeLineServer(Closeable):
         wire_s = (len(command) + len(self.instrument.command_end) + len(answer)) * self._byte_s
         free_at = max([self._clock.now(), *(due for due, _ in self._answers)])
         self._answers.append((free_at + self._latency_s + late_s + wire_s, answer))
-
-    def _until_next_s(self) -> float | None:
-        times = [due for due, _ in self._answers][:1]
-        if self._next_unasked is not None:
-            times.append(self._next_unasked)
-        return max(0.0, self._clock.real_seconds(min(times) - self._clock.now())) if times else None
 
     def _prepare_unasked(self) -> None:
         """What the instrument sends by itself, when it is time; a late one is lost."""

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 from functools import partial
 
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
+from drivers.simulated.encoders.node import SimulatedEncoder
 from drivers.simulated.encoders.object_dictionary import ALARMS
 
 
 def add_duplicate(bank: SimulatedEncoderBank, leg: int) -> None:
     """A second device with the same node id and another serial number appears."""
-    duplicate = bank._make(leg, bank._encoders[leg - 1].data.serial_number + 1000)
+    first = bank._encoders[leg - 1]
+    data = replace(first.data, serial_number=first.data.serial_number + 1000)
+    duplicate = SimulatedEncoder(bank.bus, first._vendor, data, first._real_seconds)
     with bank.bus.lock:
         duplicate.set_unplugged(on=False)
 

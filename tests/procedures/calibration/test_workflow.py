@@ -239,7 +239,7 @@ class Choices:
         monkeypatch.setattr(module.Plan, "_next_pose", self._choose)
         monkeypatch.setattr(path_planning, "next_return_move", lambda *_: 0)
         known = None, SimpleNamespace(reference=None)
-        monkeypatch.setattr(IdentificationSteps, "_estimated", lambda *_: known)
+        monkeypatch.setattr(IdentificationSteps, "_known", lambda *_: known)
 
     def _choose(self, situation: Any, point: int) -> MeasurePose:
         self.made += 1

@@ -6,14 +6,15 @@ Time is simulated, so figures are exact; the benchmark measures them with real d
 from __future__ import annotations
 
 import asyncio
+import shutil
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from hexacell.errors import ExitCode, HexacellError
-from procedures.guards import supervision
 from procedures.run.keys import Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
@@ -232,7 +233,7 @@ async def test_no_step_begins_without_free_disk_space(stage: Any, step: Any, mon
     config = scene.rig.config
     doing = await step(scene)
     orders, still_since_s = len(scene.controller.log), scene.rig.physics.motion_end_s
-    monkeypatch.setattr(supervision, "_free_bytes", lambda folder: 49_900_000)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=49_900_000))
     with pytest.raises(HexacellError) as refusal:
         await doing()
     assert root(refusal.value).trip.guard is Guard.DISK

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,7 @@ from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import DeviceError, ExitCode, LimitError
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.limits.gauge_travel import GaugeRoom
-from procedures.guards import rules, supervision
+from procedures.guards import rules
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
 from procedures.guards.rules import GuardLimits, following_error, stuck_gauge
 from procedures.guards.supervision import low_disk_space
@@ -255,7 +257,7 @@ def test_drift_has_its_own_exit_code() -> None:
 
 @pytest.mark.parametrize(("free", "trips"), [(50_000_000, False), (49_999_999, True), (0, True)])
 def test_the_disk_must_have_room(monkeypatch, free: int, trips: bool) -> None:
-    monkeypatch.setattr(supervision, "_free_bytes", lambda folder: free)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=free))
     assert (low_disk_space(Path("/runs"), 50.0) is not None) is trips
 
 

@@ -86,9 +86,7 @@ class Forecast(Frozen):
 class StartPoint:
     """Begin a point: go there, and zero the gauges.
 
-    Attributes:
-        pose: in the controller's frames.
-        joints: joint variables that the controller will go to, mm.
+    ``pose`` is in the controller's frames, ``joints`` are those that the controller will go to.
     """
 
     point: int

@@ -46,8 +46,6 @@ class PoseChooser:
 
     Attributes:
         pose_list: poses to visit; None where they are to be selected.
-        task: where the robot has to be accurate.
-        effort: how hard poses are searched for.
         known_then: gives the covariance (p, p) once all that is planned is measured but the next record,
             which has to gain beside it as soon as the robot is well known; None where the plan may end
             sooner.

@@ -10,7 +10,6 @@ import numpy as np
 from hexacell.conformance.example import MechanismExample
 from hexacell.kinematics.forward import apply_twist, continue_solution
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.mechanism import ConstraintDerivatives
 from hexacell.kinematics.parameters import JointUnit, ParameterUnit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -168,15 +167,10 @@ def _check_derivatives_at(
     _compare(found.pose, by_twist, TWIST_STEPS, names)
     of_each_joint = found.joints[..., None] * np.eye(6)
     _compare(of_each_joint, by_joints, np.full(6, JOINT_STEPS[mechanism.words.joint_unit]), ["joints"] * 6)
-    _compare(_by_all_parameters(example, found), by_parameters, sizes, parameters.names)
-
-
-def _by_all_parameters(example: MechanismExample, found: ConstraintDerivatives) -> Array:
-    """Derivatives (n, 6, P): leg i depends on its own numbers alone."""
-    per_leg = example.mechanism.parameters.numbers_per_leg
+    # Leg i depends on its own numbers alone.
     of_legs = found.parameters[:, :, None, :] * np.eye(6)[..., None]
-    by_leg: Array = of_legs.reshape(*found.joints.shape, 6 * per_leg)
-    return by_leg[..., example.mechanism.parameters.leg_order]
+    of_all = of_legs.reshape(*found.joints.shape, -1)[..., parameters.leg_order]
+    _compare(of_all, by_parameters, sizes, parameters.names)
 
 
 def _compare(found: Array, residual: Callable[[Array], Array], steps: Array, names: Sequence[str]) -> None:

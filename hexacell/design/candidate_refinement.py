@@ -23,20 +23,13 @@ from hexacell.design.predicted_records import (
 )
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics import rotations
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import Batch, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.rows import Rows
 
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """One round of turns.
-
-    Attributes:
-        refined: how many candidates are turned.
-        turns: in how many ways each of them.
-        angle: the largest about each axis, rad.
-    """
+    """One round: some candidates are ``refined``, by ``turns`` of up to ``angle``, rad, about each axis."""
 
     refined: int
     turns: int
@@ -78,7 +71,7 @@ GainOfRecords = Callable[[PredictedRecords], Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RatedRecords(Rows):
+class RatedRecords(Batch):
     """Predicted records (n), and what each gains (n,)."""
 
     records: PredictedRecords
@@ -89,11 +82,8 @@ class RatedRecords(Rows):
 class CandidateSpace:
     """The records that a point's poses could have: within the limits, and almost surely inside the travel.
 
-    By linear propagation; what that does not see is checked before a pose is selected.
-
-    Attributes:
-        zero: of the point's gauges.
-        gain: gives what each of n records gains (n,).
+    By linear propagation; what that does not see is checked before a pose is selected. ``gain`` gives what
+    each of n records gains (n,).
     """
 
     belief: RobotBelief

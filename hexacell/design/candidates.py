@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics import rotations
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import Batch, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.rows import Rows
 from hexacell.kinematics.sensitivity import has_singularity_margin, margin_and_mode
 
 TWIST_PER_TILT = 2.0
@@ -38,13 +37,8 @@ class Amplitudes(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ReachableTargets(Rows):
-    """Poses that the estimated robot takes within its limits.
-
-    Attributes:
-        poses: n poses under the estimate.
-        joints: joint variables (n, 6), mm, of the estimated robot there.
-    """
+class ReachableTargets(Batch):
+    """Poses (n) that the estimated robot takes within its limits, and its joint variables (n, 6) there."""
 
     poses: PoseBatch
     joints: Array

@@ -22,11 +22,7 @@ from hexacell.kinematics.rotations import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Criterion:
-    """An optimality criterion.
-
-    Attributes:
-        weight: of the free parameters' covariance (p, p), dimensionless; None for D.
-    """
+    """An optimality criterion: the ``weight`` (p, p) of the parameters' covariance; None for D."""
 
     weight: Array | None = None
 

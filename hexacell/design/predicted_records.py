@@ -17,9 +17,8 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import modes_of
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import Batch, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.rows import Rows
 from hexacell.kinematics.sensitivity import (
     POSITION,
     free_sensitivity,
@@ -106,7 +105,7 @@ def position_derivatives(belief: RobotBelief, targets: ReachableTargets) -> tupl
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PredictedRecords(Rows):
+class PredictedRecords(Batch):
     """The records (n) that some targets would give.
 
     Attributes:

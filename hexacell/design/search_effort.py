@@ -14,20 +14,15 @@ class SearchEffort:
     Numbers of candidates are powers of two: a Sobol' sequence is even over no other number.
 
     Attributes:
-        candidates: orientations that the pose of each record is chosen from.
-        pilot_candidates: orientations that each pilot pose is chosen from; with four times as many the
-            records are as good.
-        held_out_candidates: orientations that the held-out poses are chosen from.
+        candidates: orientations that the pose of each record is chosen from; likewise for other poses.
+        pilot_candidates: with four times as many the records are as good.
         planned_candidates: orientations that the sets of a forecast are chosen from.
-        forecast_held_out_candidates: orientations that held-out poses are forecast from; how wide these
-            are hardly changes with more.
+        forecast_held_out_candidates: how wide held-out poses are hardly changes with more.
         checked_candidates: orientations among which preflight looks for any safe pose at a point.
-        checked_robots: robots, drawn within the tolerances, of which preflight asks whether they reach
-            the points.
+        checked_robots: robots within the tolerances that preflight asks whether they reach the points.
         dry_run_robots: robots that a plan is carried out on to say what it gives.
-        rounds: rounds in which the best candidates are refined.
-        late_rounds: rounds of the decisions with most records to fit, so that these take no longer.
-        late_records: number of records from which the refinement is that of ``late_rounds``.
+        rounds: in which the best candidates are refined; ``late_rounds`` from ``late_records`` on, so that
+            the decisions with most records to fit take no longer.
     """
 
     candidates: int = 1024

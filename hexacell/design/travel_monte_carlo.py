@@ -34,9 +34,8 @@ from hexacell.design.predicted_records import GaugeZero, PredictedRecords, predi
 from hexacell.identification.belief import SPARE_ANGLE, SPARE_SIGMAS, UNCERTAIN_SIGMA, RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.geometry import GeometryBatch
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import Batch, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.rows import Rows
 from hexacell.kinematics.sensitivity import FreeSensitivity, free_sensitivity, has_singularity_margin
 from hexacell.limits.limits import Limits
 from hexacell.motion.paths import Path
@@ -152,7 +151,7 @@ class TravelConstraint:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _SampledRobots(Rows):
+class _SampledRobots(Batch):
     """Robots (r) that can take the reference pose, at n targets.
 
     Attributes:
@@ -169,13 +168,7 @@ class _SampledRobots(Rows):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Scenario:
-    """The reference, first, and n targets of the estimated robot, for robots sampled from the belief.
-
-    Attributes:
-        joints: (n + 1, 6) joint variables.
-        poses: those of the estimated robot.
-        sensitivity: of these poses.
-    """
+    """The reference, first, and n targets of the estimated robot, for robots sampled from the belief."""
 
     belief: RobotBelief
     joints: Array

@@ -135,11 +135,7 @@ class StepAlarm:
 
 
 class DriftWatch:
-    """Takes the runs of a robot one after the other.
-
-    Attributes:
-        alarms: raised so far, by the runs until each.
-    """
+    """Takes the runs of a robot in turn; ``alarms`` are those so far, each by the runs until then."""
 
     def __init__(self, causes: Causes) -> None:
         self.alarms: list[StepAlarm] = []

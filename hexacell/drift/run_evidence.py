@@ -73,9 +73,7 @@ class Causes:
 class RunEvidence:
     """The evidence of one run on a state (s,): the free parameters, then the shared causes.
 
-    Attributes:
-        information: (s, s).
-        weighted: (s,) information times the state that fits the run best.
+    ``weighted`` (s,) is the information (s, s) times the state that fits the run best.
     """
 
     information: Array

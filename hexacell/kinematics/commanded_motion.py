@@ -25,9 +25,8 @@ import numpy as np
 from hexacell.kinematics.forward import ForwardResult, continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
-from hexacell.kinematics.pose import AXES, Pose, PoseBatch
+from hexacell.kinematics.pose import AXES, Batch, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.rows import Rows
 
 COMMAND_STAGES = (3,)
 """Continuation stages for a command. A pose that needs more is near a singularity and is not used."""
@@ -99,7 +98,7 @@ class RefusedCommands:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ActualPoses(Rows):
+class ActualPoses(Batch):
     """The actual poses of n commands.
 
     Attributes:

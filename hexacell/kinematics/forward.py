@@ -57,11 +57,9 @@ LARGEST_CONTRACTION = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForwardResult:
-    """Poses found by forward kinematics, and which of them can be trusted.
+    """Poses by forward kinematics, the last iterates where they are not found.
 
-    Attributes:
-        poses: n poses; where ``found`` is false, the last iterate.
-        found: (n,) bool: converged, on the required assembly mode.
+    ``found`` (n,): converged, on the required assembly mode.
     """
 
     poses: PoseBatch

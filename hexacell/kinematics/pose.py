@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -71,8 +72,32 @@ class Pose:
         return " ".join(f"{axis}{value:z.3f}" for axis, value in coordinates)
 
 
+class Batch:
+    """Some of the rows, and those of several in one: a base of dataclasses whose fields all have n rows."""
+
+    __slots__ = ()
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def __len__(self) -> int:
+        return len(getattr(self, next(iter(self.__dataclass_fields__))))
+
+    def __getitem__(self, rows: Index | tuple[Index | int, Index | int]) -> Self:
+        return type(self)(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+    @classmethod
+    def concatenate(cls, parts: Iterable[Self]) -> Self:
+        """The rows of several in one."""
+        several = list(parts)
+        joined: list[Any] = []
+        for name in cls.__dataclass_fields__:
+            column = [getattr(part, name) for part in several]
+            is_array = isinstance(column[0], np.ndarray)
+            joined.append(np.concatenate(column) if is_array else type(column[0]).concatenate(column))
+        return cls(*joined)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseBatch:
+class PoseBatch(Batch):
     """Poses as arrays, for computations: n of them, or (m, n), which is m poses along each of n lines.
 
     Attributes:
@@ -94,26 +119,11 @@ class PoseBatch:
         """One position (3,), mm, in several orientations (n, 3, 3)."""
         return cls(np.broadcast_to(np.asarray(position, dtype=float), (len(orientations), 3)), orientations)
 
-    @classmethod
-    def concatenate(cls, batches: Iterable[PoseBatch]) -> PoseBatch:
-        """The poses of several batches in one batch."""
-        batches = list(batches)
-        return cls(
-            np.concatenate([batch.positions for batch in batches]),
-            np.concatenate([batch.rotations for batch in batches]),
-        )
-
     def with_rows(self, rows: Index | tuple[Index | int, Index | int], poses: PoseBatch) -> PoseBatch:
         """A copy in which ``poses`` replace those in some rows."""
         positions, orientations = self.positions.copy(), self.rotations.copy()
         positions[rows], orientations[rows] = poses.positions, poses.rotations
         return PoseBatch(positions, orientations)
-
-    def __len__(self) -> int:
-        return len(self.positions)
-
-    def __getitem__(self, rows: Index | tuple[Index | int, Index | int]) -> PoseBatch:
-        return PoseBatch(self.positions[rows], self.rotations[rows])
 
     def reshape(self, *shape: int) -> PoseBatch:
         """The poses in their order, in another shape: ``-1`` for one axis, ``-1, n`` for n lines."""

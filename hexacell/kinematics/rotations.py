@@ -13,6 +13,7 @@ With the rotation vector ``(a, b, 0)``, ``t = sqrt(a^2 + b^2)``, ``s = sin t / t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -111,48 +112,61 @@ def to_vector(rotation: ArrayLike) -> Array:
     return axis * scale[..., None]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class TurnedAxes:
-    """Where the turns put x, y and z: unit vectors (..., 3), and derivatives (..., 3, 2) by the turns."""
+    """Where ``turns`` (..., 2), rad, put x, y and z: unit vectors (..., 3)."""
 
+    turns: Array
     u: Array
     w: Array
     axis: Array
-    u_by_turns: Array
-    w_by_turns: Array
-    axis_by_turns: Array
 
     @classmethod
     def by(cls, turns: Array) -> TurnedAxes:
         """The axes by their turns (..., 2), rad."""
-        a, b = turns[..., 0], turns[..., 1]
-        angle = np.hypot(a, b)
-        s, k = np.sinc(angle / np.pi), 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+        a, b, angle, s, k = _sine_and_cosine(turns)
+        return cls(
+            turns,
+            u=np.stack([1.0 - b * b * k, a * b * k, -b * s], axis=-1),
+            w=np.stack([a * b * k, 1.0 - a * a * k, a * s], axis=-1),
+            axis=np.stack([b * s, -a * s, np.cos(angle)], axis=-1),
+        )
+
+    @cached_property
+    def by_turns(self) -> tuple[Array, Array, Array]:
+        """Derivatives (..., 3, 2) of u, w and axis by the turns."""
+        a, b, angle, s, k = _sine_and_cosine(self.turns)
         # ``ds/da = a s_rate`` and ``dk/da = a k_rate``, likewise by b.
         is_small = angle < SERIES
         squared = np.where(is_small, 1.0, angle) ** 2
         s_rate = np.where(is_small, -1.0 / 3.0 + angle**2 / 30.0, (np.cos(angle) - s) / squared)
         k_rate = np.where(is_small, -1.0 / 12.0 + angle**2 / 180.0, (s - 2.0 * k) / squared)
-        return cls(
-            u=np.stack([1.0 - b * b * k, a * b * k, -b * s], axis=-1),
-            w=np.stack([a * b * k, 1.0 - a * a * k, a * s], axis=-1),
-            axis=np.stack([b * s, -a * s, np.cos(angle)], axis=-1),
-            u_by_turns=_rows(
-                (-b * b * a * k_rate, -2.0 * b * k - b**3 * k_rate),
-                (b * k + a * a * b * k_rate, a * k + a * b * b * k_rate),
-                (-a * b * s_rate, -s - b * b * s_rate),
-            ),
-            w_by_turns=_rows(
-                (b * k + a * a * b * k_rate, a * k + a * b * b * k_rate),
-                (-2.0 * a * k - a**3 * k_rate, -a * a * b * k_rate),
-                (s + a * a * s_rate, a * b * s_rate),
-            ),
-            axis_by_turns=_rows(
-                (a * b * s_rate, s + b * b * s_rate),
-                (-s - a * a * s_rate, -a * b * s_rate),
-                (-a * s, -b * s),
-            ),
+        of_u = (
+            (-b * b * a * k_rate, -2.0 * b * k - b**3 * k_rate),
+            (b * k + a * a * b * k_rate, a * k + a * b * b * k_rate),
+            (-a * b * s_rate, -s - b * b * s_rate),
         )
+        of_w = (
+            of_u[1],
+            (-2.0 * a * k - a**3 * k_rate, -a * a * b * k_rate),
+            (s + a * a * s_rate, a * b * s_rate),
+        )
+        of_axis = (
+            (a * b * s_rate, s + b * b * s_rate),
+            (-s - a * a * s_rate, -a * b * s_rate),
+            (-a * s, -b * s),
+        )
+        u, w, axis = (
+            np.stack([np.stack(row, axis=-1) for row in rows], axis=-2) for rows in (of_u, of_w, of_axis)
+        )
+        return u, w, axis
+
+
+def _sine_and_cosine(turns: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """a, b, t, s and k of the formulas above."""
+    a, b = turns[..., 0], turns[..., 1]
+    angle = np.hypot(a, b)
+    return a, b, angle, np.sinc(angle / np.pi), 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
 
 
 def turns_of(axes: Array) -> Array:
@@ -163,7 +177,3 @@ def turns_of(axes: Array) -> Array:
     factor = np.where(is_vertical, 1.0, np.arctan2(across, z) / np.where(is_vertical, 1.0, across))
     a = np.where(is_vertical & (z < 0.0), np.pi, -y * factor)
     return np.stack([a, x * factor], axis=-1)
-
-
-def _rows(*rows: tuple[Array, Array]) -> Array:
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

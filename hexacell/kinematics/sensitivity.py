@@ -31,9 +31,8 @@ import numpy as np
 from hexacell.kinematics.forward import assembly_mode
 from hexacell.kinematics.geometry import Geometries, Geometry
 from hexacell.kinematics.mechanism import ConstraintDerivatives, Mechanism
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import Batch, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.rows import Rows
 
 POSITION = 3
 POSE = 6
@@ -52,7 +51,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FreeSensitivity(Rows):
+class FreeSensitivity(Batch):
     """Derivatives of a pose by the joint variables (n, m, 6) and the free parameters (n, m, p).
 
     Rows are the ball's position, mm, then, if m is 6, the rotation vector in the base frame, rad. ``mode``

@@ -114,11 +114,7 @@ class PathPlanner:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathOptions:
-    """Three kinds of path to n commands, each for some ``rows`` of them; None where there is no path.
-
-    Attributes:
-        lines: the straight lines.
-    """
+    """Three kinds of path to n commands, each for some ``rows`` of them; None where there is no path."""
 
     planner: PathPlanner
     ends: PoseBatch

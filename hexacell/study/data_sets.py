@@ -14,9 +14,8 @@ import numpy as np
 from hexacell.errors import LimitError
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.pose import Batch, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.rows import Rows
 from hexacell.kinematics.sensitivity import has_singularity_margin
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot.model import Robot
@@ -100,7 +99,7 @@ def random_orientations(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reached(Rows):
+class Reached(Batch):
     """Commands (n), the joint variables (n, 6), mm, and the actual poses that they bring the robot to."""
 
     commands: PoseBatch

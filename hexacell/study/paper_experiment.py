@@ -14,21 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.errors import ConvergenceError
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.rotations import Array
-from hexacell.robot.model import Robot, robot_of
+from hexacell.robot.model import Robot
 from hexacell.study.data_sets import DataSet, unlimited_travel
-from hexacell.study.paper_simulation import NOISE_MM, SEED
+from hexacell.study.paper_simulation import NOISE_MM, SEED, bundled_robot
 from hexacell.study.reference_solvers import gauss_newton
 from hexacell.study.tasks import Study
 
@@ -85,7 +81,8 @@ def run_experiment(experiment: Experiment) -> ExperimentOutcome:
     Raises:
         LimitError: too few orientations can be reached.
     """
-    robot, truth, points = _table_four()
+    robot, truth, settings = bundled_robot("paper-experiment")
+    points = np.array([*settings.identification.points, *settings.verification.points])
     random = np.random.default_rng([SEED, experiment.number])
     amplitude = float(np.radians(AMPLITUDE_DEG))
     calibrating, verifying = (
@@ -131,17 +128,6 @@ def _differences(
         return tuple(distances.ravel().tolist())
 
     return Differences(places(robot.commanding), places(found[0]), places(found[1]))
-
-
-@cache
-def _table_four() -> tuple[Robot, Geometry, Array]:
-    """The robot as drawn, its geometry by Table 4, and P1 to P6."""
-    cell = load_cell(bundled_config("paper-experiment"))
-    assert cell.settings.simulation is not None  # noqa: S101 - a bundled cell's
-    robot = robot_of(cell)
-    actual = Geometry.of(robot.mechanism.parameters, cell.settings.simulation.geometry.model_dump())
-    points = (*cell.settings.identification.points, *cell.settings.verification.points)
-    return robot, actual, np.array(points)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
+from hexacell.cell.model import CellSettings
 from hexacell.errors import ConvergenceError, IdentifiabilityError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics import rotations
@@ -131,12 +132,12 @@ def run_trial(trial: Trial) -> Outcome:
     Raises:
         LimitError: too few orientations can be reached.
     """
-    robot, truth, points = _table_one()
+    robot, truth, settings = bundled_robot("simulated-hexaglide")
     random = np.random.default_rng([SEED, trial.number])
     measured = unlimited_travel(
         robot,
         truth,
-        points[: trial.points],
+        np.array(settings.identification.points[: trial.points]),
         trial.orientations,
         float(np.radians(trial.amplitude_deg)),
         random,
@@ -173,14 +174,12 @@ def _by_kind(found: Geometry, truth: Geometry) -> dict[str, float]:
 
 
 @cache
-def _table_one() -> tuple[Robot, Geometry, Array]:
-    """The robot of Table 1 as drawn, as it is in the frames of the convention, and the points."""
-    cell = load_cell(bundled_config("simulated-hexaglide"))
+def bundled_robot(name: str) -> tuple[Robot, Geometry, CellSettings]:
+    """The robot of a bundled cell as drawn, as it is in the frames of the convention, and the settings."""
+    cell = load_cell(bundled_config(name))
     assert cell.settings.simulation is not None  # noqa: S101 - a bundled cell's
-    truth = cell.settings.simulation.geometry.model_dump()
-    robot = robot_of(cell)
-    actual = Geometry.of(robot.mechanism.parameters, truth)
-    return robot, actual, np.array(cell.settings.identification.points)
+    robot, truth = robot_of(cell), cell.settings.simulation.geometry.model_dump()
+    return robot, Geometry.of(robot.mechanism.parameters, truth), cell.settings
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,12 +18,7 @@ class JointedLegs(Mechanism):
     """A mechanism whose constraint is a leg's length less what it should be, mm; stateless.
 
     The parameters of a leg are, in this order, those of its joint at the base's end, others, those of its
-    joint on the platform, and its length.
-
-    Attributes:
-        base_joint: symbol of the joints at the base's end.
-        platform_joint: symbol of the joints on the platform.
-        length: symbol of the legs' lengths.
+    joint on the platform, and its length. The attributes are the symbols of these kinds.
     """
 
     base_joint: str

@@ -134,7 +134,8 @@ class RotaryCranks(JointedLegs):
         cosine, sine = _cosine_and_sine(geometry, joints)
         outward = np.einsum("nij,nij->ni", n, axes.u * cosine + axes.w * sine)
         along = np.einsum("nij,nij->ni", n, axes.w * cosine - axes.u * sine)
-        turned = axes.u_by_turns * cosine[..., None] + axes.w_by_turns * sine[..., None]
+        u_by_turns, w_by_turns, _ = axes.by_turns
+        turned = u_by_turns * cosine[..., None] + w_by_turns * sine[..., None]
         by_axis = crank[:, None] * np.einsum("nij,nijk->nik", n, turned)
         by_angle = np.radians(crank * along)
         return by_angle, [by_axis, outward[..., None], by_angle[..., None]]

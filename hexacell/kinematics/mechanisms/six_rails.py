@@ -86,7 +86,7 @@ class SixRails(JointedLegs):
 
     def derivatives_at_base(self, geometry: Geometry, joints: Array, n: Array) -> tuple[Array, list[Array]]:
         axes = TurnedAxes.by(geometry["rail"])
-        by_rail = joints[..., None] * np.einsum("nij,ijk->nik", n, axes.axis_by_turns)
+        by_rail = joints[..., None] * np.einsum("nij,ijk->nik", n, axes.by_turns[2])
         return np.einsum("nij,ij->ni", n, axes.axis), [by_rail]
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
@@ -131,7 +131,7 @@ class SixRails(JointedLegs):
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         _, v = self.leg_vectors(geometry, poses, joints)
         n = v / np.linalg.norm(v, axis=-1, keepdims=True)
-        by_turns = TurnedAxes.by(geometry["rail"]).axis_by_turns
+        by_turns = TurnedAxes.by(geometry["rail"]).by_turns[2]
         along = np.einsum("ij,ij->i", geometry["S"], _directions(geometry)) + joints
         across = np.einsum("nij,ijk->nik", n, by_turns / np.linalg.norm(by_turns, axis=1, keepdims=True))
         return Guides(OWN_RAILS, along, across)

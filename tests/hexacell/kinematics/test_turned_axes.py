@@ -26,15 +26,15 @@ def test_derivatives_are_those_of_the_axes(a: float, b: float) -> None:
     found = TurnedAxes.by(np.array([a, b]))
     for column, step in enumerate(1e-5 * np.eye(2)):
         after, before = (TurnedAxes.by(np.array([a, b]) + side * step) for side in (1.0, -1.0))
-        np.testing.assert_allclose(found.u_by_turns[:, column], (after.u - before.u) / 2e-5, atol=1e-9)
-        np.testing.assert_allclose(found.w_by_turns[:, column], (after.w - before.w) / 2e-5, atol=1e-9)
+        np.testing.assert_allclose(found.by_turns[0][:, column], (after.u - before.u) / 2e-5, atol=1e-9)
+        np.testing.assert_allclose(found.by_turns[1][:, column], (after.w - before.w) / 2e-5, atol=1e-9)
 
 
 @pytest.mark.parametrize("size", [0.999 * SERIES, 1.001 * SERIES])
 def test_the_series_meets_the_quotient(size: float) -> None:
     """To what rounding leaves of the quotient there."""
     found, beyond = (TurnedAxes.by(np.array([one, 0.5 * one])) for one in (size, 1.0001 * size))
-    np.testing.assert_allclose(found.u_by_turns, beyond.u_by_turns, atol=2.0 * size * 1e-4)
+    np.testing.assert_allclose(found.by_turns[0], beyond.by_turns[0], atol=2.0 * size * 1e-4)
 
 
 @given(turn, turn)

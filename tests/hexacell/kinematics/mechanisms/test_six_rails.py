@@ -91,7 +91,7 @@ def test_derivatives_are_those_of_the_leg_equation(pose: Pose, off_mm: float) ->
 
 def directions_of_rails(turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     axes = TurnedAxes.by(turns)
-    return axes.axis, axes.axis_by_turns
+    return axes.axis, axes.by_turns[2]
 
 
 @given(turns, turns)

@@ -169,7 +169,7 @@ def _check_derivatives_at(
     _compare(of_each_joint, by_joints, np.full(6, JOINT_STEPS[mechanism.words.joint_unit]), ["joints"] * 6)
     # Leg i depends on its own numbers alone.
     of_legs = found.parameters[:, :, None, :] * np.eye(6)[..., None]
-    of_all = of_legs.reshape(*found.joints.shape, -1)[..., parameters.leg_order]
+    of_all = of_legs.reshape(*found.joints.shape, len(parameters))[..., parameters.leg_order]
     _compare(of_all, by_parameters, sizes, parameters.names)
 
 

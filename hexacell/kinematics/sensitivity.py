@@ -90,7 +90,7 @@ def pose_sensitivity(
 def _by_numbers_of_legs(by_constraints: Array, linear: ConstraintDerivatives) -> Array:
     """Derivatives (n, m, P) by the numbers of leg 1, 2, ..., from those by the constraints (n, m, 6)."""
     products = by_constraints[..., None] * linear.parameters[..., None, :, :]
-    return products.reshape(*by_constraints.shape[:2], -1)
+    return products.reshape(*by_constraints.shape[:2], 6 * linear.parameters.shape[-1])
 
 
 def free_sensitivity(

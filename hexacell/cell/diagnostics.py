@@ -143,7 +143,10 @@ class Diagnosis:
     def _explain_one(self, path: KeyPath, kind: str, context: Mapping[str, Any]) -> FileError:
         length = self.model.length_at(path)
         if length is not None and kind in {"too_few", "too_long", "tuple_type"}:
-            return self._mismatch(path, self._list_of(length, path))
+            is_of_sections = self.model.section_at((*path, 0)) is not None
+            each = f"sections, each beginning with {self.model.header(path)}"
+            expected = f"{length} {each}" if is_of_sections else f"a list of {length} items"
+            return self._mismatch(path, expected)
         if kind == "missing":
             return self._missing(path)
         if kind == "extra_forbidden":
@@ -180,18 +183,10 @@ class Diagnosis:
 
     def _mismatch(self, path: KeyPath, expected: str) -> FileError:
         meaning = self.model.description_at(path)
-        action = (
-            "Remove the quotes" if _is_quoted_number(self.document.value(path), expected) else "Correct it"
-        )
+        value, action = self.document.value(path), "Correct it"
+        is_number = isinstance(value, str) and value.strip("+-").replace(".", "").isdigit()
+        if is_number and "number" in expected:
+            action = "Remove the quotes"
         return self.document.error(
             path, self.document.mismatch(path, expected), action + (f" ({meaning})" if meaning else "")
         )
-
-    def _list_of(self, length: int, path: KeyPath) -> str:
-        if self.model.section_at((*path, 0)):
-            return f"{length} sections, each beginning with {self.model.header(path)}"
-        return f"a list of {length} items"
-
-
-def _is_quoted_number(value: object, expected: str) -> bool:
-    return isinstance(value, str) and "number" in expected and value.strip("+-").replace(".", "").isdigit()

@@ -58,9 +58,6 @@ MOST_THERMOMETERS = 100
 FEWEST_POINTS = 2
 """Fewest points to measure: one alone does not identify the geometry."""
 
-SectionType = TypeVar("SectionType", bound=Section)
-
-
 Named = TypeVar("Named", bound="tuple[GaugeSettings | ThermometerSettings | NotificationSettings, ...]")
 
 
@@ -215,7 +212,7 @@ class CellSettings(Section):
         return self
 
     @model_validator(mode="after")
-    def _the_thermometer_of_the_fixture_exists(self) -> Self:
+    def _the_length_check_is_possible(self) -> Self:
         named = self.length_check and self.length_check.thermometer
         if named and named not in {thermometer.name for thermometer in self.thermometers}:
             refusal = broken_rule(
@@ -223,10 +220,6 @@ class CellSettings(Section):
                 "Write the name of one of [[thermometers]], or remove it and write temperature_c",
             )
             raise self._refused((("length_check", "thermometer"), refusal))
-        return self
-
-    @model_validator(mode="after")
-    def _a_length_check_is_of_encoders_of_lengths(self) -> Self:
         if self.length_check is not None and self.mechanism.words.joint_unit is JointUnit.DEG:
             refusal = broken_rule(
                 "a length check finds what is wrong with the scale of encoders of lengths; those of this "

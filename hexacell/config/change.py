@@ -296,20 +296,18 @@ def compare_versions(
     now = read_contents(paths)
     edits = [diff_of_files(paths, version, now) for _, version in (before, written)]
     is_from_written = len(edits[1]) <= len(edits[0])
-    numbers = _numbers(before[0], written[0], _geometry_now(paths, layout))
+    parameters = before[0].parameters.parameters
+    geometry = geometry_if_readable(paths, layout)
+    last = [None] * len(parameters) if geometry is None else geometry.vector.tolist()
+    values = zip(parameters, before[0].vector.tolist(), written[0].vector.tolist(), last, strict=True)
+    found = (NumberVersions(one.name, one.kind.unit.value, *three) for one, *three in values)
+    numbers = tuple(one for one in found if len({one.before, one.written, one.now}) > 1)
     return ConfigVersions(numbers, edits[is_from_written], is_from_written)
 
 
-def _geometry_now(paths: tuple[Path, ...], layout: ConfigLayout) -> Geometry | None:
+def geometry_if_readable(paths: tuple[Path, ...], layout: ConfigLayout) -> Geometry | None:
+    """The geometry in the files; None where it cannot be read."""
     try:
         return layout.read(*paths).geometry
     except HexacellError:
         return None
-
-
-def _numbers(before: Geometry, written: Geometry, now: Geometry | None) -> tuple[NumberVersions, ...]:
-    parameters = before.parameters.parameters
-    last = [None] * len(parameters) if now is None else now.vector.tolist()
-    values = zip(parameters, before.vector.tolist(), written.vector.tolist(), last, strict=True)
-    found = (NumberVersions(one.name, one.kind.unit.value, *three) for one, *three in values)
-    return tuple(one for one in found if len({one.before, one.written, one.now}) > 1)

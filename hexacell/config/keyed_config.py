@@ -235,10 +235,11 @@ class KeyedConfig:
         for parameter, wanted in new:
             difference = wanted - self._value(lookup, parameter, None)
             if abs(difference) > 0.5 * _resolution(parameter):
-                token = lookup.number(self._written_key(parameter))
-                unit = self._unit(parameter)
+                key = self._keys.corrections.get(parameter.name, self._keys.values[parameter.name])
+                token, unit = lookup.number(key), self._unit(parameter)
                 value = number_of(token, None) + difference / unit
-                yield token, write_number(value, parameter.kind.unit.decimals + _more_decimals(unit))
+                more_decimals = max(0, ceil(log10(unit)))  # than a millimetre needs, in a larger unit
+                yield token, write_number(value, parameter.kind.unit.decimals + more_decimals)
 
     def _require_kept(self, lookup: NumberLookup, new: Iterable[tuple[GeometricParameter, float]]) -> None:
         for parameter, wanted in new:
@@ -261,9 +262,6 @@ class KeyedConfig:
         keys = (self._keys.values[parameter.name], self._keys.corrections.get(parameter.name))
         return tuple(key for key in keys if key is not None)
 
-    def _written_key(self, parameter: GeometricParameter) -> str:
-        return self._keys.corrections.get(parameter.name, self._keys.values[parameter.name])
-
     def _unit(self, parameter: GeometricParameter) -> float:
         return self._unit_mm if parameter.kind.unit is ParameterUnit.MM else 1.0
 
@@ -284,8 +282,3 @@ class KeyedConfig:
 def _resolution(parameter: GeometricParameter) -> float:
     """The last decimal of a parameter in its own unit."""
     return float(10.0**-parameter.kind.unit.decimals)
-
-
-def _more_decimals(unit: float) -> int:
-    """Decimals that a number needs beyond those of a millimetre, counted in a larger unit."""
-    return max(0, ceil(log10(unit)))

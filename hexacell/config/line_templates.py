@@ -58,7 +58,10 @@ class LineTemplates(KeyedConfig):
         if options.branch is None and f"{BRANCH}1" in names:
             options = options.model_copy(update={"branch": f"{BRANCH}{{leg}}"})
         keys = NumberKeys.of(parameters, options, lambda parameter: parameter.name, is_part=is_part)
-        _require_each_once(names, parameters, is_part=is_part)
+        for name in parameters.names:
+            if names[name] > 1 or not (names[name] or is_part):
+                often = "in no line" if not names[name] else "in more than one line"
+                raise UsageError(f"config_options: {name} is {often}", action="Put it into one")
         super().__init__(
             parameters, keys, lambda text, path: _MatchedLines.of(text, path, templates), options.unit_mm
         )
@@ -100,7 +103,7 @@ def _parsed(line: str) -> list[tuple[str, str | None]]:
 def _template(line: str, leg: int, of_a_leg: set[str]) -> _LineTemplate:
     pattern, names = "", list[str]()
     for text, field in _parsed(line):
-        pattern += _literal(text)
+        pattern += r"\s+".join(re.escape(part) for part in re.split(r"\s+", text))
         if field in {"leg", "index"}:
             pattern += str(leg if field == "leg" else leg - 1)
         elif field is not None:
@@ -108,17 +111,6 @@ def _template(line: str, leg: int, of_a_leg: set[str]) -> _LineTemplate:
             names.append(f"{symbol}{leg}{component}" if field in of_a_leg else field)
             pattern += f"({NUMBER})"
     return _LineTemplate(f"{line} (leg {leg})", re.compile(rf"\s*{pattern}\s*", re.ASCII), tuple(names))
-
-
-def _literal(text: str) -> str:
-    return r"\s+".join(re.escape(part) for part in re.split(r"\s+", text))
-
-
-def _require_each_once(names: Counter[str], parameters: ParameterSet, *, is_part: bool) -> None:
-    for name in parameters.names:
-        if names[name] > 1 or not (names[name] or is_part):
-            often = "in no line" if not names[name] else "in more than one line"
-            raise UsageError(f"config_options: {name} is {often}", action="Put it into one")
 
 
 @dataclass(frozen=True, slots=True)

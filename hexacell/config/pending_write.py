@@ -127,12 +127,18 @@ def settle_interrupted_write(paths: Sequence[Path]) -> InterruptedWrite | None:
         return None
     path = note_path(paths)
     note = _Note.load(path)
-    _require_same_files(note, paths, path)
+    # What a note names is written: it must be the files of this cell, no others.
+    noted, own = ({os.path.realpath(one) for one in files} for files in (note.paths, paths))
+    if noted != own:
+        raise FileError(
+            f"a write of {' and '.join(names_of(note.paths))} was interrupted, which are not the files "
+            "that this cell file names",
+            subject=path,
+            action="Use the cell file with which the write was made; its next command undoes it",
+        )
     found = list(zip(note.files, read_contents(note.paths), strict=True))
     replaced = [(one, data) for one, data in found if _is_replaced(one, data, note, path)]
-    is_complete = len(replaced) == sum(
-        atomic_files.sha256(one.old) != one.sha256_after for one in note.files
-    )
+    is_complete = len(replaced) == sum(one.is_changed for one in note.files)
     for one, data in () if is_complete else replaced:
         atomic_files.write_atomically(one.path, one.old, expected=data)
     forget_write(paths)
@@ -152,18 +158,6 @@ def _is_replaced(one: _NotedFile, data: bytes, note: _Note, path: Path) -> bool:
         subject=one.path,
         action=f"Make all of them old or all new, from the copies in the run's folder; then delete {path}",
     )
-
-
-def _require_same_files(note: _Note, paths: Sequence[Path], path: Path) -> None:
-    """What a note names is written: it must be the files of this cell, no others."""
-    noted, own = ({os.path.realpath(one) for one in files} for files in (note.paths, paths))
-    if noted != own:
-        raise FileError(
-            f"a write of {' and '.join(names_of(note.paths))} was interrupted, which are not the files "
-            "that this cell file names",
-            subject=path,
-            action="Use the cell file with which the write was made; its next command undoes it",
-        )
 
 
 def _readers(path: Path) -> int:

@@ -16,7 +16,7 @@ character.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -79,8 +79,13 @@ class NativeToml:
         """
         require_physical(geometry)
         document = TomlDocument.parse(text)
-        before = _Content(document, self._parameters).geometry()
-        changed = document.replaced(dict(_changed_tokens(before, geometry)))
+        before, tokens = _Content(document, self._parameters).geometry(), dict[KeyPath, str]()
+        for kind in self._parameters.kinds:
+            old, half_of_last = before[kind.symbol], 0.5 * 10.0**-kind.unit.decimals
+            for index, new in np.ndenumerate(geometry[kind.symbol]):
+                if abs(new - old[index]) > half_of_last:
+                    tokens["geometry", kind.symbol, *index] = write_number(float(new), kind.unit.decimals)
+        changed = document.replaced(tokens)
         after = _Content(TomlDocument.parse(changed), self._parameters).geometry()
         last_decimal = {kind.symbol: 10.0**-kind.unit.decimals for kind in self._parameters.kinds}
         if (abs(after.vector - geometry.vector) > self._parameters.by_kind(last_decimal)).any():
@@ -113,14 +118,6 @@ class NativeToml:
         has_branch = self._parameters.has_branch and "branch" in names | {*document.data}
         kinds = tuple(kind for kind in self._parameters.kinds if kind.symbol in names)
         return ParameterSet(kinds, has_branch)
-
-
-def _changed_tokens(before: Geometry, after: Geometry) -> Iterator[tuple[KeyPath, str]]:
-    for kind in after.parameters.kinds:
-        old, half_of_last = before[kind.symbol], 0.5 * 10.0**-kind.unit.decimals
-        for index, new in np.ndenumerate(after[kind.symbol]):
-            if abs(new - old[index]) > half_of_last:
-                yield ("geometry", kind.symbol, *index), write_number(float(new), kind.unit.decimals)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,13 +154,14 @@ class _Content:
             return None
         if not all(isinstance(axis, dict) and {"min", "max"} <= axis.keys() for axis in axes):
             return None
-        return tuple(self._joint_range(leg) for leg in range(LEGS))
-
-    def _joint_range(self, leg: int) -> tuple[float, float]:
-        low, high = (self._number(("axes", leg, limit)) for limit in ("min", "max"))
-        if low >= high:
-            raise self._error(("axes", leg, "max"), f"max of axis {leg + 1} is not above its min, {low:g}")
-        return low, high
+        ranges: list[tuple[float, float]] = []
+        for leg in range(LEGS):
+            low, high = (self._number(("axes", leg, limit)) for limit in ("min", "max"))
+            if low >= high:
+                problem = f"max of axis {leg + 1} is not above its min, {low:g}"
+                raise self._error(("axes", leg, "max"), problem)
+            ranges.append((low, high))
+        return tuple(ranges)
 
     def _require_positive(self, kind: ParameterKind, values: Any) -> None:  # noqa: ANN401
         for index, value in np.ndenumerate(np.array(values)):
@@ -205,14 +203,11 @@ class _Content:
         return self._error(path, self.document.mismatch(path, expected))
 
     def _error(self, path: KeyPath, problem: str) -> FileError:
-        needed = [_needed(kind) for kind in self.parameters.kinds]
+        needed: list[str] = []  # as "S (six rows of 3 numbers, mm)"
+        for kind in self.parameters.kinds:
+            values = f"six rows of {len(kind.components)} numbers" if kind.components else "six numbers"
+            needed.append(f"{kind.symbol} ({', '.join(filter(None, (values, kind.unit)))})")
         if self.parameters.has_branch:
             needed.append("branch (six signs)")
         *most, last = needed
         return self.document.error(path, problem, f"[geometry] needs {', '.join(most)} and {last}")
-
-
-def _needed(kind: ParameterKind) -> str:
-    """``S (six rows of 3 numbers, mm)``."""
-    values = f"six rows of {len(kind.components)} numbers" if kind.components else "six numbers"
-    return f"{kind.symbol} ({', '.join(filter(None, (values, kind.unit)))})"

@@ -42,7 +42,8 @@ def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
     found = read_contents(change.paths)
     if found == after and _is_complete(receipt):
         return receipt
-    _require_unchanged(change.paths, found, before)
+    for path, data, expected in zip(change.paths, found, before, strict=True):
+        require_fingerprint(path, (data,), fingerprint_of((expected,)))
     _back_up(receipt, before, after)
     _replace(receipt, Replacement(change.paths, before, after))
     _log.info("wrote %s; the previous version is in %s", _names(change.paths), backup_folder)
@@ -91,12 +92,6 @@ def restore(paths: tuple[Path, ...], contents: Contents, *, expected: Contents) 
 
 def _names(paths: Sequence[Path]) -> str:
     return " and ".join(map(str, paths))
-
-
-def _require_unchanged(paths: Sequence[Path], found: Contents, before: Contents) -> None:
-    """Raise ``FileError``, with the file, if the config changed since the run began."""
-    for path, data, expected in zip(paths, found, before, strict=True):
-        require_fingerprint(path, (data,), fingerprint_of((expected,)))
 
 
 def _edited(receipt: Receipt, found: Contents, before: Contents) -> tuple[Path, Path]:
@@ -152,11 +147,22 @@ def _replace(receipt: Receipt, replacement: Replacement) -> None:
 def _undo(
     receipt: Receipt, replacement: Replacement, cause: BaseException, *, all_of_them: bool
 ) -> NoReturn:
+    def keep(found: bytes) -> None:
+        """Keep a version that no commit wrote beside the backup, if possible, so that it is not lost."""
+        with suppress(FileError):
+            name = f"config-found-{atomic_files.sha256(found)[:12]}"
+            atomic_files.write_atomically(receipt.backup_folder / name, found, like=receipt.path)
+
     try:
-        replacement.restore(all_of_them=all_of_them, keep=lambda found: _keep(receipt, found))
+        replacement.restore(all_of_them=all_of_them, keep=keep)
     except FileError as error:
         if any(one.present != one.old for one in replacement.changed):
-            raise _not_undone(receipt, cause, error) from cause
+            raise FileError(
+                f"the write-back failed ({_reason(cause)}) and could not be undone ({_reason(error)}); "
+                "the config may hold the new geometry",
+                subject=receipt.path,
+                action=f"Do not move the robot; copy {_names(receipt.kept(BEFORE))} over the config",
+            ) from cause
     if not isinstance(cause, Exception):
         raise cause
     raise WriteBackUndone(
@@ -166,25 +172,8 @@ def _undo(
     ) from cause
 
 
-def _not_undone(receipt: Receipt, cause: BaseException, error: FileError) -> FileError:
-    copies = " and ".join(map(str, receipt.kept(BEFORE)))
-    return FileError(
-        f"the write-back failed ({_reason(cause)}) and could not be undone ({_reason(error)}); "
-        "the config may hold the new geometry",
-        subject=receipt.path,
-        action=f"Do not move the robot; copy {copies} over the config",
-    )
-
-
 def _reason(error: BaseException) -> str:
     return error.problem if isinstance(error, HexacellError) else repr(error)
-
-
-def _keep(receipt: Receipt, found: bytes) -> None:
-    """Keep a version that no commit wrote beside the backup, if possible, so that it is not lost."""
-    with suppress(FileError):
-        name = f"config-found-{atomic_files.sha256(found)[:12]}"
-        atomic_files.write_atomically(receipt.backup_folder / name, found, like=receipt.path)
 
 
 class ReplacedFile(NamedTuple):

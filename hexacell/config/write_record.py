@@ -19,6 +19,7 @@ from typing import Literal
 from pydantic import TypeAdapter, ValidationError
 
 from hexacell.cell.fields import LONGEST_TEXT, Finite, Frozen, Text
+from hexacell.config.change import geometry_if_readable
 from hexacell.config.layout import ConfigLayout, fingerprint
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.kinematics.geometry import Geometry
@@ -162,10 +163,7 @@ class _Version:
 
     @classmethod
     def now(cls, paths: tuple[Path, ...], layout: ConfigLayout) -> _Version:
-        try:
-            geometry = layout.read(*paths).geometry
-        except HexacellError:
-            geometry = None
+        geometry = geometry_if_readable(paths, layout)
         try:
             return cls(fingerprint(*paths), geometry)
         except FileError:

@@ -120,8 +120,15 @@ def write_atomically(
     try:
         target = _resolved(path)
         with _temporary_beside(target) as temporary:
-            _write_like(target, temporary, data, _new_mode(like), for_everybody=for_everybody)
-            _require_content(target, expected)
+            mode = 0o666 if like is None else stat.S_IMODE(like.stat().st_mode)
+            new_mode = mode & 0o666 & ~NOT_FOR_OTHERS
+            _write_like(target, temporary, data, new_mode, for_everybody=for_everybody)
+            if expected is not None and target.read_bytes() != expected:
+                raise FileError(
+                    "the file was changed by somebody else just now and is left unchanged",
+                    subject=target,
+                    action="Run again",
+                )
             os.replace(temporary, target)  # noqa: PTH105 - named as the system call it is
     except OSError as error:
         raise os_error_to_file_error("cannot be written and is unchanged", path, error) from error
@@ -224,11 +231,6 @@ def _temporary_beside(target: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def _new_mode(like: Path | None) -> int:
-    mode = 0o666 if like is None else stat.S_IMODE(like.stat().st_mode)
-    return mode & 0o666 & ~NOT_FOR_OTHERS
-
-
 def _write_like(target: Path, temporary: Path, data: bytes, new_mode: int, *, for_everybody: bool) -> None:
     status = _status(target)
     # Who may not read the old file must not read the new one, not even while it is written.
@@ -260,34 +262,21 @@ def _require_regular(path: Path, status: os.stat_result) -> None:
         raise FileError("this is not a file", subject=path, action="Check the path")
 
 
-def _require_content(target: Path, expected: bytes | None) -> None:
-    if expected is not None and target.read_bytes() != expected:
-        raise FileError(
-            "the file was changed by somebody else just now and is left unchanged",
-            subject=target,
-            action="Run again",
-        )
-
-
 def _keep_attributes(descriptor: int, target: Path, status: os.stat_result) -> None:
     own = os.fstat(descriptor)
     if (own.st_uid, own.st_gid) != (status.st_uid, status.st_gid):
-        _keep_owner(descriptor, target, status)
+        try:
+            os.fchown(descriptor, status.st_uid, status.st_gid)
+        except PermissionError as error:
+            raise FileError(
+                f"the file belongs to user {status.st_uid}, group {status.st_gid}, and replacing it would "
+                "change that; it is unchanged",
+                subject=target,
+                action="Run as its owner",
+            ) from error
     if hasattr(os, "listxattr"):
         _copy_extended_attributes(descriptor, target)
     os.fchmod(descriptor, stat.S_IMODE(status.st_mode))
-
-
-def _keep_owner(descriptor: int, target: Path, status: os.stat_result) -> None:
-    try:
-        os.fchown(descriptor, status.st_uid, status.st_gid)
-    except PermissionError as error:
-        raise FileError(
-            f"the file belongs to user {status.st_uid}, group {status.st_gid}, and replacing it would "
-            "change that; it is unchanged",
-            subject=target,
-            action="Run as its owner",
-        ) from error
 
 
 def _copy_extended_attributes(descriptor: int, target: Path) -> None:

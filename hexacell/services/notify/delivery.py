@@ -119,8 +119,6 @@ TIMEOUT_S = 10.0
 LONGEST_ATTEMPT_S = 18.0
 """Longest attempt, s, also where a server answers a byte at a time; all attempts fit into a minute."""
 
-Sender = Callable[[NoticeAddress, Notice, float], None]
-
 
 def deliver(
     address: NoticeAddress,
@@ -152,7 +150,12 @@ def _attempt(address: NoticeAddress, notice: Notice, longest_s: float) -> None:
 
     def act() -> None:
         try:
-            _sender(address)(address, notice, min(TIMEOUT_S, longest_s))
+            scheme, send = scheme_of(address.url), send_by_apprise
+            if scheme in WEBHOOKS:
+                send = post_to_webhook
+            elif scheme in BROKERS:
+                send = publish_by_mqtt
+            send(address, notice, min(TIMEOUT_S, longest_s))
         except NoticeUndelivered as error:
             ended.put(str(error))
         except Exception as error:
@@ -168,13 +171,6 @@ def _attempt(address: NoticeAddress, notice: Notice, longest_s: float) -> None:
     problem = ended.get_nowait()
     if problem is not None:
         raise NoticeUndelivered(problem)
-
-
-def _sender(address: NoticeAddress) -> Sender:
-    scheme = scheme_of(address.url)
-    if scheme in WEBHOOKS:
-        return post_to_webhook
-    return publish_by_mqtt if scheme in BROKERS else send_by_apprise
 
 
 def post_to_webhook(address: NoticeAddress, notice: Notice, timeout_s: float) -> None:

@@ -90,7 +90,12 @@ class NoticeOutbox:
         for one in waiting:
             if one not in kept:
                 self.forget(one)
-        self._remove_remains(now)
+        # Files that no program reads, as those of a process that died while it wrote them.
+        damaged = [path for path in self._folder.glob("*.json") if _read(path) is None]
+        for path in (*self._folder.glob(".hexacell-*.tmp"), *damaged):
+            with suppress(OSError):
+                if path.stat().st_mtime < (now - LONGEST_KEPT).timestamp():
+                    path.unlink()
         return len(waiting) - len(kept)
 
     @contextmanager
@@ -104,28 +109,17 @@ class NoticeOutbox:
         except OSError as error:
             raise atomic_files.os_error_to_file_error("cannot be read", self._folder, error) from error
         try:
-            yield _locked(descriptor)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                is_ours = True
+            except BlockingIOError:
+                is_ours = False
+            yield is_ours
         finally:
             os.close(descriptor)
 
-    def _remove_remains(self, now: datetime) -> None:
-        """Files that no program reads, as those of a process that died while it wrote them."""
-        damaged = [path for path in self._folder.glob("*.json") if _read(path) is None]
-        for path in (*self._folder.glob(".hexacell-*.tmp"), *damaged):
-            with suppress(OSError):
-                if path.stat().st_mtime < (now - LONGEST_KEPT).timestamp():
-                    path.unlink()
-
     def _file(self, pending: PendingNotice) -> Path:
         return self._folder / f"{notice_id(pending.notice.id, pending.to)}.json"
-
-
-def _locked(descriptor: int) -> bool:
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
 
 
 def _read(path: Path) -> PendingNotice | None:

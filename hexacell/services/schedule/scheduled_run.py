@@ -136,10 +136,20 @@ def service_text(run: ScheduledRun, user: str | None, groups: Sequence[str], on_
         f"TimeoutStopSec={STOPPING_S}",
         "KillSignal=SIGTERM",
         "StandardInput=null",
-        *_retries(run),
-        *_identity(user, groups),
     ]
-    return _file(run, [*unit, "", *service, *([] if user is None else _hardening(run))])
+    if run.retries:  # only after failures that may pass by themselves, not after a verdict
+        others = [code for code in ExitCode if code not in {*WORTH_ANOTHER_TRY, ExitCode.DONE}]
+        final = " ".join(str(int(code)) for code in others)
+        service += ["Restart=on-failure", f"RestartSec={run.retry_minutes}min"]
+        service += [f"RestartPreventExitStatus={final} SIGTERM"]
+    if user is not None:
+        service += [f"User={_plain(user)}"]
+        service += [f"SupplementaryGroups={' '.join(groups)}"] if groups else []
+        # A cell below a temporary folder is seen only in the folder that all share.
+        is_temporary = any(one.is_relative_to(folder) for one in run.writable for folder in TEMPORARY)
+        service += [*HARDENING, "PrivateTmp=no" if is_temporary else "PrivateTmp=yes"]
+        service += [f"ReadWritePaths={_quoted(str(one))}" for one in run.writable]
+    return _file(run, [*unit, "", *service])
 
 
 def timer_text(run: ScheduledRun) -> str:
@@ -169,32 +179,6 @@ def cell_of(unit_text: str) -> Path | None:
 
 def _file(run: ScheduledRun, lines: Sequence[str]) -> str:
     return "\n".join([f"{MARK}{run.cell}", *lines]) + "\n"
-
-
-def _retries(run: ScheduledRun) -> list[str]:
-    """Only after failures that may pass by themselves, not after a verdict."""
-    if not run.retries:
-        return []
-    others = [code for code in ExitCode if code not in {*WORTH_ANOTHER_TRY, ExitCode.DONE}]
-    final = " ".join(str(int(code)) for code in others)
-    return [
-        "Restart=on-failure",
-        f"RestartSec={run.retry_minutes}min",
-        f"RestartPreventExitStatus={final} SIGTERM",
-    ]
-
-
-def _hardening(run: ScheduledRun) -> list[str]:
-    """A cell below a temporary folder is seen only in the folder that all share."""
-    is_temporary = any(one.is_relative_to(folder) for one in run.writable for folder in TEMPORARY)
-    private = "PrivateTmp=no" if is_temporary else "PrivateTmp=yes"
-    return [*HARDENING, private, *(f"ReadWritePaths={_quoted(str(one))}" for one in run.writable)]
-
-
-def _identity(user: str | None, groups: Sequence[str]) -> list[str]:
-    if user is None:
-        return []
-    return [f"User={_plain(user)}", *([f"SupplementaryGroups={' '.join(groups)}"] if groups else [])]
 
 
 def _plain(text: str) -> str:

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
@@ -112,7 +113,10 @@ def write_schedule(cell: Cell, request: ScheduleRequest, folder: Path | None) ->
     for path in (service, timer):
         _require_ours(path, run.cell)
     user = _owner_of(run.cell) if is_of_system else None
-    groups = [group for group in DEVICE_GROUPS if _exists(group)]
+    groups: list[str] = []
+    for group in DEVICE_GROUPS:
+        with suppress(KeyError):
+            groups.append(grp.getgrnam(group).gr_name)
     atomic_files.create_folder_durably(place)
     _remove_units([path for path in _units_of(run.cell, place) if path not in {service, timer}])
     atomic_files.write_atomically(service, service_text(run, user, groups, request.on_failure).encode())
@@ -236,14 +240,6 @@ def _owner_of(cell: Path) -> str:
         raise UsageError(
             "nobody on this computer owns it", subject=cell, action="Give it an owner"
         ) from error
-
-
-def _exists(group: str) -> bool:
-    try:
-        grp.getgrnam(group)
-    except KeyError:
-        return False
-    return True
 
 
 def _verified(units: Sequence[Path]) -> tuple[str, ...]:

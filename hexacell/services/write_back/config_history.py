@@ -77,7 +77,11 @@ def config_history(cell: Cell) -> ConfigHistory:
     """
     folder = runs_folder(cell)
     records, damaged = read_records(folder)
-    runs = {run.name: run for run in _written_runs(cell)}
+    runs: dict[str, _Run] = {}
+    for receipt in receipts_of(cell):
+        with suppress(HexacellError):  # runs that cannot be read are left out
+            run = _read(RunFolder(receipt.backup_folder), receipt)
+            runs[run.name] = run
     found: list[ConfigWrite] = []
     for name in sorted({*runs, *(record.run for record in records)}):
         own = [record for record in records if record.run == name]
@@ -100,10 +104,8 @@ class _Run:
 def _writes_of(run: _Run, records: Sequence[WriteRecord]) -> Iterator[ConfigWrite]:
     every = [*((one, True) for one in records), *((one, False) for one in _unrecorded(run.noted, records))]
     for record, is_recorded in every:
-        if record.kind in _OF_THE_RESULT:
-            yield ConfigWrite(record, is_recorded, run.verdict, run.line)
-        else:
-            yield ConfigWrite(record, is_recorded)
+        verdict = (run.verdict, run.line) if record.kind in _OF_THE_RESULT else (None, "")
+        yield ConfigWrite(record, is_recorded, *verdict)
 
 
 def _unrecorded(noted: Sequence[WriteRecord], records: Sequence[WriteRecord]) -> list[WriteRecord]:
@@ -128,13 +130,6 @@ def _is_of(record: WriteRecord, noted: WriteRecord) -> bool:
 
 def _in_milliseconds(at: datetime) -> datetime:
     return at.replace(microsecond=at.microsecond // 1000 * 1000)
-
-
-def _written_runs(cell: Cell) -> Iterator[_Run]:
-    """The runs that wrote the config; those that cannot be read are left out."""
-    for receipt in receipts_of(cell):
-        with suppress(HexacellError):
-            yield _read(RunFolder(receipt.backup_folder), receipt)
 
 
 def _read(run: RunFolder, receipt: Receipt) -> _Run:

@@ -70,26 +70,24 @@ def roll_back_config(
     with held_config(*cell.config_paths):
         receipts = list(receipts_of(cell))
         found = read_contents(paths)
-        undone = _written_by(receipts, found)
+        sha256 = fingerprint_of(found)
+        undone = next((one for one in reversed(receipts) if one.sha256_after == sha256), None)
         if to is not None:
             restored, contents = _written_files(cell, to)
         else:
             restored, contents = _files_before(cell, undone, receipts)
         _require_known(cell, receipts, found)
         if contents != found:
-            cause = _cause(restored[0], undone, to=to, by=by, reason=reason)
+            run = restored[0].parent.name
+            why = f"by hand, as it was before {run}" if to is None else f"by hand, as {run} wrote it"
+            if to is not None and undone is not None:
+                why += f", in place of {undone.backup_folder.name}"
+            cause = WriteCause(WriteKind.ROLLED_BACK, by, run, why, reason)
             with recorded_write(runs_folder(cell), paths, config_layout(cell.settings), cause) as recording:
                 restore(paths, contents, expected=found)
     change = diff_of_files(paths, found, contents)
     folder = None if undone is None else undone.backup_folder
     return ConfigRollback(paths, folder, restored, change, recording.problem)
-
-
-def _cause(restored: Path, undone: Receipt | None, *, to: str | None, by: str, reason: str) -> WriteCause:
-    run = restored.parent.name
-    what = f"as {run} wrote it" if to is not None else f"as it was before {run}"
-    instead = "" if undone is None or to is None else f", in place of {undone.backup_folder.name}"
-    return WriteCause(WriteKind.ROLLED_BACK, by, run, f"by hand, {what}{instead}", reason)
 
 
 def receipts_of(cell: Cell) -> Iterator[Receipt]:
@@ -101,12 +99,6 @@ def receipts_of(cell: Cell) -> Iterator[Receipt]:
             continue
         if are_same_files(receipt.paths, cell.config_paths):
             yield receipt
-
-
-def _written_by(receipts: list[Receipt], found: Contents) -> Receipt | None:
-    """The newest run that wrote this config."""
-    sha256 = fingerprint_of(found)
-    return next((one for one in reversed(receipts) if one.sha256_after == sha256), None)
 
 
 def _files_before(

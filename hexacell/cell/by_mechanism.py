@@ -116,7 +116,6 @@ def uncertainty_settings(mechanism: Mechanism) -> type[CommonUncertaintySettings
 
 
 def _in_unit(mechanism: Mechanism, **sections: type[Section]) -> dict[str, Any]:
-    """Fields of sections with a default, in the unit of the mechanism's joint variables."""
     made = {name: in_joint_unit(one, mechanism.words.joint_unit) for name, one in sections.items()}
     return {name: (one, one()) for name, one in made.items()}
 

@@ -152,7 +152,6 @@ def require_plugins(cell: Cell) -> None:
 
 
 def _plugins(settings: CellSettings) -> Iterator[tuple[KeyPath, Group, str]]:
-    """Every name of a plug-in, and where it is in the cell file."""
     for n, gauge in enumerate(settings.gauges):
         yield ("gauges", n, "protocol"), Group.GAUGES, gauge.protocol
     for n, thermometer in enumerate(settings.thermometers):

@@ -114,7 +114,6 @@ def _with_scales(mechanism: Mechanism, *, encoder_scales: bool) -> Mechanism:
 def _screw_legs(
     settings: ScrewSettings, base: Six[PointInRange], platform: Six[PointInRange], *, encoder_scales: bool
 ) -> Mechanism:
-    """The mechanism with joints that are drawn on base and platform there, mm."""
     screws = Screws(settings.lead_mm, np.array(settings.base_axes), np.array(settings.platform_axes))
     drawn: dict[str, ArrayLike] = {"base": base, "platform": platform, "offset": np.zeros(6)}
     legs = ScrewLegs(screws, Geometry.of(GOUGH_STEWART_PARAMETERS, drawn))

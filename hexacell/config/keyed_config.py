@@ -155,7 +155,6 @@ class NumberKeys:
 
 
 def _keys_by(patterns: Mapping[str, str], every: Iterable[GeometricParameter]) -> dict[str, str]:
-    """The keys of those parameters whose kind has a pattern."""
     named = (one for one in every if one.kind.symbol in patterns)
     return {one.name: _key_of(patterns[one.kind.symbol], one) for one in named}
 

@@ -95,7 +95,6 @@ class ConfigLayout:
         return [one.read_part(text, source) for one, text, source in files]
 
     def _values(self, parts: Sequence[ConfigPart], paths: Sequence[Path]) -> Mapping[str, float]:
-        """The value of every parameter, each of which must be in one of the files."""
         found: dict[str, float] = {}
         for name in self.parameters.names:
             having = [path for part, path in zip(parts, paths, strict=True) if name in part.values]

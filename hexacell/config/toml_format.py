@@ -112,7 +112,6 @@ class NativeToml:
         return NativeToml(there).rewrite(text, Geometry(there, [values[name] for name in there.names]))
 
     def _kinds_in(self, document: TomlDocument) -> ParameterSet:
-        """The parameters of the mechanism that the document has, and whether it has the branch."""
         section = document.data.get("geometry")
         names = {*section} if isinstance(section, dict) else set()
         has_branch = self._parameters.has_branch and "branch" in names | {*document.data}
@@ -182,7 +181,6 @@ class _Content:
         return ("geometry", name)
 
     def _numbers(self, path: KeyPath, shape: tuple[int, ...]) -> Any:  # noqa: ANN401
-        """The number, or the nested lists of numbers, of that shape at ``path``."""
         if not shape:
             return self._number(path)
         value = self.document.value(path)

@@ -2,14 +2,17 @@
 
 The records of a cell are lines of JSON in a file beside its run folders, and stay when runs are deleted.
 Whoever writes a config holds the cell, so no two processes add a record at once. The config comes first: a
-record that cannot be written undoes nothing.
+record that cannot be written undoes nothing. Each line is on the disk before the next is begun, and
+begins on a line of its own: what a power cut or a full disk tears costs no other.
 """
 
 from __future__ import annotations
 
+import os
 import socket
+import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -25,7 +28,6 @@ from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.runs.cell_lock import user_name
 from hexacell.storage import atomic_files
-from hexacell.storage.appended_lines import append_line
 
 RECORDS = "config-writes.jsonl"
 """The file of them, beside the run folders of a cell."""
@@ -190,10 +192,57 @@ def _record(paths: tuple[Path, ...], before: _Version, after: _Version, cause: W
 
 
 def _changes(before: Geometry | None, after: Geometry | None) -> list[NumberChange] | None:
-    """The numbers that differ, the largest change first; None where a geometry is not known."""
     if before is None or after is None:
         return None
     units = [one.kind.unit for one in after.parameters.parameters]
     found = zip(after.parameters.names, (after.vector - before.vector).tolist(), units, strict=True)
     ranked = sorted((one for one in found if one[1]), key=lambda one: -abs(one[1]) / one[2].like_a_mm)
     return [NumberChange(name=name, change=change, unit=unit.value) for name, change, unit in ranked]
+
+
+# A link would lead what is appended to another file; a pipe would be waited for.
+_FLAGS = os.O_RDWR | os.O_APPEND | os.O_NOFOLLOW | os.O_NONBLOCK
+_NEW_FILE = 0o644
+_FOR_GROUP = 0o020
+
+
+def append_line(path: Path, line: bytes) -> None:
+    """Add a line, given without its line feed; one process at a time may do that.
+
+    Whoever may put files into the folder as a member of its group may add lines to a new file, too.
+
+    Raises:
+        FileError: the line is not in the file.
+    """
+    try:
+        is_new = True
+        try:
+            descriptor = os.open(path, _FLAGS | os.O_CREAT | os.O_EXCL, _NEW_FILE)
+        except FileExistsError:
+            descriptor, is_new = os.open(path, _FLAGS), False
+        try:
+            if is_new:
+                with suppress(OSError):
+                    os.fchmod(descriptor, _NEW_FILE | (path.parent.stat().st_mode & _FOR_GROUP))
+                    atomic_files.sync_folder(path.parent)
+            _append(descriptor, path, line + b"\n")
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        raise atomic_files.os_error_to_file_error("cannot be written", path, error) from error
+
+
+def _append(descriptor: int, path: Path, line: bytes) -> None:
+    status = os.fstat(descriptor)
+    if not stat.S_ISREG(status.st_mode):
+        raise FileError("this is not a file", subject=path, action="Move it away")
+    is_torn = status.st_size > 0 and os.pread(descriptor, 1, status.st_size - 1) != b"\n"
+    rest = b"\n" + line if is_torn else line
+    try:
+        while rest:  # a disk that is nearly full takes a part first
+            rest = rest[os.write(descriptor, rest) :]
+        os.fsync(descriptor)
+    except OSError:
+        with suppress(OSError):
+            os.ftruncate(descriptor, status.st_size)
+        raise

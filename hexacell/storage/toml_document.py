@@ -261,7 +261,6 @@ class _Scanner:
         self._spans[path] = slice(start, self._offset)
 
     def _items(self, path: KeyPath, bracket: str) -> None:
-        """The elements of an array, or the keys and values of an inline table."""
         self._offset += len(bracket)
         index = 0
         while self._next() not in {"]", "}"}:

@@ -334,7 +334,6 @@ def _kind(notice: Notice) -> str:
 
 
 def _apprise_url(address: NoticeAddress, timeout_s: float) -> str:
-    """The address with its login and apprise's own words for a time-out."""
     url = address.url
     if address.user is not None:
         scheme, _, rest = url.partition("://")

@@ -200,7 +200,6 @@ def waiting_notices(cell: Cell) -> tuple[PendingNotice, ...]:
 def _send_all(
     cell: Cell, outbox: NoticeOutbox, send: Deliver, unkept: Sequence[PendingNotice]
 ) -> NotifyOutcome:
-    """Send what waits, and what could not be kept."""
 
     def act(address: NoticeAddress, pending: PendingNotice) -> None:
         send(address, pending.notice)

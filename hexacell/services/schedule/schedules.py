@@ -195,7 +195,6 @@ def _times(cell: Cell, request: ScheduleRequest) -> tuple[int, int]:
 
 
 def _require_not_quiet(cell: Cell, hour: int, minute: int) -> None:
-    """Refuse a time at which quiet hours begin or go on, on whatever day."""
     stated, at = cell.settings.unattended, 60 * hour + minute
     for begin, length in stated.quiet_spans:
         if (at - begin) % DAY_MINUTES < length:
@@ -243,7 +242,6 @@ def _owner_of(cell: Path) -> str:
 
 
 def _verified(units: Sequence[Path]) -> tuple[str, ...]:
-    """What systemd finds wrong with them; nothing where there is no systemd."""
     program = shutil.which("systemd-analyze")
     if program is None:
         return ()

@@ -89,7 +89,6 @@ def note_unreadable_cell(path: Path, mode: str, error: HexacellError) -> None:
 
 
 def _wait_s(settings: CellSettings, error: HexacellError, began: datetime, at: datetime) -> float | None:
-    """Seconds until another try; None where it would not help, or the window is over by then."""
     wanted = settings.unattended
     again = at + timedelta(minutes=wanted.retry_minutes)
     is_open = again <= began + timedelta(minutes=wanted.window_minutes)

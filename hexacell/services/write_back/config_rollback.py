@@ -104,7 +104,6 @@ def receipts_of(cell: Cell) -> Iterator[Receipt]:
 def _files_before(
     cell: Cell, undone: Receipt | None, receipts: list[Receipt]
 ) -> tuple[tuple[Path, ...], Contents]:
-    """The copies of the config before a run wrote it, and what they hold."""
     if undone is not None:
         return undone.kept(BEFORE), undone.backup()
     if receipts:
@@ -117,7 +116,6 @@ def _files_before(
 
 
 def _written_files(cell: Cell, named: str) -> tuple[tuple[Path, ...], Contents]:
-    """The copies of the config as a run wrote it, and what they hold."""
     folder = find_run(cell, named)
     try:
         receipt = Receipt.of(folder.path)

@@ -169,12 +169,10 @@ async def _approval(proposal: Proposal, operator: Operator, typed_by: str) -> st
 
 
 def _outcome(state: RunState) -> str:
-    """What the run itself said of the geometry."""
     return "not verified by its run" if state.judged is None else state.judged.line
 
 
 def _verification_gate(state: RunState) -> AcceptanceGate:
-    """What the held-out records say of the written geometry."""
     judged = state.judged
     if judged is None or judged.verification is None:
         sentence = "No held-out record has verified it."

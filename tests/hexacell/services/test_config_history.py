@@ -153,7 +153,7 @@ async def test_a_full_disk_leaves_no_part_of_a_record(cell, records, monkeypatch
     def full(descriptor: int, data: bytes) -> int:
         raise OSError(28, os.strerror(28))
 
-    monkeypatch.setattr("hexacell.storage.appended_lines.os.write", full)
+    monkeypatch.setattr("hexacell.config.write_record.os.write", full)
     assert "the disk is full" in roll_back_config(cell).unrecorded
     assert (cell.config_path.read_bytes(), records.read_bytes()) == (run.before, before)
 

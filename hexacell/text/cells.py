@@ -40,6 +40,7 @@ HELP = {
     "hexacell_changes_found": "Changes of the robot that the watch over all runs found.",
     "hexacell_largest_sum_ratio": "Largest cumulative sum of a parameter, over the limit of an alarm.",
 }
+ESCAPES = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n"})
 
 
 def status_text(found: Sequence[CellStatus], unreadable: Sequence[UnreadableCell] = ()) -> str:
@@ -47,10 +48,8 @@ def status_text(found: Sequence[CellStatus], unreadable: Sequence[UnreadableCell
     head = f"{'cell':{LONGEST_NAME}} {'latest verdict':17} {'error, mm':16} {'when':17} in use"
     lines = [head, *(line for one in found for line in _lines(one))]
     for one in unreadable:
-        lines += [
-            f"{one.path.name[:LONGEST_NAME]:{LONGEST_NAME}} cannot be read",
-            indent(str(one.error), "  "),
-        ]
+        lines.append(f"{one.path.name[:LONGEST_NAME]:{LONGEST_NAME}} cannot be read")
+        lines.append(indent(str(one.error), "  "))
     return "\n".join(lines)
 
 
@@ -67,7 +66,9 @@ def metrics_text(found: Sequence[CellStatus]) -> str:
     samples: dict[str, list[str]] = {name: [] for name in HELP}
     for one in found:
         for name, labels, value in _samples(one):
-            samples[name].append(f"{name}{{{_labels(one, labels)}}} {value}")
+            named = {"cell": one.cell.settings.name, **labels}
+            shown = ",".join(f'{label}="{text.translate(ESCAPES)}"' for label, text in named.items())
+            samples[name].append(f"{name}{{{shown}}} {value}")
     return "".join(
         f"# HELP {name} {HELP[name]}\n# TYPE {name} gauge\n" + "".join(f"{line}\n" for line in lines)
         for name, lines in samples.items()
@@ -116,11 +117,11 @@ def _document(one: CellStatus) -> dict[str, Any]:
 
 
 def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
-    yield "hexacell_in_use", {}, _flag(one.in_use_by is not None)
-    yield "hexacell_open_proposal", {}, _flag(one.proposal is not None)
+    yield "hexacell_in_use", {}, str(int(one.in_use_by is not None))
+    yield "hexacell_open_proposal", {}, str(int(one.proposal is not None))
     yield "hexacell_changes_found", {}, str(len(one.drift.changes))
     if one.latest is not None:
-        yield "hexacell_last_run_begun", {}, _flag(one.latest.summary.has_begun)
+        yield "hexacell_last_run_begun", {}, str(int(one.latest.summary.has_begun))
     times = {
         "hexacell_last_run_timestamp_seconds": summary_of(one.latest).ended,
         "hexacell_last_pass_timestamp_seconds": one.passed_at,
@@ -133,23 +134,13 @@ def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
     if one.judged is None:
         return
     verdict, position = one.judged.summary.verdict, one.judged.summary.position
-    yield "hexacell_last_run_passed", {}, _flag(verdict is Verdict.PASS)
+    yield "hexacell_last_run_passed", {}, str(int(verdict is Verdict.PASS))
     for each in Verdict:
-        yield "hexacell_last_verdict", {"verdict": each.value}, _flag(each is verdict)
+        yield "hexacell_last_verdict", {"verdict": each.value}, str(int(each is verdict))
     if position is not None:
         yield "hexacell_position_error_mm", {}, repr(position.value)
         yield "hexacell_position_expanded_mm", {}, repr(position.expanded)
         yield "hexacell_position_limit_mm", {}, repr(position.limit)
-
-
-def _labels(one: CellStatus, further: dict[str, str]) -> str:
-    labels = {"cell": one.cell.settings.name, **further}
-    escapes = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n"})
-    return ",".join(f'{name}="{text.translate(escapes)}"' for name, text in labels.items())
-
-
-def _flag(value: bool) -> str:
-    return "1" if value else "0"
 
 
 def fleet_text(cells: Sequence[FleetCell]) -> str:
@@ -180,17 +171,11 @@ def fleet_history_text(runs: Sequence[FleetRun]) -> str:
     """A line a run of an archive."""
     if not runs:
         return NO_FLEET_RUNS
-    lines = [
-        _fleet_columns(
-            one.cell,
-            one.host,
-            verdict_word(one.summary.verdict),
-            error_with_u(one.summary.accuracy),
-            minute(one.summary.ended),
-        )
-        for one in runs
-    ]
-    return "\n".join([_fleet_columns("cell", "host", "verdict", "error, mm", "ended"), *lines])
+    lines = [_fleet_columns("cell", "host", "verdict", "error, mm", "ended")]
+    for one in runs:
+        verdict, error = verdict_word(one.summary.verdict), error_with_u(one.summary.accuracy)
+        lines.append(_fleet_columns(one.cell, one.host, verdict, error, minute(one.summary.ended)))
+    return "\n".join(lines)
 
 
 def fleet_history_document(runs: Sequence[FleetRun]) -> dict[str, Any]:

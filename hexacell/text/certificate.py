@@ -14,11 +14,7 @@ from hexacell.errors import UsageError
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.services.history.run_summary import judged_accuracy
 from hexacell.text.parameters import rows_of_run
-from hexacell.text.report.report import (
-    certificate_of,
-    serial_number_of,
-    temperature_ranges,
-)
+from hexacell.text.report.report import certificate_of, serial_number_of, temperature_ranges
 from hexacell.text.report.statement import MODES, decision_rule, method_sentences, scope_sentences
 from hexacell.text.verdict import VERDICT_MEANINGS
 from hexacell.uncertainty.statement import COVERAGE, COVERAGE_FACTOR
@@ -67,7 +63,13 @@ def certificate_of_run(run: ReportedRun) -> bytes:
             subject=run.name,
             action="Name a calibration or a check with a verdict; a report is made of any run",
         )
-    _require_stated(run)
+    absent = [key for key in NEEDED if not getattr(run.settings.report, key)]
+    if absent:
+        raise UsageError(
+            f"a calibration certificate needs {', '.join(absent)}",
+            subject=run.name,
+            action="Write them in [report] of the cell file; runs that begin afterwards have them",
+        )
     root = Element(f"{{{DCC}}}digitalCalibrationCertificate", schemaVersion=SCHEMA_VERSION)
     _add_administrative_data(root, run, accuracy)
     _add_measurement_results(root, run, accuracy)
@@ -76,24 +78,26 @@ def certificate_of_run(run: ReportedRun) -> bytes:
     return text + b"\n"
 
 
-def _require_stated(run: ReportedRun) -> None:
-    """Refuse a run whose cell file left out what a certificate must have; raises ``UsageError``."""
-    absent = [key for key in NEEDED if not getattr(run.settings.report, key)]
-    if absent:
-        raise UsageError(
-            f"a calibration certificate needs {', '.join(absent)}",
-            subject=run.name,
-            action="Write them in [report] of the cell file; runs that begin afterwards have them",
-        )
-
-
 def _add_administrative_data(root: Element, run: ReportedRun, accuracy: VerifiedAccuracy) -> None:
     """The first ring of the certificate."""
     data = _add(root, "administrativeData")
     stated = run.settings.report
     _add_software(_add(data, "dccSoftware"), "hexacell", __version__)
-    _add_core_data(data, run)
-    _add_item(data, run)
+    core = _add(data, "coreData")
+    _add(core, "countryCodeISO3166_1", stated.country)
+    _add(core, "usedLangCodeISO639_1", LANGUAGE)
+    _add(core, "mandatoryLangCodeISO639_1", LANGUAGE)
+    _add(core, "uniqueIdentifier", run.identifier)
+    _add(core, "beginPerformanceDate", run.began.date().isoformat())
+    _add(core, "endPerformanceDate", run.ended.date().isoformat())
+    _add(core, "performanceLocation", "other" if stated.place else "laboratory")
+    _add(core, "issueDate", run.ended.date().isoformat())
+    item = _add(_add(data, "items"), "item")
+    _add_text(item, "name", stated.machine or run.settings.robot.mechanism)
+    if stated.place:
+        _add_text(item, "description", f"Stands at: {stated.place}")
+    numbers = _add(item, "identifications")
+    _add_identification(numbers, "manufacturer", stated.serial_number, "serial number")
     _add_contact(_add(data, "calibrationLaboratory"), "contact", stated.laboratory, stated.country)
     person = _add(_add(data, "respPersons"), "respPerson")
     _add_text(_add(person, "person"), "name", stated.authorised_by)
@@ -108,29 +112,6 @@ def _add_software(parent: Element, name: str, version: str) -> None:
     _add_text(made, "name", name)
     numbers = re.match(r"\d{1,3}(\.\d{1,3}){0,3}", version)
     _add(made, "release", f"v{numbers[0] if numbers else 0}")
-
-
-def _add_core_data(data: Element, run: ReportedRun) -> None:
-    core = _add(data, "coreData")
-    _add(core, "countryCodeISO3166_1", run.settings.report.country)
-    _add(core, "usedLangCodeISO639_1", LANGUAGE)
-    _add(core, "mandatoryLangCodeISO639_1", LANGUAGE)
-    _add(core, "uniqueIdentifier", run.identifier)
-    _add(core, "beginPerformanceDate", run.began.date().isoformat())
-    _add(core, "endPerformanceDate", run.ended.date().isoformat())
-    _add(core, "performanceLocation", "other" if run.settings.report.place else "laboratory")
-    _add(core, "issueDate", run.ended.date().isoformat())
-
-
-def _add_item(data: Element, run: ReportedRun) -> None:
-    stated = run.settings.report
-    item = _add(_add(data, "items"), "item")
-    _add_text(item, "name", stated.machine or run.settings.robot.mechanism)
-    if stated.place:
-        _add_text(item, "description", f"Stands at: {stated.place}")
-    _add_identification(
-        _add(item, "identifications"), "manufacturer", stated.serial_number, "serial number"
-    )
 
 
 def _add_statements(data: Element, run: ReportedRun, accuracy: VerifiedAccuracy) -> None:
@@ -152,28 +133,20 @@ def _add_measurement_results(root: Element, run: ReportedRun, accuracy: Verified
     """The second ring of the certificate."""
     result = _add(_add(root, "measurementResults"), "measurementResult")
     _add_text(result, "name", "Accuracy of the robot at the task poses")
-    _add_method(result, run)
-    name, _, version = run.started.software.partition(" ")
-    _add_software(_add(result, "usedSoftware"), name, version)
-    _add_instruments(result, run)
-    _add_conditions(result, run)
-    results = _add(result, "results")
-    _add_errors(results, run, accuracy)
-    _add_parameters(results, run)
-
-
-def _add_method(parent: Element, run: ReportedRun) -> None:
-    method = _add(_add(parent, "usedMethods"), "usedMethod")
+    method = _add(_add(result, "usedMethods"), "usedMethod")
     _add_text(method, "name", MODES[run.started.mode])
     _add_text(method, "description", method_sentences(run))
     _add(method, "norm", "JCGM 100:2008")
     _add(method, "norm", "JCGM 101:2008")
-
-
-def _add_instruments(parent: Element, run: ReportedRun) -> None:
-    listed = _add(parent, "measuringEquipments")
+    name, _, version = run.started.software.partition(" ")
+    _add_software(_add(result, "usedSoftware"), name, version)
+    listed = _add(result, "measuringEquipments")
     for device in run.started.devices:
         _add_instrument(listed, run, device)
+    _add_conditions(result, run)
+    results = _add(result, "results")
+    _add_errors(results, run, accuracy)
+    _add_parameters(results, run)
 
 
 def _add_instrument(parent: Element, run: ReportedRun, device: DeviceIdentity) -> None:
@@ -189,14 +162,10 @@ def _add_instrument(parent: Element, run: ReportedRun, device: DeviceIdentity) -
             _add_identification(numbers, "manufacturer", serial, "serial number")
         if certificate is not None:
             _add_identification(numbers, "other", certificate.number, "calibration certificate")
-    if certificate is not None and certificate.expanded_um is not None:
-        _add_quantity(
-            _add(made, "measuringEquipmentQuantities"),
-            "expanded uncertainty (k = 2) by its certificate",
-            certificate.expanded_um,
-            UNITS["um"],
-            tag="measuringEquipmentQuantity",
-        )
+    if certificate is not None and (expanded := certificate.expanded_um) is not None:
+        listed = _add(made, "measuringEquipmentQuantities")
+        name, tag = "expanded uncertainty (k = 2) by its certificate", "measuringEquipmentQuantity"
+        _add_quantity(listed, name, expanded, UNITS["um"], tag=tag)
 
 
 def _add_conditions(parent: Element, run: ReportedRun) -> None:

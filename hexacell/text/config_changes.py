@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hexacell.config.change import BEFORE, ConfigVersions, NumberVersions, kept_paths
+from hexacell.config.change import BEFORE, ConfigVersions, kept_paths
 from hexacell.config.layout import names_of
 from hexacell.config.write_record import WriteKind, WriteRecord
 from hexacell.text.layout import wrapped
@@ -35,7 +35,7 @@ def applied_text(applied: AppliedProposal) -> str:
             *teaching,
             wrapped(RELOAD),
             f"`hexacell rollback` undoes it; the old config is {files_named(kept)}.",
-            *_unrecorded_lines(applied.unrecorded),
+            *filter(None, [wrapped(applied.unrecorded)]),
         )
     )
 
@@ -48,12 +48,8 @@ def rollback_text(done: ConfigRollback) -> str:
     undone = "" if done.undone is None else f", which undoes the run {done.undone.name}"
     copies = zip(done.paths, done.restored, strict=True)
     back = ",\n".join(f"{path} is {copy} again" for path, copy in copies)
-    lines = (done.change, f"{back}, bit for bit{undone}.", wrapped(RELOAD))
-    return "\n".join([*lines, *_unrecorded_lines(done.unrecorded)])
-
-
-def _unrecorded_lines(problem: str) -> list[str]:
-    return [wrapped(problem)] if problem else []
+    lines = (done.change, f"{back}, bit for bit{undone}.", wrapped(RELOAD), wrapped(done.unrecorded))
+    return "\n".join(filter(None, lines))
 
 
 NO_WRITES = "No run of this cell wrote its config."
@@ -91,11 +87,9 @@ def _how_much(one: WriteRecord) -> str:
         return f"{files}: how many numbers is not known"
     plural = "" if one.numbers_changed == 1 else "s"
     text = f"{files}: {one.numbers_changed} number{plural}"
-    if one.largest is None:
+    if (most := one.largest) is None:
         return text
-    return (
-        f"{text}, most of all {one.largest.name} by {one.largest.change:+.4f} {one.largest.unit}".rstrip()
-    )
+    return f"{text}, most of all {most.name} by {most.change:+.4f} {most.unit}".rstrip()
 
 
 def files_named(paths: Sequence[Path], verb: str = "", verb_of_several: str = "") -> str:
@@ -106,13 +100,11 @@ def files_named(paths: Sequence[Path], verb: str = "", verb_of_several: str = ""
 def versions_text(versions: ConfigVersions) -> str:
     """The three versions of an edited config, number by number, and the edit itself."""
     origin = "the run wrote it" if versions.is_from_written else "it was before the run"
-    numbers = [_number_line(one) for one in versions.numbers]
-    head = f"{'number':9}{'before':>16}{'written':>16}{'now':>16}"
-    table = [head, *numbers] if numbers else ["No number of the geometry differs."]
+    table = [f"{'number':9}{'before':>16}{'written':>16}{'now':>16}"]
+    for one in versions.numbers:
+        now = f"{'unreadable':>16}" if one.now is None else f"{one.now:16.6f}"
+        edited = "  edited by hand" if one.is_edited else ""
+        table.append(f"{one.name:9}{one.before:16.6f}{one.written:16.6f}{now}{edited}")
+    if not versions.numbers:
+        table = ["No number of the geometry differs."]
     return "\n".join([*table, f"The edit since {origin}:", versions.edit.rstrip("\n")])
-
-
-def _number_line(number: NumberVersions) -> str:
-    now = f"{'unreadable':>16}" if number.now is None else f"{number.now:16.6f}"
-    edited = "  edited by hand" if number.is_edited else ""
-    return f"{number.name:9}{number.before:16.6f}{number.written:16.6f}{now}{edited}"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.campaign.decisions import Finished, MeasurePose, StartPoint
 from hexacell.text.layout import iso
 from hexacell.text.verdict import teaching_sentence
 
@@ -47,21 +47,22 @@ def next_document(proposed: NextPose) -> dict[str, Any]:
         "pose": asdict(decision.pose),
         "joint_targets": list(decision.joints),
         "predicted_worst_sigma_mm": forecast and forecast.next_mm,
-        "going_on": forecast and _remainder(forecast),
+        "going_on": forecast
+        and {
+            "records": forecast.records,
+            "minutes": forecast.minutes,
+            "worst_sigma_mm": forecast.end_mm,
+            "expanded_mm": forecast.expanded_mm(forecast.end_mm),
+            "gain_mm": forecast.gain_mm,
+        },
     }
 
 
 def _expected_record(decision: StartPoint | MeasurePose) -> dict[str, Any]:
     if isinstance(decision, StartPoint):
         zero = [0.0, 0.0, 0.0]
-        return {
-            "orientation": 1,
-            "reference": True,
-            "predicted_deviation": zero,
-            "sigma": zero,
-            "gain": 0.0,
-            "via": [],
-        }
+        found = {"predicted_deviation": zero, "sigma": zero, "gain": 0.0, "via": []}
+        return {"orientation": 1, "reference": True, **found}
     return {
         "orientation": decision.orientation,
         "reference": False,
@@ -72,41 +73,22 @@ def _expected_record(decision: StartPoint | MeasurePose) -> dict[str, Any]:
     }
 
 
-def _remainder(forecast: Forecast) -> dict[str, Any]:
-    return {
-        "records": forecast.records,
-        "minutes": forecast.minutes,
-        "worst_sigma_mm": forecast.end_mm,
-        "expanded_mm": forecast.expanded_mm(forecast.end_mm),
-        "gain_mm": forecast.gain_mm,
-    }
-
-
 def preflight_document(devices: Sequence[DeviceIdentity], trial: PlanTrial) -> dict[str, Any]:
     """What ``preflight --json`` prints."""
-    return {
-        "ready": True,
-        "devices": [asdict(identity) for identity in devices],
-        "expected": {
-            **asdict(trial.result),
-            "averaging": [one.model_dump() for one in trial.averaging],
-            "encoders_part_mm": trial.encoders_part_mm,
-            "lost": {str(point): share for point, share in trial.unreachable.items()},
-        },
+    expected = {
+        **asdict(trial.result),
+        "averaging": [one.model_dump() for one in trial.averaging],
+        "encoders_part_mm": trial.encoders_part_mm,
+        "lost": {str(point): share for point, share in trial.unreachable.items()},
     }
+    return {"ready": True, "devices": [asdict(one) for one in devices], "expected": expected}
 
 
 def quick_preflight_document(devices: Sequence[DeviceIdentity], trial: QuickTrial) -> dict[str, Any]:
     """What ``preflight --mode quick --json`` prints."""
-    return {
-        "ready": True,
-        "devices": [asdict(identity) for identity in devices],
-        "expected": {
-            "points": trial.points,
-            "minutes": trial.minutes,
-            "quick": trial.accuracy and trial.accuracy.model_dump(mode="json"),
-        },
-    }
+    accuracy = trial.accuracy and trial.accuracy.model_dump(mode="json")
+    expected = {"points": trial.points, "minutes": trial.minutes, "quick": accuracy}
+    return {"ready": True, "devices": [asdict(one) for one in devices], "expected": expected}
 
 
 def run_document(request: RunRequest, ended: events.Ended, state: RunState) -> dict[str, Any]:
@@ -142,14 +124,9 @@ def replay_document(replayed: ReplayReport) -> dict[str, Any]:
         "recorded_by": replayed.recorded_by,
         "replayed_by": replayed.replayed_by,
         "differences": [
-            {
-                "line": difference.line,
-                "place": difference.place,
-                "aspect": difference.aspect.value,
-                "counts": replayed.counts(difference),
-                **asdict(difference.change),
-            }
-            for difference in replayed.differences
+            {"line": one.line, "place": one.place, "aspect": one.aspect.value}
+            | {"counts": replayed.counts(one), **asdict(one.change)}
+            for one in replayed.differences
         ],
     }
 
@@ -210,11 +187,10 @@ def _write_document(write: ConfigWrite) -> dict[str, Any]:
 
 def history_document(runs: Sequence[PastRun]) -> dict[str, Any]:
     """What ``history --json`` prints: the runs, the newest first."""
-    return {"runs": [past_run_document(run) for run in runs]}
+    return {"runs": [_run_document(run) for run in runs]}
 
 
-def past_run_document(run: PastRun) -> dict[str, Any]:
-    """A run in the document of ``history --json``."""
+def _run_document(run: PastRun) -> dict[str, Any]:
     was, position = run.summary, run.summary.position
     return {
         "run": str(run.folder.path),
@@ -282,12 +258,11 @@ def _change_document(found: FoundChange) -> dict[str, Any]:
 
 def schedule_document(schedule: Schedule | None) -> dict[str, Any]:
     """What ``schedule --json`` prints."""
-    if schedule is None:
-        return {"unit": None, "files": [], "complaints": []}
+    files, complaints = (schedule.files, schedule.complaints) if schedule else ((), ())
     return {
-        "unit": schedule.unit,
-        "files": list(map(str, schedule.files)),
-        "complaints": list(schedule.complaints),
+        "unit": schedule and schedule.unit,
+        "files": list(map(str, files)),
+        "complaints": list(complaints),
     }
 
 

@@ -12,7 +12,7 @@ from drivers.discovery.encoders import BusFindings, FoundFrame, FoundNode
 from drivers.discovery.gauges import FoundGauge, PortFindings
 from drivers.serial.adapters import SerialPortFound
 from hexacell.kinematics.parameters import JointUnit
-from hexacell.services.devices.device_diagnosis import DeviceDiagnosis, Failure, SeriesFigures
+from hexacell.services.devices.device_diagnosis import DeviceDiagnosis, Failure
 from hexacell.services.devices.device_search import (
     LEGS,
     SearchFindings,
@@ -45,7 +45,7 @@ def search_lines(found: SearchFindings) -> Iterator[str]:
         yield "No serial port: plug a gauge's cable or adapter in, or name a port."
     for port, on_it in zip(found.ports, found.gauges, strict=True):
         yield from _port_lines(port, on_it, found.buses)
-    if any(_is_silent(on_it, found.buses) for on_it in found.gauges):
+    if any(not (one.gauges or one.problem or _is_can_adapter(one, found.buses)) for one in found.gauges):
         others = ", ".join(found.untried)
         yield f"Not tried where nothing answers: {others}, which the cell file describes (docs/drivers.md)."
     if not found.buses:
@@ -98,10 +98,6 @@ def _is_can_adapter(on_it: PortFindings, buses: tuple[BusFindings, ...]) -> bool
     return any(bus.bus.get("channel") == on_it.port for bus in buses)
 
 
-def _is_silent(on_it: PortFindings, buses: tuple[BusFindings, ...]) -> bool:
-    return not on_it.gauges and not on_it.problem and not _is_can_adapter(on_it, buses)
-
-
 def _bus_lines(bus: BusFindings) -> Iterator[str]:
     name = " ".join(str(bus.bus[key]) for key in ("interface", "channel", "bitrate") if key in bus.bus)
     if bus.problem:
@@ -112,17 +108,13 @@ def _bus_lines(bus: BusFindings) -> Iterator[str]:
         yield f"CAN {name}: no node answers; check supply and termination, or try another --bitrate"
     for node in bus.nodes:
         yield f"CAN {name}, node {node.node}: {_node_words(node)}"
-    yield from _overheard_lines(name, bus.frames)
-
-
-def _overheard_lines(name: str, frames: tuple[FoundFrame, ...]) -> Iterator[str]:
-    for frame in frames[:MOST_FRAMES]:
+    for frame in bus.frames[:MOST_FRAMES]:
         what = f"{frame.length} bytes, {frame.per_second:.0f} a second"
         data = "its data change" if frame.changes else "its data stay the same"
         yield f"CAN {name}, frame {_number(frame)}: {what}, {data}"
-    if len(frames) > MOST_FRAMES:
-        yield f"CAN {name}: frames with {len(frames) - MOST_FRAMES} further identifiers"
-    if frames:
+    if len(bus.frames) > MOST_FRAMES:
+        yield f"CAN {name}: frames with {len(bus.frames) - MOST_FRAMES} further identifiers"
+    if bus.frames:
         yield (
             f"CAN {name}: no CANopen node that answers sends these frames. If they are of encoders, name "
             'the DBC file of their maker, with protocol = "dbc" (docs/drivers.md)'
@@ -132,9 +124,7 @@ def _overheard_lines(name: str, frames: tuple[FoundFrame, ...]) -> Iterator[str]
 def _node_words(node: FoundNode) -> str:
     words = [node.description]
     if node.step is not None:
-        words.append(
-            f"{node.step} counts a turn" if node.unit is JointUnit.DEG else f"{node.step} nm a count"
-        )
+        words.append(f"{node.step} {'counts a turn' if node.unit is JointUnit.DEG else 'nm a count'}")
     if node.serial_number is not None:
         words.append(f"serial number {node.serial_number}")
     return ", ".join(words)
@@ -155,11 +145,10 @@ def _gauge_section(axis: str, gauge: FoundGauge) -> Iterator[str]:
 
 
 def _encoder_section(bus: BusFindings, encoders: tuple[FoundNode, ...]) -> Iterator[str]:
-    shown = ", ".join(_keys(bus.bus))
     nodes = [node.node for node in encoders]
     needed = "" if len(nodes) == LEGS else ": six are needed"
     yield from ("[encoders]", *_keys({"protocol": "cia406"}))
-    yield f"bus = {{ {shown} }}"
+    yield f"bus = {{ {', '.join(_keys(bus.bus))} }}"
     yield f"nodes = {nodes}  # of legs 1 to 6{needed}"
     yield from _keys(encoder_keys(encoders))
     yield ""
@@ -207,7 +196,9 @@ def diagnosis_lines(found: DeviceDiagnosis) -> Iterator[str]:
     rate = found.readings / found.seconds if found.seconds else 0.0
     yield f"{_counted(found.readings, 'reading')} in {found.seconds:.1f} s, {rate:.1f} a second"
     for series in found.series:
-        yield _series_line(series)
+        scatter = "" if series.scatter is None else f", scatter {_micro(series.scatter, series.unit)}"
+        span = f"{series.lowest:.4f} to {series.highest:.4f} {series.unit}"
+        yield f"{series.name}: {span}, {_counted(series.distinct, 'distinct value')}{scatter}"
     if not found.failures:
         yield "No answer was damaged or missing."
     for failure in found.failures:
@@ -218,12 +209,6 @@ def diagnosis_lines(found: DeviceDiagnosis) -> Iterator[str]:
 
 def _counted(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}s"
-
-
-def _series_line(series: SeriesFigures) -> str:
-    scatter = "" if series.scatter is None else f", scatter {_micro(series.scatter, series.unit)}"
-    span = f"{series.lowest:.4f} to {series.highest:.4f} {series.unit}"
-    return f"{series.name}: {span}, {_counted(series.distinct, 'distinct value')}{scatter}"
 
 
 def _meaning(found: DeviceDiagnosis) -> Iterator[str]:

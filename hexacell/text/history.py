@@ -33,11 +33,9 @@ def history_head() -> str:
 
 def history_line(run: PastRun) -> str:
     """One run: its name, mode, verdict, error and what became of it."""
-    was = run.summary
-    error = error_with_u(was.accuracy)
-    return _columns(
-        run.name[:LONGEST_RUN_NAME], was.mode or "-", verdict_word(was.verdict), error, standing(run)
-    )
+    was, name = run.summary, run.name[:LONGEST_RUN_NAME]
+    verdict, error = verdict_word(was.verdict), error_with_u(was.accuracy)
+    return _columns(name, was.mode or "-", verdict, error, standing(run))
 
 
 def standing(run: PastRun) -> str:
@@ -88,18 +86,17 @@ def drift_text(found: Sequence[ParameterTrend]) -> str:
         return NO_DRIFT
     walking = [one.name for one in found if one.is_walking]
     verdict = f"Walking: {', '.join(walking)}." if walking else "No parameter walks."
-    head = f"{'':5}{'first':>15}{'last':>15}{'in 30 days':>14}{'sigma':>10}"
-    return "\n".join([wrapped(verdict), head, *map(_trend_line, found)])
+    lines = [wrapped(verdict), f"{'':5}{'first':>15}{'last':>15}{'in 30 days':>14}{'sigma':>10}"]
+    for one in found:
+        change, sigma = TREND_DAYS * one.per_day, TREND_DAYS * one.sigma_per_day
+        mark = "  walking" if one.is_walking else ""
+        values = f"{one.values[0]:15.4f}{one.values[-1]:15.4f}"
+        lines.append(f"{one.name:5}{values}{change:+14.4f}{sigma:10.4f}{mark}")
+    return "\n".join(lines)
 
 
 def _columns(name: str, mode: str, verdict: str, error: str, what: str) -> str:
     return f"{name:23}{mode:9}{verdict:17}{error:17}{what}".rstrip()
-
-
-def _trend_line(one: ParameterTrend) -> str:
-    change, sigma = TREND_DAYS * one.per_day, TREND_DAYS * one.sigma_per_day
-    mark = "  walking" if one.is_walking else ""
-    return f"{one.name:5}{one.values[0]:15.4f}{one.values[-1]:15.4f}{change:+14.4f}{sigma:10.4f}{mark}"
 
 
 def retention_text(found: Retention, *, is_deleted: bool) -> str:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hexacell.identification.diagnostics.frame_alignment import PoseErrors
 from hexacell.identification.diagnostics.model_tests import contradicted_points
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import JointUnit
-from hexacell.noise.record_noise import NoiseLevel, NoiseLevels, Repeatability
+from hexacell.noise.record_noise import NoiseLevels, Repeatability
 from hexacell.text.layout import wrapped
 from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.parameters import parameter_rows, parameter_table
@@ -25,12 +24,15 @@ SMALLEST_BUDGET_LINE_MM = 0.0005
 
 def identification_report(assessed: Assessment) -> str:
     """The whole report that ``hexacell fit`` prints."""
-    found = assessed.found
+    found, budget = assessed.found, assessed.budget
+    expanded = ""
+    if budget is not None and not assessed.refused:
+        expanded = f" U at the task poses is {budget.expanded_mm:.3f} mm."
     parts = (
         "\n".join(wrapped(sentence) for sentence in findings(assessed)),
-        _verdict_line(assessed),
+        wrapped(f"Verdict: {Verdict.NOT_EVALUATED}, as no held-out records test this model.{expanded}"),
         accuracy_table(assessed),
-        budget_table(assessed.budget),
+        budget_table(budget),
         wrapped(
             f"{len(found.free)} parameters from {found.records} records at {found.points} points; the "
             f"solver ended because {found.termination.value} ({found.solution.iterations} iterations)."
@@ -45,15 +47,6 @@ def identification_report(assessed: Assessment) -> str:
         correlation_lines(pair_sentences(assessed), len(assessed.correlated)),
     )
     return "\n\n".join(part for part in parts if part)
-
-
-def _verdict_line(assessed: Assessment) -> str:
-    """Why the records of an identification alone give no verdict, and what U the robot would have."""
-    sentence = f"Verdict: {Verdict.NOT_EVALUATED}, as no held-out records test this model."
-    budget = assessed.budget
-    if budget is None or assessed.refused:
-        return wrapped(sentence)
-    return wrapped(f"{sentence} U at the task poses is {budget.expanded_mm:.3f} mm.")
 
 
 def _points_line(assessed: Assessment) -> str:
@@ -73,21 +66,16 @@ def accuracy_table(assessed: Assessment) -> str:
         return ""
     what = "task poses" if assessed.task_named else "poses across the workspace"
     title = f"Predicted error at {len(accuracy.poses)} {what}"
-    return "\n".join(
-        [
-            f"{title:44}{'position, mm':>17}{'angle, deg':>18}",
-            f"{'':44}{'rms':>8}{'largest':>9}{'rms':>9}{'largest':>9}",
-            _error_row("geometry the controller has now", accuracy.before),
-            _error_row("identified geometry (one sigma)", accuracy.after),
-        ]
-    )
-
-
-def _error_row(name: str, errors: PoseErrors) -> str:
-    return (
-        f"  {name:42}{errors.position_rms_mm:8.3f}{errors.position_largest_mm:9.3f}"
-        f"{errors.orientation_rms_deg:9.4f}{errors.orientation_largest_deg:9.4f}"
-    )
+    lines = [
+        f"{title:44}{'position, mm':>17}{'angle, deg':>18}",
+        f"{'':44}{'rms':>8}{'largest':>9}{'rms':>9}{'largest':>9}",
+    ]
+    names = "geometry the controller has now", "identified geometry (one sigma)"
+    for name, errors in zip(names, (accuracy.before, accuracy.after), strict=True):
+        position = f"{errors.position_rms_mm:8.3f}{errors.position_largest_mm:9.3f}"
+        angle = f"{errors.orientation_rms_deg:9.4f}{errors.orientation_largest_deg:9.4f}"
+        lines.append(f"  {name:42}{position}{angle}")
+    return "\n".join(lines)
 
 
 def _identified(assessed: Assessment) -> str:
@@ -118,8 +106,7 @@ def drawing_table(found: Identification | IdentifiedZeros, drawing: Geometry) ->
 def residual_line(found: Identification) -> str:
     """The residuals and the chi-square test."""
     goodness = found.goodness
-    probability = goodness.probability
-    shown = f"{probability:.2g}" if probability >= 1e-4 else "below 0.0001"
+    shown = f"{goodness.probability:.2g}" if goodness.probability >= 1e-4 else "below 0.0001"
     return wrapped(
         f"Residual {found.residual_rms_mm:.4f} mm rms; chi-square {goodness.chi2:.1f}, expected "
         f"{goodness.expected:.1f} (probability {shown}). {residual_sentence(goodness)}"
@@ -132,17 +119,14 @@ def noise_table(noise: NoiseLevels | None) -> str:
         return ""
     if not noise.are_separable:
         return wrapped(noise_sentence(noise))
-    rows = (("encoders", noise.encoder), ("gauges", noise.gauge))
-    lines = [f"  {name:10}{level.stated:9.4f}  {_noise_estimate(level)}" for name, level in rows]
-    unit = noise.joint_unit
-    head = "Noise, mm" if unit is JointUnit.MM else f"Noise, {unit}, mm"
-    return "\n".join([f"{head:12}{'stated':>9}  estimated from the residuals", *lines])
-
-
-def _noise_estimate(level: NoiseLevel) -> str:
-    if not level.is_resolved:
-        return f"below {level.at_most:.4f}: too small to be separated from the other"
-    return f"{level.estimated:.4f} +- {level.standard_error:.4f}"
+    head = "Noise, mm" if noise.joint_unit is JointUnit.MM else f"Noise, {noise.joint_unit}, mm"
+    lines = [f"{head:12}{'stated':>9}  estimated from the residuals"]
+    for name, level in (("encoders", noise.encoder), ("gauges", noise.gauge)):
+        estimate = f"below {level.at_most:.4f}: too small to be separated from the other"
+        if level.is_resolved:
+            estimate = f"{level.estimated:.4f} +- {level.standard_error:.4f}"
+        lines.append(f"  {name:10}{level.stated:9.4f}  {estimate}")
+    return "\n".join(lines)
 
 
 def repeatability_lines(scatter: Repeatability | None) -> str:
@@ -179,27 +163,22 @@ def budget_table(budget: UncertaintyBudget | None) -> str:
     title = "Uncertainty at the worst task pose, mm"
     noise = "noise, and all that is not identified" if budget.has_held else "noise of the readings"
     expanded = f"U, 95 %, of the largest error of all poses (angle: {budget.expanded_deg:.3f} deg)"
-    unseen = ", ".join(f"{line.effect.name} ({_by_one_unit(line)})" for line in budget.unseen)
-    return "\n".join(
-        [
-            f"{title:44}{'size':>12}{'result':>8}{'direct':>8}{'both':>8}",
-            f"  {noise:42}{'':12}{budget.noise_mm:8.3f}{'':8}{budget.noise_mm:8.3f}",
-            *filter(None, map(_budget_line, budget.lines)),
-            f"  {'standard uncertainty (root of the squares)':70}{budget.standard_mm:8.3f}",
-            f"  {expanded:70}{budget.expanded_mm:8.3f}",
-            *([wrapped(f"Not checked, as no record shows it: {unseen}.", indent=2)] if unseen else []),
-        ]
-    )
-
-
-def _budget_line(line: BudgetLine) -> str:
-    """A line of the budget; empty where all of it would be zero."""
-    effect, figures = line.effect, (line.through_mm, line.direct_mm, line.combined_mm)
-    if max(figures) < SMALLEST_BUDGET_LINE_MM:
-        return ""
-    through, direct = (f"{mm:8.3f}" if mm else f"{'-':>8}" for mm in figures[:2])
-    size = f"{effect.size:.3g} {effect.unit}"
-    return f"  {effect.name:42}{size:>12}{through}{direct}{line.combined_mm:8.3f}"
+    lines = [
+        f"{title:44}{'size':>12}{'result':>8}{'direct':>8}{'both':>8}",
+        f"  {noise:42}{'':12}{budget.noise_mm:8.3f}{'':8}{budget.noise_mm:8.3f}",
+    ]
+    for line in budget.lines:
+        if max(line.through_mm, line.direct_mm, line.combined_mm) >= SMALLEST_BUDGET_LINE_MM:
+            through, direct = (
+                f"{mm:8.3f}" if mm else f"{'-':>8}" for mm in (line.through_mm, line.direct_mm)
+            )
+            size = f"{line.effect.size:.3g} {line.effect.unit}"
+            lines.append(f"  {line.effect.name:42}{size:>12}{through}{direct}{line.combined_mm:8.3f}")
+    lines.append(f"  {'standard uncertainty (root of the squares)':70}{budget.standard_mm:8.3f}")
+    lines.append(f"  {expanded:70}{budget.expanded_mm:8.3f}")
+    if unseen := ", ".join(f"{one.effect.name} ({_by_one_unit(one)})" for one in budget.unseen):
+        lines.append(wrapped(f"Not checked, as no record shows it: {unseen}.", indent=2))
+    return "\n".join(lines)
 
 
 def _by_one_unit(line: BudgetLine) -> str:

@@ -14,7 +14,6 @@ from hexacell.study.paper_experiment import (
     PAPER_REPEATABILITY_MM,
     ExperimentStudy,
     Reduction,
-    RepeatabilityRow,
 )
 from hexacell.study.paper_simulation import (
     FIGURES,
@@ -65,32 +64,24 @@ def study_lines(study: PaperStudy) -> Iterator[str]:
             both = f"{_accuracy(one.exact):<26} {_in_full(one.noisy):<32}"
             yield f"  {one.points:<8} {both} {one.deviation_mm:.0f} mm"
         yield wrapped(WHAT_THE_PAPER_SAYS[figure])
-    yield from _table_2(study)
-    yield from _sweep(study)
-    yield ""
-    yield wrapped(NO_GAUGE)
-
-
-def _table_2(study: PaperStudy) -> Iterator[str]:
     yield ""
     yield wrapped("Table 2: 5 points, 11 orientations, noise of 0.01 mm; largest errors by kinds, mm.")
     yield "  parameters   in the paper   paper's estimator   ours"
     for kind, (paper, ours) in study.table_2.items():
         yield f"  {kind:<12} {PAPER_TABLE_2_MM[kind]:<14.3f} {_number(paper):<19} {_number(ours)}"
-
-
-def _sweep(study: PaperStudy) -> Iterator[str]:
     yield ""
-    steps = ", ".join(map(str, STEPS_SHOWN))
     yield wrapped(
         "Other orientations: 5 points, 11 orientations, with noise; largest error of a parameter, mm. "
-        f"After {steps} steps of the paper's estimator, at its end, and ours as above."
+        f"After {', '.join(map(str, STEPS_SHOWN))} steps of the paper's estimator, at its end, and ours as "
+        "above."
     )
     yield SWEEP_HEAD
     for one in study.sweep:
         after = " ".join(f"{_number(error):<6}" for error in one.noisy.after_steps_mm)
         angles = f"{one.angles:<16} {one.amplitude_deg:<3g}"
         yield f"  {angles} {after} {_in_full(one.noisy):<24} {one.deviation_mm:.0f} mm"
+    yield ""
+    yield wrapped(NO_GAUGE)
 
 
 def study_document(study: PaperStudy) -> dict[str, Any]:
@@ -124,13 +115,8 @@ def _set(one: PlannedSet) -> dict[str, Any]:
 
 def experiment_document(study: ExperimentStudy) -> dict[str, Any]:
     """All figures as a JSON document; what is not finite is null."""
-    document: dict[str, Any] = finite(
-        {
-            "paper": {"reduction": PAPER_REDUCTION, "repeatability_mm": PAPER_REPEATABILITY_MM},
-            "rows": [asdict(row) for row in study.rows],
-            "example": asdict(study.example),
-        }
-    )
+    paper = {"reduction": PAPER_REDUCTION, "repeatability_mm": PAPER_REPEATABILITY_MM}
+    document: dict[str, Any] = finite({"paper": paper, **asdict(study)})
     return document
 
 
@@ -205,10 +191,11 @@ def experiment_lines(study: ExperimentStudy) -> Iterator[str]:
     )
     yield ""
     yield f"  {'':<11} {'P1 to P3':<32} P4 to P6"
-    head = _columns("before", "P", "ours")
+    head = f"{'before':<6} {'P':<12} {'ours':<12}"
     yield f"  {'mm':<6} {'ends':<4} {head:<32} {head}".rstrip()
     for row in study.rows:
-        yield _line(row)
+        both = f"{_reduction(row.calibrating):<32} {_reduction(row.verifying)}"
+        yield f"  {row.repeatability_mm:<6g} {row.ended:<4} {both}".rstrip()
     yield ""
     yield wrapped(
         f"The paper: more than {100 * PAPER_REDUCTION:.0f} percent less, with a repeatability of about "
@@ -216,21 +203,12 @@ def experiment_lines(study: ExperimentStudy) -> Iterator[str]:
     )
 
 
-def _line(row: RepeatabilityRow) -> str:
-    both = f"{_reduction(row.calibrating):<32} {_reduction(row.verifying)}"
-    return f"  {row.repeatability_mm:<6g} {row.ended:<4} {both}".rstrip()
-
-
 def _reduction(one: Reduction) -> str:
-    return _columns(f"{one.before:.2f}", _after(one.paper, one.before), _after(one.ours, one.before))
-
-
-def _columns(before: str, paper: str, ours: str) -> str:
-    return f"{before:<6} {paper:<12} {ours:<12}"
-
-
-def _after(value: float, before: float) -> str:
-    return f"{value:.3f} -{100 * (1 - value / before):.1f}%" if isfinite(value) else "-"
+    paper, ours = (
+        f"{value:.3f} -{100 * (1 - value / one.before):.1f}%" if isfinite(value) else "-"
+        for value in (one.paper, one.ours)
+    )
+    return f"{one.before:<6.2f} {paper:<12} {ours:<12}"
 
 
 def experiment_picture(study: ExperimentStudy) -> str:

@@ -14,7 +14,7 @@ from hexacell.text.layout import duration, wrapped
 from hexacell.text.line_face import request_text
 from hexacell.text.verdict import teaching_line, teaching_sentence
 from procedures.calibration.calibration import Mode
-from procedures.replay.replayer import Aspect, Difference, ReplayReport
+from procedures.replay.replayer import Aspect, ReplayReport
 from procedures.run.questions import (
     GaugePlacement,
     PendingChange,
@@ -90,7 +90,7 @@ def question_text(question: Question) -> str:
             )
         case PendingChange(gates=gates, diff=diff, displacement=moved, improvement=improvement):
             outcomes = "".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}\n" for gate in gates)
-            expected = "" if improvement is None else f"{wrapped(_expected(improvement), indent=4)}\n"
+            expected = "" if improvement is None else f"{_expected(improvement)}\n"
             write = f"{_teaching(moved)}Write this into the controller's config? {request_text(question)}"
             return f"\n{diff}\n{outcomes}{expected}{write}"
         case WrittenResult(line=line, displacement=moved):
@@ -119,10 +119,9 @@ def _mounting_text(mounting: int, seat: int, pose: Pose) -> str:
 
 def _expected(improvement: ExpectedImprovement) -> str:
     """What the change improves."""
-    return (
-        f"Largest position error at the task poses: {improvement.now_mm:.3g} mm with the current config, "
-        f"0 +- {improvement.expanded_mm:.2g} mm with this one."
-    )
+    now, then = f"{improvement.now_mm:.3g}", f"0 +- {improvement.expanded_mm:.2g}"
+    errors = f"{now} mm with the current config, {then} mm with this one"
+    return wrapped(f"Largest position error at the task poses: {errors}.", indent=4)
 
 
 def _teaching(moved: TaskDisplacement | None) -> str:
@@ -134,8 +133,8 @@ def replay_report(replayed: ReplayReport) -> str:
     """The differences, those that count first, and the verdict."""
     found = sorted(replayed.differences, key=lambda one: not replayed.counts(one))
     lines = [
-        wrapped(_difference_line(replayed, difference), indent=4)
-        for difference in found[:LISTED_DIFFERENCES]
+        wrapped(f"{'NO' if replayed.counts(one) else '--'}  {one}", indent=4)
+        for one in found[:LISTED_DIFFERENCES]
     ]
     if len(found) > LISTED_DIFFERENCES:
         lines.append(f"and {len(found) - LISTED_DIFFERENCES} more (--json lists them)")
@@ -143,16 +142,9 @@ def replay_report(replayed: ReplayReport) -> str:
         lines.append(
             wrapped(f"{replayed.recorded_by} recorded it: {replayed.replayed_by} may decide otherwise.")
         )
-    return "\n".join([*lines, _replay_verdict(replayed)])
-
-
-def _difference_line(replayed: ReplayReport, difference: Difference) -> str:
-    return f"{'NO' if replayed.counts(difference) else '--'}  {difference}"
-
-
-def _replay_verdict(replayed: ReplayReport) -> str:
+    outcome = "the same as recorded"
+    if not replayed.is_same:
+        first = next(one for one in replayed.differences if replayed.counts(one))
+        outcome = f"different, first in line {first.line} ({first.place})"
     what = f"{replayed.decisions} decisions and {replayed.results} results of {replayed.events} events"
-    if replayed.is_same:
-        return f"{what}: the same as recorded"
-    first = next(one for one in replayed.differences if replayed.counts(one))
-    return f"{what}: different, first in line {first.line} ({first.place})"
+    return "\n".join([*lines, f"{what}: {outcome}"])

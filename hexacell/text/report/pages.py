@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
 from html import escape
-from itertools import chain
 from typing import Final
 
 from hexacell.errors import UsageError
@@ -95,7 +94,6 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     numbers_from: int | None = 1
-    caption: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,14 +117,7 @@ class Chapter:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A whole report.
-
-    Attributes:
-        identifier: unique; printed on each page.
-        issued: the day on which the run ended.
-        verdict: in a few words, below the title.
-        tone: the colour of the verdict; never its only sign.
-    """
+    """A report: ``identifier`` is on each page, ``tone`` colours the verdict, but is not its only sign."""
 
     title: str
     identifier: str
@@ -227,14 +218,11 @@ def typst_of(report: Report) -> str:
         date=f"datetime(year: {day.year}, month: {day.month}, day: {day.day})",
         colour=colours[report.tone],
     )
-    chapters = (
-        [
-            f"#heading(level: 2, {_literal(chapter.title)})",
-            *(f"{_typst_block(one)}\n" for one in chapter.blocks),
-        ]
-        for chapter in report.chapters
-    )
-    return head + "\n".join(chain.from_iterable(chapters))
+    lines = []
+    for chapter in report.chapters:
+        lines.append(f"#heading(level: 2, {_literal(chapter.title)})")
+        lines += [f"{_typst_block(one)}\n" for one in chapter.blocks]
+    return head + "\n".join(lines)
 
 
 def _literal(text: str) -> str:
@@ -260,17 +248,12 @@ def _typst_block(block: Block) -> str:
 
 
 def _typst_table(table: Table) -> str:
-    count = len(table.columns)
-    first = table.numbers_from
-    widths = ", ".join(["auto"] * count if first is not None else _widths(table))
+    count, first = len(table.columns), table.numbers_from
+    widths = ["auto"] * count
+    if first is None:  # the column with the longest text takes what the others leave
+        longest = [max(map(len, column)) for column in zip(table.columns, *table.rows, strict=True)]
+        widths[longest.index(max(longest))] = "1fr"
     align = ", ".join("left" if first is None or column < first else "right" for column in range(count))
     head = ", ".join(f"strong({_literal(name)})" for name in table.columns)
     cells = ", ".join(_literal(text) for row in table.rows for text in row)
-    return f"#table(columns: ({widths}), align: ({align}), table.header({head}), {cells})"
-
-
-def _widths(table: Table) -> list[str]:
-    """The column with the longest text takes what the others leave."""
-    longest = [max(map(len, column)) for column in zip(table.columns, *table.rows, strict=True)]
-    widest = longest.index(max(longest))
-    return ["1fr" if column == widest else "auto" for column in range(len(longest))]
+    return f"#table(columns: ({', '.join(widths)}), align: ({align}), table.header({head}), {cells})"

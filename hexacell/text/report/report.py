@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import date
-
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.fields import CertificateSettings
 from hexacell.services.history.reported_run import ReportedRun
@@ -78,12 +76,8 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
         pairs.append(("Temperature", "not measured"))
     pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
     noise = () if state.noise is None else measured_noise_sentences(state.noise.noise)
-    return Chapter("Conditions", (Facts(tuple(pairs)), *map(Paragraph, noise), *_sets_table(run)))
-
-
-def _sets_table(run: ReportedRun) -> tuple[Table, ...]:
-    """Sets whose reference was read again, with how far the gauges had drifted by then."""
     columns = ("Set of records", "records", "largest deviation, mm", "drift of the gauges, mm")
+    # The sets whose reference was read again, with how far the gauges had drifted by then.
     rows = tuple(
         (
             key.name,
@@ -91,20 +85,31 @@ def _sets_table(run: ReportedRun) -> tuple[Table, ...]:
             f"{max(abs(value) for one in measured.samples for value in one.deviation_mm):.3f}",
             f"{max(map(abs, measured.drift_mm)):.3f}",
         )
-        for key, measured in run.state.sets.items()
+        for key, measured in state.sets.items()
         if measured.drift_mm is not None and measured.samples
     )
-    return (Table(columns, rows),) if rows else ()
+    tables = (Table(columns, rows),) if rows else ()
+    return Chapter("Conditions", (Facts(tuple(pairs)), *map(Paragraph, noise), *tables))
 
 
 def traceability_chapter(run: ReportedRun) -> Chapter:
     """Every instrument with its serial number and certificate."""
     day = run.began.date()
-    rows = tuple(_instrument_row(run, device, day) for device in run.started.devices)
+    rows = []
+    for device in run.started.devices:
+        certificate = certificate_of(run, device)
+        number = NOT_STATED if certificate is None else certificate.number
+        if certificate is not None and certificate.expanded_um is not None:
+            number = f"{number} (U {certificate.expanded_um:g} um)"
+        due = "" if certificate is None or certificate.due is None else certificate.due.isoformat()
+        if certificate is not None and certificate.has_expired(day):
+            due = f"{due}: EXPIRED"
+        serial = serial_number_of(run, device) or NOT_STATED
+        rows.append((device.name, device.description, serial, number, due))
     expired = run.settings.expired_on(day)
     text = f"Expired on the day of the run: {', '.join(expired)}."
     note = (Paragraph(text, is_strong=True),) if expired else ()
-    table = Table(("Instrument", "kind", "serial number", "certificate", "due"), rows, None)
+    table = Table(("Instrument", "kind", "serial number", "certificate", "due"), tuple(rows), None)
     return Chapter("Instruments and traceability", (table, *note))
 
 
@@ -114,7 +119,7 @@ def integrity_chapter(run: ReportedRun) -> Chapter:
         "Everything in this report can be derived again from these files of the run folder; "
         "`hexacell replay` repeats its decisions and results."
     )
-    rows = tuple((name, digest) for name, digest in sorted(run.fingerprints.items()))
+    rows = tuple(sorted(run.fingerprints.items()))
     return Chapter("Files", (Paragraph(text), Table(("File", "SHA-256"), rows, None)))
 
 
@@ -138,18 +143,6 @@ def temperature_ranges(run: ReportedRun) -> dict[str, tuple[float, float]]:
                 if one.celsius is not None:
                     shown.setdefault(one.name, []).append(one.celsius)
     return {name: (min(values), max(values)) for name, values in shown.items()}
-
-
-def _instrument_row(run: ReportedRun, device: DeviceIdentity, day: date) -> tuple[str, ...]:
-    certificate = certificate_of(run, device)
-    number = NOT_STATED if certificate is None else certificate.number
-    if certificate is not None and certificate.expanded_um is not None:
-        number = f"{number} (U {certificate.expanded_um:g} um)"
-    due = "" if certificate is None or certificate.due is None else certificate.due.isoformat()
-    if certificate is not None and certificate.has_expired(day):
-        due = f"{due}: EXPIRED"
-    serial = serial_number_of(run, device) or NOT_STATED
-    return device.name, device.description, serial, number, due
 
 
 def certificate_of(run: ReportedRun, device: DeviceIdentity) -> CertificateSettings | None:

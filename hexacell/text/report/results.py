@@ -6,12 +6,10 @@ The figures are SVG text that is the same, byte for byte, whenever it is drawn.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from hexacell.identification.identified_zeros import ParameterChoice
-from hexacell.kinematics.rotations import Array
 from hexacell.results.run_comparison import compare_results
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.services.history.run_summary import require_result
@@ -37,14 +35,15 @@ def figure_chapter(run: ReportedRun) -> Chapter | None:
 
 def _deviations(run: ReportedRun) -> Picture | None:
     """What the gauges show at each held-out pose, as in figures 8 and 9 of the paper."""
-    phases = (("as found", Phase.BEFORE, BEFORE, "o"), ("as left", Phase.AFTER, AFTER, "s"))
-    series = [(name, _distances(run, phase), colour, marker) for name, phase, colour, marker in phases]
-    if not any(len(distances) for _, distances, _, _ in series):
+    found, left = (run.state.held_out(phase) for phase in (Phase.BEFORE, Phase.AFTER))
+    if not found and not left:
         return None
-    figure, axes = _axes()
-    for name, distances, colour, marker in series:
-        numbers = np.arange(1, len(distances) + 1)
-        axes.semilogy(numbers, distances, marker, color=colour, label=name, markersize=5)
+    figure, [axes] = new_figure((7.0, 2.8), AXES_PLACE)
+    series = ((found, "as found", BEFORE, "o"), (left, "as left", AFTER, "s"))
+    for deviations, name, colour, marker in series:
+        distances = np.linalg.norm(np.array(deviations, dtype=float).reshape(-1, 3), axis=-1)
+        numbers, shown = np.arange(1, len(distances) + 1), np.maximum(distances, SMALLEST_MM)
+        axes.semilogy(numbers, shown, marker, color=colour, label=name, markersize=5)
     axes.set_xlabel("held-out pose")
     axes.set_ylabel("deviation of the ball, mm")
     axes.grid(visible=True, axis="y", color="#dddddd", linewidth=0.6)
@@ -52,18 +51,12 @@ def _deviations(run: ReportedRun) -> Picture | None:
     return Picture(as_svg(figure), "Distance of the ball from its reference at each held-out pose.")
 
 
-def _distances(run: ReportedRun, phase: Phase) -> Array:
-    deviations = np.array(run.state.held_out(phase), dtype=float).reshape(-1, 3)
-    distances: Array = np.maximum(np.linalg.norm(deviations, axis=-1), SMALLEST_MM)
-    return distances
-
-
 def _changes(run: ReportedRun) -> Picture | None:
     """The change of each free parameter by its expanded uncertainty."""
     if run.state.identified is None:
         return None
     rows = rows_of_run(run.state, run.settings)
-    figure, axes = _axes()
+    figure, [axes] = new_figure((7.0, 2.8), AXES_PLACE)
     axes.errorbar(
         np.arange(len(rows)),
         [one.change / one.unit.like_a_mm for one in rows],
@@ -79,11 +72,6 @@ def _changes(run: ReportedRun) -> Picture | None:
     kinds = run.settings.mechanism.parameters.kinds
     axes.set_ylabel(f"change, {' or '.join(dict.fromkeys(kind.unit.shown for kind in kinds))}")
     return Picture(as_svg(figure), "Change of each parameter, with its expanded uncertainty (k = 2).")
-
-
-def _axes() -> tuple[Any, Any]:
-    figure, [axes] = new_figure((7.0, 2.8), AXES_PLACE)
-    return figure, axes
 
 
 def uncertainty_chapter(run: ReportedRun) -> Chapter | None:

@@ -47,8 +47,8 @@ def statement_chapter(run: ReportedRun) -> Chapter:
     verdict, accuracy = verdict_of(run), judged_accuracy(run.state.judged)
     blocks: list[Block] = [
         Paragraph(_meaning(run, verdict), is_strong=True),
-        *_error_table(accuracy),
-        *_reasons(run),
+        *([] if accuracy is None else [_error_table(accuracy)]),
+        _reasons(run),
         Paragraph(scope_sentences(accuracy)),
         Paragraph(decision_rule(accuracy)),
     ]
@@ -105,30 +105,28 @@ def _meaning(run: ReportedRun, verdict: Verdict | None) -> str:
     return VERDICT_MEANINGS[verdict]
 
 
-def _error_table(accuracy: VerifiedAccuracy | None) -> tuple[Block, ...]:
-    if accuracy is None:
-        return ()
+def _error_table(accuracy: VerifiedAccuracy) -> Table:
     columns = (f"Largest error at {accuracy.poses} task poses", "error", "U (k = 2)", "limit", "verdict")
     rows = (
         (f"{name}, {unit}", f"{one.value:.3f}", f"{one.expanded:.3f}", f"{one.limit:g}", one.verdict.value)
         for name, unit, one in accuracy.errors
     )
-    return (Table(columns, tuple(rows)),)
+    return Table(columns, tuple(rows))
 
 
-def _reasons(run: ReportedRun) -> tuple[Block, ...]:
+def _reasons(run: ReportedRun) -> Block:
     """The tests of the model, or the outcome of a check or a length check."""
     judged = run.state.judged
     if judged is None:
         reason = "it is not over" if run.state.ended is None else run.state.ended.line
-        return (Paragraph(f"How it ended: {reason}."),)
+        return Paragraph(f"How it ended: {reason}.")
     if judged.verification is not None and judged.verification.tests:
         rows = (
             (test.name, f"{'holds' if test.passed else 'FAILS'}: {test.sentence}")
             for test in judged.verification.tests
         )
-        return (Table(("Test of the model", "result"), tuple(rows), None),)
-    return (Paragraph(judged.line),)
+        return Table(("Test of the model", "result"), tuple(rows), None)
+    return Paragraph(judged.line)
 
 
 def scope_sentences(accuracy: VerifiedAccuracy | None) -> str:
@@ -177,6 +175,5 @@ def _left(run: ReportedRun) -> str:
     if state.committed is None:
         return "Nothing was written: the robot is left as it was found."
     kept = f"; kept by {state.accepted.by}" if state.accepted is not None and state.accepted.by else ""
-    return (
-        f"The new geometry is in the controller's config, approved by {state.committed.approved_by}{kept}."
-    )
+    approved = f"approved by {state.committed.approved_by}{kept}"
+    return f"The new geometry is in the controller's config, {approved}."

@@ -65,7 +65,8 @@ class _Translated:
             except HexacellError:
                 raise
             except Exception as error:
-                if not is_about_a_device(error):
+                library = type(error).__module__.partition(".")[0]
+                if not isinstance(error, OSError | EOFError) and library not in LIBRARIES:
                     raise
                 raise DeviceError(
                     f"its driver failed: {type(error).__name__}: {error}",
@@ -74,9 +75,3 @@ class _Translated:
                 ) from error
 
         return wrapped
-
-
-def is_about_a_device(error: Exception) -> bool:
-    """Whether the system or a library for devices raised it."""
-    module = type(error).__module__.partition(".")[0]
-    return isinstance(error, OSError | EOFError) or module in LIBRARIES

@@ -34,10 +34,6 @@ def _listening_at(
                 _, local, _, state = line.split()[:4]
                 address, _, own_port = local.partition(":")
                 if state == _LISTENING and int(own_port, 16) == port:
-                    yield _address(address)
-
-
-def _address(digits: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address:
-    """An address as the kernel writes it: words of four bytes, each in the computer's own order."""
-    words = [int(digits[start : start + 8], 16) for start in range(0, len(digits), 8)]
-    return ipaddress.ip_address(struct.pack(f"={len(words)}I", *words))
+                    # As the kernel writes it: words of four bytes, each in the computer's own order.
+                    words = [int(address[start : start + 8], 16) for start in range(0, len(address), 8)]
+                    yield ipaddress.ip_address(struct.pack(f"={len(words)}I", *words))

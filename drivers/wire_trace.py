@@ -125,9 +125,9 @@ class _LineTrace:
 
     def add(self, number: int, entry: TraceEntry) -> None:
         self.entries.append((number, entry))
-        self._size += _size(entry)
+        self._size += ENTRY_BYTES + len(entry.data)
         while self._size > self._capacity:
-            self._size -= _size(self.entries.popleft()[1])
+            self._size -= ENTRY_BYTES + len(self.entries.popleft()[1].data)
             self.dropped += 1
 
 
@@ -152,7 +152,3 @@ def read_trace(text: str) -> tuple[TraceEntry, ...]:
             TraceEntry(float(match["time_s"]), match["line"], TrafficDirection(match["direction"]), data)
         )
     return tuple(entries)
-
-
-def _size(entry: TraceEntry) -> int:
-    return ENTRY_BYTES + len(entry.data)

@@ -150,26 +150,17 @@ def search_bus(bus: Mapping[str, Any], timeouts: SearchTimeouts = USUAL) -> BusF
     overheard = OverheardFrames()
     try:
         with closing(EncoderBus(bus, threading.Event(), accepts=overheard.accepts)) as opened:
-            return _findings(bus, opened, overheard, timeouts)
+            try:
+                opened.listen(timeouts.listen)
+                frames = overheard.counted(timeouts.listen)
+                ids = responding_nodes(opened, timeouts)
+                nodes = tuple(_described(opened, node, timeouts.node) for node in ids)
+            except BusError as error:
+                action = "Check cable and termination, or try another bit rate"
+                raise BusError(error.problem, subject=opened.name, action=action) from error
+            return BusFindings(bus, nodes, frames_of_no_node(frames, ids))
     except HexacellError as error:
         return BusFindings(bus, problem=str(error))
-
-
-def _findings(
-    bus: Mapping[str, Any], opened: EncoderBus, overheard: OverheardFrames, timeouts: SearchTimeouts
-) -> BusFindings:
-    try:
-        opened.listen(timeouts.listen)
-        frames = overheard.counted(timeouts.listen)
-        ids = responding_nodes(opened, timeouts)
-        nodes = tuple(_described(opened, node, timeouts.node) for node in ids)
-    except BusError as error:
-        raise BusError(
-            error.problem,
-            subject=opened.name,
-            action="Check cable and termination, or try another bit rate",
-        ) from error
-    return BusFindings(bus, nodes, frames_of_no_node(frames, ids))
 
 
 def responding_nodes(bus: EncoderBus, timeouts: SearchTimeouts = USUAL) -> list[int]:

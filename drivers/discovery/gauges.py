@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 
@@ -93,10 +93,15 @@ async def search_port(
     if VISA_SEPARATOR in port:
         return await _identify(port, timeouts.visa)
     probes = {name: probe for name in factories if (probe := probe_of(factories[name])) is not None}
+    asked = sorted(name for name, probe in probes.items() if probe.channel_of is None)
+    last = sorted(asked, key=lambda name: probes[name].is_last)
+    tries: list[tuple[str, int | None]] = [(name, None) for name in last]
+    tries += [(name, rate) for name in asked for rate in probes[name].other_baud_rates]
     heard: list[str] = []
-    for protocol, baudrate in _tries(probes):
+    for protocol, baudrate in tries:
+        settings = _settings(protocol, port, timeouts.gauge, baudrate)
         try:
-            found = await _channels(protocol, factories[protocol], port, baudrate, heard, timeouts.gauge)
+            found = await _channels(factories[protocol], settings, heard)
         except HexacellError as error:
             return PortFindings(port, problem=f"{error.problem}. {error.action}")
         if found:
@@ -105,13 +110,11 @@ async def search_port(
     return replace(listened, heard=heard[-1]) if heard and not listened.gauges else listened
 
 
-def _tries(probes: Mapping[str, Probe]) -> Iterator[tuple[str, int | None]]:
-    """Protocols in the order in which they are asked, with a baud rate where it is not the usual one."""
-    asked = [name for name, probe in probes.items() if probe.channel_of is None]
-    for protocol in sorted(asked, key=lambda name: (probes[name].is_last, name)):
-        yield protocol, None
-    for protocol in sorted(asked):
-        yield from ((protocol, rate) for rate in probes[protocol].other_baud_rates)
+def _settings(protocol: str, port: str, timeout_s: float, baudrate: int | None = None) -> GaugeSettings:
+    serial = {} if baudrate is None else {"baudrate": baudrate}
+    return GaugeSettings(
+        name="searched", axis="x", protocol=protocol, port=port, serial=serial, timeout_s=timeout_s
+    )
 
 
 async def _identify(resource: str, timeout_s: float) -> PortFindings:
@@ -141,10 +144,8 @@ async def _listen(
             frames = await asyncio.to_thread(_frames, port, rate, timeouts.listen)
             channels = {channel for frame in frames if (channel := channel_of(frame)) is not None}
             if channels:
-                found = [
-                    await _ask(protocol, factories[protocol], port, channel, None, timeouts.gauge)
-                    for channel in sorted(channels)
-                ]
+                settings = _settings(protocol, port, timeouts.gauge)
+                found = [await _ask(factories[protocol], settings, channel) for channel in sorted(channels)]
                 return PortFindings(port, tuple(found))
     for baudrate in LISTENED_BAUD_RATES:
         for frame in await asyncio.to_thread(_frames, port, baudrate, timeouts.listen):
@@ -167,14 +168,7 @@ def _frames(port: str, baudrate: int, seconds: float) -> list[bytes]:
     return []
 
 
-async def _channels(
-    protocol: str,
-    factory: GaugeFactory,
-    port: str,
-    baudrate: int | None,
-    heard: list[str],
-    timeout_s: float,
-) -> list[FoundGauge]:
+async def _channels(factory: GaugeFactory, settings: GaugeSettings, heard: list[str]) -> list[FoundGauge]:
     """The gauges that answer in one protocol; raises ``PortLost`` where the port cannot be used.
 
     Why an answer is of another protocol is added to ``heard``.
@@ -182,7 +176,7 @@ async def _channels(
     found = []
     for channel in CHANNELS:
         try:
-            gauge = await _ask(protocol, factory, port, channel, baudrate, timeout_s)
+            gauge = await _ask(factory, settings, channel)
         except EmptyChannel:
             continue
         except GaugeSilent:
@@ -196,21 +190,12 @@ async def _channels(
     return found
 
 
-async def _ask(
-    protocol: str, factory: GaugeFactory, port: str, channel: int, baudrate: int | None, timeout_s: float
-) -> FoundGauge:
-    settings = GaugeSettings(
-        name="searched",
-        axis="x",
-        protocol=protocol,
-        port=port,
-        serial={} if baudrate is None else {"baudrate": baudrate},
-        channel=channel,
-        timeout_s=timeout_s,
-    )
-    ports = SharedSerialPorts(worst_latency_s=timeout_s)
-    gauge = factory(settings, ports)
-    found = FoundGauge(protocol, port, "", getattr(gauge, "channel", None), baudrate=baudrate)
+async def _ask(factory: GaugeFactory, settings: GaugeSettings, channel: int) -> FoundGauge:
+    ports = SharedSerialPorts(worst_latency_s=settings.timeout_s)
+    gauge = factory(settings.model_copy(update={"channel": channel}), ports)
+    baudrate = settings.serial.get("baudrate")
+    own_channel = getattr(gauge, "channel", None)
+    found = FoundGauge(settings.protocol, settings.port or "", "", own_channel, baudrate=baudrate)
     try:
         identity = await gauge.open()
         shown = (await gauge.read_once()).raw

@@ -44,9 +44,23 @@ def set_node_id(bus: Mapping[str, Any], node: int) -> int | None:
             raise DeviceError(f"has several nodes: {nodes}", subject=opened.name, action=ALONE)
         with _in_configuration_state(opened) as master:
             _require_alone(opened, master)
-            _store(opened, master, node)
+            try:
+                master.configure_node_id(node)  # type: ignore[no-untyped-call]
+                master.store_configuration()  # type: ignore[no-untyped-call]
+            except LssError as error:
+                raise DeviceError(
+                    f"has a device that refuses node id {node}: {error}",
+                    subject=opened.name,
+                    action="Set it with its vendor's tool",
+                ) from error
         opened.network.send_message(_NMT, _RESET_COMMUNICATION)
-        _require_taken(opened, node)
+        opened.network.scanner.reset()  # type: ignore[no-untyped-call]
+        if node not in responding_nodes(opened):
+            raise BusError(
+                f"has no node {node} after it was stored",
+                subject=opened.name,
+                action="Switch the device off and on, and look: hexacell devices --can",
+            )
         return before[0] if before else None
 
 
@@ -75,25 +89,3 @@ def _require_alone(bus: EncoderBus, master: LssMaster) -> None:
     bus.listen(SECOND_RESPONSE_S)
     if len(answers) > 1:
         raise DeviceError(f"has {len(answers)} devices that answer", subject=bus.name, action=ALONE)
-
-
-def _store(bus: EncoderBus, master: LssMaster, node: int) -> None:
-    try:
-        master.configure_node_id(node)  # type: ignore[no-untyped-call]
-        master.store_configuration()  # type: ignore[no-untyped-call]
-    except LssError as error:
-        raise DeviceError(
-            f"has a device that refuses node id {node}: {error}",
-            subject=bus.name,
-            action="Set it with its vendor's tool",
-        ) from error
-
-
-def _require_taken(bus: EncoderBus, node: int) -> None:
-    bus.network.scanner.reset()  # type: ignore[no-untyped-call]
-    if node not in responding_nodes(bus):
-        raise BusError(
-            f"has no node {node} after it was stored",
-            subject=bus.name,
-            action="Switch the device off and on, and look: hexacell devices --can",
-        )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,19 +56,6 @@ class PositionSignal:
     def subject(self) -> str:
         """The subject of messages about this encoder."""
         return f"encoder of leg {self.leg} ({self.name})"
-
-    def problem(self, values: Mapping[str, Any], must_be: Mapping[str, int]) -> str:
-        """Why decoded values cannot be trusted; empty if they can.
-
-        They are outside the range that the DBC file states, or other signals are not what they must be.
-        """
-        value, low, high = values[self.signal.name], self.signal.minimum, self.signal.maximum
-        if (low is not None and value < low) or (high is not None and value > high):
-            return f"sends {value:g}, outside the range in the DBC file"
-        for name, expected in must_be.items():
-            if values.get(name) != expected:
-                return f"sends {name} {values.get(name)}, not {expected}"
-        return ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,7 +218,12 @@ class DbcSession(BankSession):
             return _Received(now, 0.0, f"sends what the DBC file does not describe ({error})")
         if (value := values.get(signal.signal.name)) is None:
             return None
-        problem = signal.problem(values, self._described.must_be)
+        low, high, problem = signal.signal.minimum, signal.signal.maximum, ""
+        if (low is not None and value < low) or (high is not None and value > high):
+            problem = f"sends {value:g}, outside the range in the DBC file"
+        for name, expected in self._described.must_be.items():
+            if values.get(name) != expected and not problem:
+                problem = f"sends {name} {values.get(name)}, not {expected}"
         return _Received(now, float(value) * signal.scale, problem)
 
     def _sample(self) -> tuple[int, ...]:

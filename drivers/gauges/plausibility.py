@@ -41,7 +41,7 @@ class DisplayHistory:
         self._travel_mm = settings.travel_mm
         self._stated = settings.resolution_mm
         self._decimals = None if self._stated is None else decimals_of(self._stated)
-        self._agreement_mm = AGREEMENT_MM if settings.agreement_mm is None else settings.agreement_mm
+        self.agreement_mm = AGREEMENT_MM if settings.agreement_mm is None else settings.agreement_mm
         self._range: tuple[float, float] | None = None
 
     def agreed(self, readings: Sequence[DisplayedValue]) -> DisplayedValue | None:
@@ -53,12 +53,12 @@ class DisplayHistory:
         """
         *_, last = readings
         before = readings[-3:-1]
-        if not before or not self._differ_by_at_most(self._agreement_mm, before[-1], last):
+        if not before or not self._differ_by_at_most(self.agreement_mm, before[-1], last):
             return None
-        alike_mm = max(ALIKE_DIGITS * 10.0**-last.decimals, ALIKE_SHARE * self._agreement_mm)
+        alike_mm = max(ALIKE_DIGITS * 10.0**-last.decimals, ALIKE_SHARE * self.agreement_mm)
         if self._differ_by_at_most(alike_mm, before[-1], last):
             return last
-        if len(before) < MIDDLE_OF - 1 or not self._differ_by_at_most(self._agreement_mm, *before, last):
+        if len(before) < MIDDLE_OF - 1 or not self._differ_by_at_most(self.agreement_mm, *before, last):
             return None
         return sorted((*before, last), key=lambda one: one.value)[1]
 
@@ -66,11 +66,6 @@ class DisplayHistory:
     def _differ_by_at_most(limit_mm: float, *readings: DisplayedValue) -> bool:
         values = [one.value for one in readings]
         return max(values) - min(values) <= limit_mm + ROUNDING_MM
-
-    @property
-    def limit(self) -> str:
-        """Within what readings agree, in words."""
-        return f" within {self._agreement_mm:g} mm"
 
     def begin(self) -> None:
         """The gauge was opened: its zero may be another one."""

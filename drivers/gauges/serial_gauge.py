@@ -143,7 +143,8 @@ class SerialGauge(ABC):
             if (agreed := self._history.agreed(in_step)) is not None:
                 self._history.add(agreed)
                 return GaugeReading(agreed.value, agreed.text)
-        problem = f"readings do not agree{self._history.limit}: {', '.join(one.text for one in readings)}"
+        shown, limit_mm = ", ".join(one.text for one in readings), self._history.agreement_mm
+        problem = f"readings do not agree within {limit_mm:g} mm: {shown}"
         raise self._error(GaugeUnsteady, problem, "Wait until it is still; if it is, check its cable")
 
     async def read_once(self) -> GaugeReading:

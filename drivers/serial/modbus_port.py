@@ -77,13 +77,7 @@ class ModbusPort(RequestPort):
         return self.open_count
 
     def exchange(self, request: bytes, _terminator: bytes, timeout_s: float) -> bytes:
-        """Read registers: ``request`` is a PDU with its device and without checksum.
-
-        Raises:
-            NoAnswer: no answer came in time, a damaged one, or more than one.
-            RefusedRequest: the device answers with an exception.
-            PortLost: the line is not open, or was lost.
-        """
+        """Read registers; a device that answers with an exception is a ``RefusedRequest``."""
         self.require_not_closed()
         if self._client is None:
             raise lost_port(self.subject, self.url, "it is not open")
@@ -108,11 +102,7 @@ class ModbusPort(RequestPort):
         return struct.pack(f">{count}H", *answer.registers)
 
     def write_to_all(self, register: int, value: int) -> None:
-        """Write a register of all devices at once, which none of them answers.
-
-        Raises:
-            PortLost: the line is not open, or was lost.
-        """
+        """Write a register of all devices at once, which none of them answers."""
         self.require_not_closed()
         if self._client is None:
             raise lost_port(self.subject, self.url, "it is not open")

@@ -7,6 +7,7 @@ import termios
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from typing import Any
 
 import serial
 
@@ -49,7 +50,14 @@ def opened_port(
     """
     attempts = 0
     with opening_errors(subject, url):
-        port = _configured(url, settings)
+        lines = {name: level for name, level in settings.items() if name in {"dtr", "rts"}}
+        line_settings: Any = {name: value for name, value in settings.items() if name not in lines}
+        port = serial.serial_for_url(url, do_not_open=True, **line_settings)
+        port.timeout = SLICE_S  # set once and before opening: a pseudo-terminal refuses later changes
+        if not url.lower().startswith(WITHOUT_WRITE_TIMEOUT):
+            port.write_timeout = WRITE_SLICE_S
+        for name, level in lines.items():
+            setattr(port, name, level)
         port.inter_byte_timeout = inter_byte_timeout_s
         while not port.is_open:
             attempts += 1
@@ -62,18 +70,6 @@ def opened_port(
                     raise
                 if closing.wait(SLICE_S):
                     raise PortLost(f"port {url} is closed", subject=subject) from error
-    return port
-
-
-def _configured(url: str, given: Mapping[str, object]) -> serial.Serial:
-    lines = {name: value for name, value in given.items() if name in {"dtr", "rts"}}
-    settings = {name: value for name, value in given.items() if name not in lines}
-    port = serial.serial_for_url(url, do_not_open=True, **settings)  # type: ignore[arg-type]
-    port.timeout = SLICE_S  # set once and before opening: a pseudo-terminal refuses later changes
-    if not url.lower().startswith(WITHOUT_WRITE_TIMEOUT):
-        port.write_timeout = WRITE_SLICE_S
-    for name, level in lines.items():
-        setattr(port, name, level)
     return port
 
 

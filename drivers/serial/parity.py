@@ -43,11 +43,9 @@ class ParityInBit7:
 
     def decode(self, data: bytes) -> bytes:
         """The bytes without their parity; ``DAMAGED`` where it is wrong."""
-        return bytes(self._checked(byte) for byte in data)
-
-    def _checked(self, byte: int) -> int:
-        character = byte & ~BIT_7
-        return character if byte == character | BIT_7 * self._parity_of(character) else DAMAGED
+        return bytes(
+            byte & ~BIT_7 if byte >> 7 == self._parity_of(byte & ~BIT_7) else DAMAGED for byte in data
+        )
 
     def _parity_of(self, character: int) -> int:
         return (character.bit_count() + self._odd) % 2

@@ -33,6 +33,7 @@ class SysfsThermometer:
 
     def __init__(self, settings: ThermometerSettings) -> None:
         self._settings = settings
+        self._path, self._subject = Path(settings.path), f"thermometer {settings.name}"
         self._thread: ThreadPoolExecutor | None = None
         self._reading: Future[str] | None = None
 
@@ -64,23 +65,6 @@ class SysfsThermometer:
         except OSError as error:
             plain = os_error_to_file_error("cannot be read", self._path, error)
             raise self._error(plain.problem) from error
-        return TemperatureReading(self._celsius(raw), raw)
-
-    async def close(self) -> None:
-        """End the thread; closing twice is harmless."""
-        thread, self._thread = self._thread, None
-        if thread is not None:
-            thread.shutdown(wait=self._reading is None or self._reading.done(), cancel_futures=True)
-
-    @property
-    def _path(self) -> Path:
-        return Path(self._settings.path)
-
-    @property
-    def _subject(self) -> str:
-        return f"thermometer {self.name}"
-
-    def _celsius(self, raw: str) -> float:
         try:
             celsius = int(raw) / 1000
         except ValueError:
@@ -88,12 +72,16 @@ class SysfsThermometer:
         low, high = PLAUSIBLE_C
         if not low <= celsius <= high:
             raise self._error(f"gives {celsius:g} deg C, which is implausible")
-        return celsius
+        return TemperatureReading(celsius, raw)
+
+    async def close(self) -> None:
+        """End the thread; closing twice is harmless."""
+        thread, self._thread = self._thread, None
+        if thread is not None:
+            thread.shutdown(wait=self._reading is None or self._reading.done(), cancel_futures=True)
 
     def _error(self, problem: str) -> DeviceError:
-        return DeviceError(
-            problem, subject=self._subject, action=f"Check the sensor behind {self._settings.path}"
-        )
+        return DeviceError(problem, subject=self._subject, action=f"Check the sensor behind {self._path}")
 
 
 def _content(path: Path) -> str:

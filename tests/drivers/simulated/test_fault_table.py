@@ -119,7 +119,7 @@ def row(device: str, fault: str, error: HexacellError | None, *, is_right: bool)
 async def gauge_row(protocol: str, fault: FaultKind) -> Row:
     cell = Cell([protocol] * 3, timeout_s=TIMEOUTS_S.get(protocol, 1.0), flicker_mm=0.0)
     gauge = cell.gauges["x"]
-    gauge._history._agreement_mm = 0.005
+    gauge._history.agreement_mm = 0.005
     cell.balls["x"] = BEFORE_MM
     try:
         await gauge.open()

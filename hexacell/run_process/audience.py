@@ -73,12 +73,6 @@ class Outbox:
                 self._writer.transport.abort()
                 raise ConnectionAbortedError("the client takes nothing") from error
 
-    async def end(self) -> None:
-        """Close the connection."""
-        self._writer.close()
-        with suppress(OSError):
-            await self._writer.wait_closed()
-
     async def _next(self) -> bytes | None:
         while not self._lines and self._latest is None and not self._is_closed:
             self._changed.clear()
@@ -96,19 +90,6 @@ class _Client:
     leave: Leave | None = None
 
 
-@dataclass(eq=False)
-class AudienceEvents:
-    """Calls from the audience to the host."""
-
-    on_command: Callable[[Command], None]
-    on_control: Callable[[], None]
-    """Somebody is in control now."""
-    on_leave: Callable[[bool], None]
-    """Who was in control has left; whether the run goes on."""
-    on_lost: Callable[[], None]
-    """Who was in control is gone without a word."""
-
-
 class Audience:
     """The clients of one run.
 
@@ -117,19 +98,24 @@ class Audience:
 
     Args:
         opening: gives the lines that a new client receives first, in order.
-        events: the calls to the host.
+        on_command: takes the commands of who is in control.
+        on_control: called when somebody is in control now.
+        on_leave: called when who was in control has left; with None if without a word.
         stuck_s: how long a client may take nothing, s.
     """
 
     def __init__(
         self,
         opening: Callable[[], list[bytes]],
-        events: AudienceEvents,
+        *,
+        on_command: Callable[[Command], None],
+        on_control: Callable[[], None],
+        on_leave: Callable[[Leave | None], None],
         stuck_s: float = STUCK_S,
     ) -> None:
         self.first_came = asyncio.Event()
         self._opening = opening
-        self._events = events
+        self._on_command, self._on_control, self._on_leave = on_command, on_control, on_leave
         self._stuck_s = stuck_s
         self._clients: list[_Client] = []
         self._in_control: _Client | None = None
@@ -152,7 +138,9 @@ class Audience:
             if user == os.getuid():
                 await self._serve_client(reader, _Client(f"{_name_of(user)}, process {process}", outbox))
         finally:
-            await outbox.end()
+            writer.close()
+            with suppress(OSError):
+                await writer.wait_closed()
             self._serving.discard(serving)
 
     async def _serve_client(self, reader: StreamReader, client: _Client) -> None:
@@ -206,10 +194,7 @@ class Audience:
         self._in_control = None
         for other in self._clients:
             self._send_control(other)
-        if client.leave is None:
-            self._events.on_lost()
-        else:
-            self._events.on_leave(client.leave.keep_running)
+        self._on_leave(client.leave)
 
     async def _end(self, client: _Client, delivering: asyncio.Task[None]) -> None:
         client.outbox.close()
@@ -240,7 +225,7 @@ class Audience:
                         f"{type(command).__name__}: {self._who or 'nobody'} is in control of this run",
                         action="Take control first",
                     )
-                self._events.on_command(command)
+                self._on_command(command)
             case TakeControl():
                 self._give_control(client)
             case Leave() as leave:
@@ -254,7 +239,7 @@ class Audience:
         self._in_control = client
         for one in self._clients:
             self._send_control(one)
-        self._events.on_control()
+        self._on_control()
 
     def _send_control(self, client: _Client) -> None:
         changed = ControlChanged(is_in_control=client is self._in_control, who=self._who)

@@ -177,26 +177,20 @@ def _spawn(arguments: Sequence[str]) -> None:
     """Start the process and wait until it listens; it is no child of this one then."""
     answered, answering = os.pipe()
     with tempfile.TemporaryFile() as errors, os.fdopen(answered, "rb") as answers:
+        streams = [  # nothing to read, the answer on stdout, and messages of the interpreter in a file
+            (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
+            (os.POSIX_SPAWN_DUP2, answering, 1),
+            (os.POSIX_SPAWN_DUP2, errors.fileno(), 2),
+        ]
         command = [sys.executable, "-m", "hexacell", "host", *arguments]
         try:
-            process = os.posix_spawn(
-                sys.executable, command, os.environ, file_actions=_streams(answering, errors), setsid=True
-            )
+            process = os.posix_spawn(sys.executable, command, os.environ, file_actions=streams, setsid=True)
         finally:
             os.close(answering)
         os.waitpid(process, 0)
         answer = answers.readline()
         if answer != READY:
             raise HostNotStarted(_failure_in(answer, errors))
-
-
-def _streams(answering: int, errors: BinaryIO) -> list[tuple[int, ...] | tuple[int, int, str, int, int]]:
-    """Nothing to read, the answer on stdout, and messages of the interpreter in a file."""
-    return [
-        (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
-        (os.POSIX_SPAWN_DUP2, answering, 1),
-        (os.POSIX_SPAWN_DUP2, errors.fileno(), 2),
-    ]
 
 
 def _failure_in(answer: bytes, errors: BinaryIO) -> HostFailed:

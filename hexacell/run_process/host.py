@@ -12,11 +12,12 @@ from socket import socket
 
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.errors import ExitCode, HexacellError, SeveralErrors
-from hexacell.run_process.audience import STUCK_S, Audience, AudienceEvents, audience_server
+from hexacell.run_process.audience import STUCK_S, Audience, audience_server
 from hexacell.run_process.live_devices import RunDeviceWatch
 from hexacell.run_process.messages import (
     EventRecorded,
     HostFailed,
+    Leave,
     QuestionClosed,
     QuestionOpened,
     RunDescribed,
@@ -80,8 +81,10 @@ class RunHost:
         self._away_s = 60.0 * settings.recovery.away_minutes if away_s is None else away_s
         self._audience = Audience(
             self._opening,
-            AudienceEvents(self._queue.put, self._on_control, self._on_leave, self._on_lost),
-            stuck_s,
+            on_command=self._queue.put,
+            on_control=self._on_control,
+            on_leave=self._on_leave,
+            stuck_s=stuck_s,
         )
         described = RunDescribed(
             cell=settings.name,
@@ -160,15 +163,9 @@ class RunHost:
         if not self._queue.is_attended:  # it has not begun
             running.cancel()
         await asyncio.wait([running], timeout=ABORT_S)
-        if not self._is_only_computing():
+        step = self._last.step if isinstance(self._last, events.StepBegun) else None
+        if not isinstance(step, Computation):
             await asyncio.wait([running])
-
-    def _is_only_computing(self) -> bool:
-        match self._last:
-            case events.StepBegun(step=step):
-                return isinstance(step, Computation)
-            case _:
-                return False
 
     def _watch(self, engine: Engine, devices: Devices) -> None:
         """Called with the engine before it begins: what happened before is sent first."""
@@ -213,16 +210,13 @@ class RunHost:
         self._is_lost = False
         self._reconsider()
 
-    def _on_leave(self, keep_running: bool) -> None:
-        if not keep_running:
+    def _on_leave(self, leave: Leave | None) -> None:
+        self._is_lost = leave is None
+        if leave is None and self._status is Status.RUNNING:
+            self._queue.put(Pause())
+        elif leave is not None and not leave.keep_running:
             self._queue.put(Abort(STOPPED.problem))
             self._aborted.set()
-        self._reconsider()
-
-    def _on_lost(self) -> None:
-        self._is_lost = True
-        if self._status is Status.RUNNING:
-            self._queue.put(Pause())
         self._reconsider()
 
     def _reconsider(self) -> None:

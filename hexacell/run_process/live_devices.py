@@ -63,7 +63,7 @@ class LiveFeed:
 
     def snapshot(self) -> LiveSnapshot:
         """The latest values of all devices."""
-        live, sample = self._live, self._live.encoders.value
+        live, sample, status = self._live, self._live.encoders.value, self._live.controller.value
         return LiveSnapshot(
             gauges=tuple(map(self._gauge, self._gauges)),
             encoders=EncoderSnapshot(
@@ -72,7 +72,13 @@ class LiveFeed:
                 age_s=_age(live.encoders),
                 problem=live.encoders.problem,
             ),
-            controller=self._controller(),
+            controller=ControllerSnapshot(
+                estop=None if status is None else status.estop,
+                enabled=None if status is None else status.enabled,
+                error_messages=() if status is None else status.error_messages,
+                age_s=_age(live.controller),
+                problem=live.controller.problem,
+            ),
             stop_reason=live.stop_reason.value or live.stop_reason.problem,
         )
 
@@ -88,18 +94,6 @@ class LiveFeed:
             problem=shown.problem,
             travel_mm=settings.travel_mm,
             middle_mm=settings.middle_mm,
-        )
-
-    def _controller(self) -> ControllerSnapshot:
-        shown = self._live.controller
-        if shown.value is None:
-            return ControllerSnapshot(problem=shown.problem)
-        return ControllerSnapshot(
-            estop=shown.value.estop,
-            enabled=shown.value.enabled,
-            error_messages=shown.value.error_messages,
-            age_s=_age(shown),
-            problem=shown.problem,
         )
 
     def _noise(self, name: str) -> float | None:
@@ -203,13 +197,10 @@ class RunDeviceWatch:
         """What they show once the gauges were read anew; at once if the run itself reads them."""
         if self.is_waiting:
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._until_fresh(), FRESH_S)
+                async with asyncio.timeout(FRESH_S), aclosing(self.live.changes(0.0)) as changes:
+                    while any(gauge.age_s > SAMPLE_PERIOD_S for gauge in self._feed.gauges):
+                        await anext(changes)
         return self.snapshot()
-
-    async def _until_fresh(self) -> None:
-        async with aclosing(self.live.changes(0.0)) as changes:
-            while any(gauge.age_s > SAMPLE_PERIOD_S for gauge in self._feed.gauges):
-                await anext(changes)
 
     async def snapshots(self) -> AsyncIterator[LiveSnapshot]:
         """Snapshots after each change, until cancelled; noise is known only while they are taken."""

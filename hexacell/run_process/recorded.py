@@ -131,8 +131,16 @@ class RecordedRun:
         """What else a run sends: its status, its question, and where the cursor is."""
         entry = self._entries[sequence - 1]
         at_cursor = CursorMoved(sequence=sequence, last=self.last, at=entry.at, speed=self._speed)
-        status = StatusChanged(status=_status_after(entry.event))
-        return [status, _question_after(entry.event), at_cursor]
+        status, question = Status.RUNNING, None
+        match entry.event:
+            case events.Ended() | events.Interrupted():
+                status = Status.ENDED
+            case events.Paused():
+                status = Status.PAUSED
+            case events.StepBegun(step=Place(at=at, pose=pose)):
+                status, question = Status.AWAITING_OPERATOR, ask_placement(at, Pose(*pose))
+        asked = QuestionClosed() if question is None else QuestionOpened(question=question)
+        return [StatusChanged(status=status), asked, at_cursor]
 
     async def _until_moved(self, sent: int) -> None:
         """Wait until the cursor is moved, or moves by itself."""
@@ -161,23 +169,3 @@ class RecordedRun:
         if elapsed < 0.0:  # the machine was restarted
             elapsed = (following.at - here.at).total_seconds()
         return min(max(elapsed, 0.0), LONGEST_WAIT_S)
-
-
-def _status_after(event: events.Event) -> Status:
-    match event:
-        case events.Ended() | events.Interrupted():
-            return Status.ENDED
-        case events.Paused():
-            return Status.PAUSED
-        case events.StepBegun(step=Place()):
-            return Status.AWAITING_OPERATOR
-        case _:
-            return Status.RUNNING
-
-
-def _question_after(event: events.Event) -> QuestionOpened | QuestionClosed:
-    match event:
-        case events.StepBegun(step=Place(at=at, pose=pose)):
-            return QuestionOpened(question=ask_placement(at, Pose(*pose)))
-        case _:
-            return QuestionClosed()

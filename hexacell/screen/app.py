@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -54,12 +53,10 @@ SCREENS: tuple[type[TabScreen], ...] = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class FirstCell:
-    """A cell file that does not exist yet, and what makes the assistant for it."""
+def _assistant(path: Path) -> FirstCellAssistant:
+    from hexacell.text.screens.first_questions import FirstCellAssistant  # noqa: PLC0415 - loaded late
 
-    path: Path
-    make: Callable[[], FirstCellAssistant]
+    return FirstCellAssistant(path)
 
 
 class TechnicianApp(App[int]):
@@ -77,7 +74,7 @@ class TechnicianApp(App[int]):
         load: Callable[[], ScreenModel],
         preferences: ScreenPreferences | None = None,
         *,
-        first_cell: FirstCell | None = None,
+        first_cell: Path | None = None,
     ) -> None:
         self.preferences = preferences or ScreenPreferences()
         self.keys_in_use = {str(one.id): one.key_display or one.key for one in KEYS} | self.preferences.keys
@@ -130,8 +127,8 @@ class TechnicianApp(App[int]):
         """Whether there is a cell file, once the first-time assistant was used if it is needed."""
         if self._first_cell is None:
             return True
-        assistant = await asyncio.to_thread(self._first_cell.make)
-        is_made: bool = await self.push_screen_wait(AssistantScreen(assistant, self._first_cell.path))
+        assistant = await asyncio.to_thread(_assistant, self._first_cell)
+        is_made: bool = await self.push_screen_wait(AssistantScreen(assistant, self._first_cell))
         return is_made
 
     def draw(self) -> None:

@@ -35,6 +35,7 @@ class RunFollower:
         on_end: called when a run has sent everything.
 
     Attributes:
+        connection: the run that is followed; None when it is over.
         picture: what is known of it; stays when the run is over.
         questions: number of questions opened, so that none is taken for another.
         runs: number of runs followed.
@@ -46,61 +47,53 @@ class RunFollower:
         self.runs = 0
         self._now, self._on_end = now, on_end
         self._is_left = False
-        self._connection: RunConnection | None = None
+        self.connection: RunConnection | None = None
         self._following: asyncio.Task[None] | None = None
-
-    @property
-    def connection(self) -> RunConnection | None:
-        """The run that is followed; None when it is over."""
-        return self._connection
 
     async def follow(self, connection: RunConnection) -> None:
         """Follow another run."""
         await self.stop()
-        self.picture, self._connection = RunPicture(), connection
+        self.picture, self.connection = RunPicture(), connection
         self.runs += 1
         self._following = asyncio.create_task(self._follow(connection))
 
     async def stop(self) -> None:
         """Follow no run any more, without a word to it."""
-        following, self._following, self._connection = self._following, None, None
+        following, self._following, self.connection = self._following, None, None
         if following is not None:
             await cancel_and_wait(following)
 
     async def give(self, command: Command) -> None:
         """Give a command; raises ``HexacellError``."""
-        if self._connection is None:
+        if self.connection is None:
             raise UsageError("no run goes on here", action="Start one from 2 Preflight")
-        await self._connection.give(command)
+        await self.connection.give(command)
 
     async def leave(self, *, keep_running: bool) -> None:
         """Let the run go on alone, or have it stopped; raises ``HexacellError``."""
-        if self._connection is not None:
+        if self.connection is not None:
             self._is_left = True
-            await self._connection.leave(keep_running=keep_running)
+            await self.connection.leave(keep_running=keep_running)
 
     async def _follow(self, connection: RunConnection) -> None:
         try:
-            await self._take_all(connection)
+            count = 0
+            async for message in connection.messages():
+                self._take(message)
+                count += 1
+                if count % FEW_MESSAGES == 0:
+                    await asyncio.sleep(0)
         except HexacellError as error:
             self._take(HostFailed(problem=str(error), action=error.action or ""))
         finally:
-            if self._connection is connection:
-                self._connection = None
+            if self.connection is connection:
+                self.connection = None
         if self._is_left:
             return
         if self.picture.status is not Status.ENDED and not self.picture.is_recorded:
             self._take(GONE)
             self._take(StatusChanged(status=Status.ENDED))
         self._on_end()
-
-    async def _take_all(self, connection: RunConnection) -> None:
-        count = 0
-        async for message in connection.messages():
-            self._take(message)
-            count += 1
-            if count % FEW_MESSAGES == 0:
-                await asyncio.sleep(0)
 
     def _take(self, message: HostMessage) -> None:
         question = self.picture.question

@@ -16,12 +16,11 @@ from drivers.discovery.gauges import FoundGauge, PortFindings
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.errors import FileError, HexacellError
-from hexacell.screen.app import FirstCell, TechnicianApp
+from hexacell.screen.app import TechnicianApp
 from hexacell.screen.further_screens import AssistantScreen
 from hexacell.screen.model import ScreenModel
 from hexacell.services.devices.device_search import SearchFindings, draft_of
 from hexacell.services.devices.first_cell import CellDraft
-from hexacell.text.screens.first_questions import FirstCellAssistant
 from tests.screen.test_history_screen import WithoutDevices
 from tests.screen.test_job import press, shown, until_shown
 from tests.waiting import until
@@ -37,8 +36,7 @@ def path(tmp_path: Path) -> Path:
 
 @asynccontextmanager
 async def opened_assistant(path: Path) -> AsyncIterator[Pilot[int]]:
-    first = FirstCell(path, lambda: FirstCellAssistant(path))
-    app = TechnicianApp(lambda: ScreenModel(WithoutDevices(path)), first_cell=first)
+    app = TechnicianApp(lambda: ScreenModel(WithoutDevices(path)), first_cell=path)
     async with app.run_test(size=(80, 24)) as pilot:
         await until(lambda: isinstance(app.screen, AssistantScreen))
         await until(lambda: "Question 1 of" in shown(pilot))

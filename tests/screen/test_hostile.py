@@ -11,10 +11,9 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 
 from hexacell.cell.loader import Cell
-from hexacell.screen.app import FirstCell, TechnicianApp
+from hexacell.screen.app import TechnicianApp
 from hexacell.screen.further_screens import AssistantScreen
 from hexacell.screen.overlays import QuestionOverlay, QuitOverlay
-from hexacell.text.screens.first_questions import FirstCellAssistant
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.run.questions import ask_approval
 from procedures.steps import events
@@ -96,8 +95,7 @@ async def test_what_is_pasted_into_a_name_is_no_consent(
 
 async def test_what_is_pasted_into_the_assistant_is_refused_with_a_reason(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
-    first = FirstCell(path, lambda: FirstCellAssistant(path))
-    app = TechnicianApp(lambda: pytest.fail("there is no cell"), first_cell=first)
+    app = TechnicianApp(lambda: pytest.fail("there is no cell"), first_cell=path)
     async with app.run_test(size=(80, 24)) as pilot:
         await until(lambda: isinstance(app.screen, AssistantScreen))
         await until_shown(pilot, "Question 1 of")

@@ -14,11 +14,10 @@ from hexacell.cell.limits import ExclusionSettings
 from hexacell.cell.loader import Cell
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import StatusChanged
-from hexacell.screen.app import FirstCell, TechnicianApp
+from hexacell.screen.app import TechnicianApp
 from hexacell.screen.further_screens import AssistantScreen
 from hexacell.screen.preferences import THEMES
 from hexacell.screen.workplace import Preflight, TriedPlan
-from hexacell.text.screens.first_questions import FirstCellAssistant
 from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.command_loop import Status
@@ -183,8 +182,7 @@ SCENES: dict[str, Scene] = {
 @pytest.mark.parametrize("size", SIZES)
 async def test_the_assistant_looks_as_it_did(size: str, tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
-    first = FirstCell(path, lambda: FirstCellAssistant(path))
-    app = TechnicianApp(lambda: pytest.fail("there is no cell"), first_cell=first)
+    app = TechnicianApp(lambda: pytest.fail("there is no cell"), first_cell=path)
     async with app.run_test(size=SIZES[size]) as pilot:
         await until(lambda: isinstance(app.screen, AssistantScreen))
         await until_shown(pilot, "Question 1 of")

@@ -13,12 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hexacell.errors import ExitCode, UsageError
-from hexacell.screen.app import FirstCell, TechnicianApp
+from hexacell.screen.app import TechnicianApp
 from hexacell.screen.preferences import preferences_path, read_preferences
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
-    from hexacell.text.screens.first_questions import FirstCellAssistant
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -31,8 +30,11 @@ def main(options: argparse.Namespace) -> ExitCode:
     _require_terminal()
     end_with_terminal(sys.stdin.fileno())
     path: Path = options.cell
-    first = None if path.exists() else FirstCell(path, partial(_assistant, path))
-    app = TechnicianApp(partial(_model, path), read_preferences(preferences_path()), first_cell=first)
+    app = TechnicianApp(
+        partial(_model, path),
+        read_preferences(preferences_path()),
+        first_cell=None if path.exists() else path,
+    )
     app.run()
     if app.return_code:
         return ExitCode.FAULT  # Textual has said why
@@ -48,12 +50,6 @@ def _require_terminal() -> None:
         raise UsageError("the screen needs a terminal", action=action)
     if os.environ.get("TERM") == "dumb":
         raise UsageError("this terminal cannot draw a screen (TERM is dumb)", action=action)
-
-
-def _assistant(path: Path) -> FirstCellAssistant:
-    from hexacell.text.screens.first_questions import FirstCellAssistant  # noqa: PLC0415 - loaded late
-
-    return FirstCellAssistant(path)
 
 
 def _model(path: Path) -> ScreenModel:
@@ -72,11 +68,11 @@ def end_with_terminal(terminal: int) -> None:
     What is drawn then can be written nowhere: Textual's queue of it fills, and the process would wait for
     ever. Its run notices that nobody is there, and pauses.
     """
-    threading.Thread(target=_wait_and_end, args=(terminal,), daemon=True).start()
 
+    def wait_and_end() -> None:
+        waiting = select.poll()
+        waiting.register(terminal, 0)  # a hang-up is reported even where nothing is asked for
+        waiting.poll()
+        os._exit(int(ExitCode.INTERRUPTED))
 
-def _wait_and_end(terminal: int) -> None:
-    waiting = select.poll()
-    waiting.register(terminal, 0)  # a hang-up is reported even where nothing is asked for
-    waiting.poll()
-    os._exit(int(ExitCode.INTERRUPTED))
+    threading.Thread(target=wait_and_end, daemon=True).start()

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.run_process.audience import Audience, AudienceEvents, audience_server
+from hexacell.run_process.audience import Audience, audience_server
 from hexacell.run_process.client import HostConnection, connect_to_run
 from hexacell.run_process.messages import ControlChanged, HostMessage, StatusChanged, message_line
 from hexacell.run_process.run_socket import listening_socket
@@ -71,13 +71,10 @@ class ScriptedRun:
         note = self.calls.put_nowait
         self.audience = Audience(
             lambda: [message_line(FIRST)],
-            AudienceEvents(
-                note,
-                lambda: note("control"),
-                lambda keep_running: note(("left", keep_running)),
-                lambda: note("lost"),
-            ),
-            stuck_s,
+            on_command=note,
+            on_control=lambda: note("control"),
+            on_leave=lambda leave: note("lost" if leave is None else ("left", leave.keep_running)),
+            stuck_s=stuck_s,
         )
 
         self._clients: list[Client] = []

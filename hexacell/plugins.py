@@ -66,7 +66,9 @@ def _only(group: Group, name: str) -> EntryPoint:
     points = _announced(group, tuple(sys.path)).select(name=name)
     by_target = {point.value: point for point in points}
     if not by_target:
-        raise _unknown(group, name)
+        known = names(group)
+        action = did_you_mean(name, known) or f"Known are: {', '.join(known) or 'none'}"
+        raise UsageError(f"there is no {group.noun} '{name}'", action=action)
     found = list(by_target.values())
     if len(found) > 1:
         raise UsageError(
@@ -74,12 +76,6 @@ def _only(group: Group, name: str) -> EntryPoint:
             action="Uninstall all but one",
         )
     return found[0]
-
-
-def _unknown(group: Group, name: str) -> UsageError:
-    known = names(group)
-    action = did_you_mean(name, known) or f"Known are: {', '.join(known) or 'none'}"
-    return UsageError(f"there is no {group.noun} '{name}'", action=action)
 
 
 def _broken(group: Group, point: EntryPoint, reason: str) -> UsageError:

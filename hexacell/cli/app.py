@@ -37,7 +37,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _require_usable(typed)
             options = parser.parse_args(typed)
             require_platform(options.target)
-            return _unless_output_is_lost(_carried_out(options, typed), console)
+            code = _carried_out(options, typed)
+            if code or (lost := lost_output()) is None:
+                return code
+            # What nobody can read is not done.
+            console.error(f"hexacell: the output could not be written: {lost.strerror}")
+            return int(ExitCode.USAGE)
     except KeyboardInterrupt:
         return _failed("interrupted", ExitCode.INTERRUPTED, console)
     except HexacellError as error:
@@ -93,14 +98,6 @@ def _require_usable(typed: Sequence[str]) -> None:
             raise UsageError(
                 f"'{argument[:20]}...' is not a valid file name", action="Shorten or correct it"
             )
-
-
-def _unless_output_is_lost(code: int, console: Console) -> int:
-    """The code of a command, which is not done if nobody can read its output."""
-    if code or (lost := lost_output()) is None:
-        return code
-    console.error(f"hexacell: the output could not be written: {lost.strerror}")
-    return int(ExitCode.USAGE)
 
 
 def _failed(message: str, code: ExitCode, console: Console) -> int:

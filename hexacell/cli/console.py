@@ -41,7 +41,9 @@ def _write(stream: TextIO | None, text: str) -> None:
     if stream is None:  # closed before the program began
         return
     try:
-        stream.write(_writable(text, stream))
+        # A locale may know no letter beyond ASCII.
+        encoding = stream.encoding or "utf-8"
+        stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
         stream.flush()
     except BrokenPipeError:
         _discard_rest(stream)
@@ -57,12 +59,6 @@ def lost_output() -> OSError | None:
 
 
 _lost: list[OSError] = []
-
-
-def _writable(text: str, stream: TextIO) -> str:
-    """The text as the stream's encoding can have it: a locale may know no letter beyond ASCII."""
-    encoding = stream.encoding or "utf-8"
-    return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def _discard_rest(stream: TextIO) -> None:

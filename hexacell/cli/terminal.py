@@ -159,13 +159,7 @@ class KeyboardCommands:
         if number:
             return {} if at is None or again is None else {"m": lambda: MeasureAgain(at, again)}
         here: dict[str, Callable[[], Command]] = {} if at is None else {"m": lambda: MeasureAgain(at)}
-        return here | {
-            "p": Pause,
-            "P": lambda: Pause(at_once=True),
-            "r": Resume,
-            "u": Undo,
-            "a": Abort,
-        }
+        return here | {"p": Pause, "P": lambda: Pause(at_once=True), "r": Resume, "u": Undo, "a": Abort}
 
 
 class TerminalOperator:

@@ -192,11 +192,7 @@ class GiveCommand(Frozen):
     """Give the engine a command; only who is in control may."""
 
     kind: Literal["command"] = "command"
-    command: Annotated[
-        Command,
-        BeforeValidator(_command_in),
-        PlainSerializer(_command_document),
-    ]
+    command: Annotated[Command, BeforeValidator(_command_in), PlainSerializer(_command_document)]
 
 
 class TakeControl(Frozen):

@@ -15,13 +15,7 @@ from textual.widgets import Input
 
 from hexacell.screen.preferences import KEYS, preferences_path, shown_path
 from hexacell.screen.widgets import DevicePanel, TextList, TextPanel
-from hexacell.text.screens.help_texts import (
-    KEYS_NOTE,
-    KEYS_TITLE,
-    REPLAY_HELP,
-    SCREEN_HELP,
-    reflowed,
-)
+from hexacell.text.screens.help_texts import KEYS_NOTE, KEYS_TITLE, REPLAY_HELP, SCREEN_HELP, reflowed
 from hexacell.text.screens.views import FaultView, QuestionView
 
 if TYPE_CHECKING:

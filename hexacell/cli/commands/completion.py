@@ -19,13 +19,7 @@ FOLDER, FILE = shtab.DIRECTORY, shtab.FILE
 # Zsh takes a single pattern in parentheses for a qualifier of files, so there are two of each.
 TOML_FILE, CSV_FILE = shtab.glob("*.toml", "*.TOML"), shtab.glob("*.csv", "*.CSV")
 
-BY_NAME = {
-    "CELL": TOML_FILE,
-    "RUN": FOLDER,
-    "FOLDER": FOLDER,
-    "FILE": FILE,
-    "PORT": FILE,
-}
+BY_NAME = {"CELL": TOML_FILE, "RUN": FOLDER, "FOLDER": FOLDER, "FILE": FILE, "PORT": FILE}
 """What a shell offers for a value, by the value's name in the help."""
 
 BY_OPTION = {"--measurements": CSV_FILE}

@@ -54,7 +54,7 @@ from procedures.steps import events
 
 def main(options: argparse.Namespace) -> ExitCode:
     """Calibrate a cell, or check it."""
-    mode = _mode(options)
+    mode = Mode(options.mode or ("check" if options.unattended else "optimise"))
     if mode is Mode.CHECK and options.length_check:
         raise UsageError(
             "a check does not check the length scale", action="Use `hexacell length`, or --mode optimise"
@@ -103,12 +103,6 @@ def demo(options: argparse.Namespace) -> ExitCode:
     request = prepare_demo(options.folder, options.config)
     console.print(demo_opening(request.cell.settings.mechanism.words.machine, request.cell.config_path))
     return _run_to_end(request, console)
-
-
-def _mode(options: argparse.Namespace) -> Mode:
-    if options.mode:
-        return Mode(options.mode)
-    return Mode.CHECK if options.unattended else Mode.OPTIMISE
 
 
 def _run_to_end(request: RunRequest, console: Console, stream: EventStream | None = None) -> ExitCode:

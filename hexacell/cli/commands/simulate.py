@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
@@ -21,7 +20,10 @@ def main(options: argparse.Namespace) -> ExitCode:
     console = Console()
     cell = with_faults(cell_at(options.cell, console), options.fault)
     if options.output is not None:
-        _require_other(options.output, (cell.path, *cell.config_paths))
+        own = {path.resolve() for path in (cell.path, *cell.config_paths)}
+        if options.output.resolve() in own:
+            problem = f"--output {options.output} is a file of the simulated cell"
+            raise UsageError(problem, action="Name another file")
     with _blocked_signals() as stops, served_cell(cell) as text:
         if options.output is None:
             print(text, flush=True)
@@ -30,12 +32,6 @@ def main(options: argparse.Namespace) -> ExitCode:
         print("serving; Ctrl-C ends it", file=sys.stderr, flush=True)
         signal.sigwait(stops)
     return ExitCode.DONE
-
-
-def _require_other(output: Path, own: Sequence[Path]) -> None:
-    """Refuse to write over the files of the simulated cell itself."""
-    if output.resolve() in {path.resolve() for path in own}:
-        raise UsageError(f"--output {output} is a file of the simulated cell", action="Name another file")
 
 
 @contextmanager

@@ -52,14 +52,7 @@ ANY_NUMBERS = (
     events.ProvisionalApplied,
 )
 """Events whose numbers are all used."""
-OF_PILOTS = (
-    Move,
-    Pilot,
-    events.Arrived,
-    events.PilotTaken,
-    events.RecordRejected,
-    events.PoseExcluded,
-)
+OF_PILOTS = (Move, Pilot, events.Arrived, events.PilotTaken, events.RecordRejected, events.PoseExcluded)
 """Steps and events that may be about a pilot pose."""
 
 
@@ -181,7 +174,9 @@ class _Event:
         if isinstance(step, Move | Place | Sample | Pilot):
             yield from _out_of_range(step.pose, LARGEST_NUMBER)
         reading = event if isinstance(event, events.StandstillRead) else getattr(event, "reading", None)
-        if reading is not None and not (reading.counts and all(map(_is_round, reading.counts))):
+        counts = () if reading is None else reading.counts
+        is_round = all(len(one) == LEGS and max(map(abs, one)) <= LARGEST_COUNT for one in counts)
+        if reading is not None and not (counts and is_round):
             yield "the encoders have other counts"
 
     def _content(self) -> Iterator[str]:
@@ -257,11 +252,6 @@ class _Event:
         free = len(self.settings.mechanism.convention.free_names)
         if any(len(row) != free for rows in effects.values() for row in rows):
             yield "an effect has another size"
-
-
-def _is_round(counts: tuple[int, ...]) -> bool:
-    """Whether these are counts of six encoders."""
-    return len(counts) == LEGS and max(map(abs, counts)) <= LARGEST_COUNT
 
 
 def _joint_range_problems(ranges: JointRanges | None) -> Iterator[str]:

@@ -15,7 +15,6 @@ import numpy as np
 
 from hexacell.cell.loader import Cell
 from hexacell.config.change import BEFORE, RECEIPT, ConfigChange, Receipt, kept_paths
-from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import are_same_files, fingerprint_of, read_contents_if_present
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.kinematics.geometry import Geometry
@@ -117,7 +116,7 @@ def _require_own_geometry(
         return
     found = controller_geometry(cell, *paths)
     stated = Geometry.of(cell.settings.mechanism.parameters, started.controller)
-    if not _is_same(found, stated, started):
+    if found.branch != started.branch or not np.array_equal(found.geometry.vector, stated.vector):
         raise _differs(folder, f"another geometry than {paths[0]}")
     own = stated_limits(cell.settings, found, SAME_FRAMES).joint_ranges
     if started.joint_ranges != own or started.limits != found.limits:
@@ -134,10 +133,6 @@ def _differs(folder: RunFolder, what: str) -> FileError:
 def _have_fingerprint(paths: tuple[Path, ...], sha256: str) -> bool:
     contents = read_contents_if_present(paths)
     return contents is not None and fingerprint_of(contents) == sha256
-
-
-def _is_same(found: ControllerGeometry, stated: Geometry, started: events.RunStarted) -> bool:
-    return found.branch == started.branch and np.array_equal(found.geometry.vector, stated.vector)
 
 
 def _require_own_poses(cell: Cell, folder: RunFolder, state: RunState, started: events.RunStarted) -> None:

@@ -49,9 +49,17 @@ from procedures.workflow.preflight import (
 
 EngineWatcher = Callable[[Engine, Devices], None]
 
-
-def _watch_nothing(_engine: Engine, _devices: Devices) -> None:
-    pass
+NEEDS_RESULT = {
+    Mode.QUICK: (
+        "the quick level carries on from one",
+        "Calibrate the robot with `hexacell run CELL --mode optimise`",
+    ),
+    Mode.LENGTH: (
+        "a length check needs a calibrated machine",
+        "Calibrate it with `hexacell run CELL --length-check`, which checks the scale as well",
+    ),
+}
+"""Modes that begin with an accepted result: why, and what to do where there is none."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +97,7 @@ async def calibrate(
     listeners: Sequence[Listener] = (),
     queue: CommandQueue | None = None,
     live: LiveValues | None = None,
-    on_engine: EngineWatcher = _watch_nothing,
+    on_engine: EngineWatcher | None = None,
 ) -> events.Ended:
     """Measure, identify, verify, propose and write back, as far as the mode and the results allow.
 
@@ -166,7 +174,7 @@ async def _run(
     connected: Connected,
     listeners: Sequence[Listener],
     queue: CommandQueue | None,
-    on_engine: EngineWatcher,
+    on_engine: EngineWatcher | None,
 ) -> events.Ended:
     cell, folder = replace(request.cell, settings=connected.settings), request.folder
     if not request.resume:
@@ -174,19 +182,14 @@ async def _run(
     broker = QuestionBroker(request.operator)
     policy = RecoveryPolicy.of(cell.settings.recovery, attended=not request.unattended)
     executor = StepExecutor(
-        cell,
-        calibration,
-        connected.devices,
-        connected.clock,
-        broker,
-        folder,
-        connected.thermometers,
+        cell, calibration, connected.devices, connected.clock, broker, folder, connected.thermometers
     )
     try:
         with Journal(folder.journal) as journal:
             remove_stale_temporaries(folder.path)
             engine = Engine(executor, journal, listeners, queue=queue, broker=broker, policy=policy)
-            on_engine(engine, connected.devices)
+            if on_engine is not None:
+                on_engine(engine, connected.devices)
             if engine.state.started is None:
                 engine.record(run_started(cell, calibration, connected.identities))
             engine.reopen_sets()
@@ -282,18 +285,10 @@ def new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Ca
             action="Add [length_check] with first_seat, distance_mm and uncertainty_mm",
         )
     accepted = None if mode is Mode.OPTIMISE else last_accepted_result(cell)
-    if mode is Mode.QUICK and accepted is None:
-        raise UsageError(
-            "no accepted result has this config: the quick level carries on from one",
-            subject=cell.config_path,
-            action="Calibrate the robot with `hexacell run CELL --mode optimise`",
-        )
-    if mode is Mode.LENGTH and accepted is None:
-        raise UsageError(
-            "no accepted result has this config: a length check needs a calibrated machine",
-            subject=cell.config_path,
-            action="Calibrate it with `hexacell run CELL --length-check`, which checks the scale as well",
-        )
+    if mode in NEEDS_RESULT and accepted is None:
+        why, action = NEEDS_RESULT[mode]
+        problem = f"no accepted result has this config: {why}"
+        raise UsageError(problem, subject=cell.config_path, action=action)
     return Calibration(
         cell.settings,
         robot_of(cell),

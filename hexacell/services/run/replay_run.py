@@ -69,16 +69,18 @@ def _set_up(
     cell = _cell(scratch, started, folder.journal)
     require_sound((entry.event for entry in entries), cell.settings, folder.journal)
     contents = _config_contents(folder, started, len(cell.config_paths))
-    settings = cell.settings.model_copy(
-        update={
-            "controller": _in_scratch(cell.settings.controller),
-            "identification": _identification(cell, started),
-        }
+    # The files of its config are beside the cell file, under names of their own.
+    controller = cell.settings.controller
+    further = (
+        one.model_copy(update={"config": f"{CONFIG}-{number}"})
+        for number, one in enumerate(controller.further_files, start=2)
     )
+    controller = controller.model_copy(update={"config": CONFIG, "further_files": tuple(further)})
+    changed = {"controller": controller, "identification": _identification(cell, started)}
+    settings = cell.settings.model_copy(update=changed)
     if contents is None:
         native = {"config_format": "toml", "config_options": {}, "further_files": ()}
-        controller = settings.controller.model_copy(update=native)
-        settings = settings.model_copy(update={"controller": controller})
+        settings = settings.model_copy(update={"controller": controller.model_copy(update=native)})
         contents = (_native_config(settings, started),)
     cell = replace(cell, settings=settings)
     for path, data in zip(cell.config_paths, contents, strict=True):
@@ -87,15 +89,6 @@ def _set_up(
     run.path.mkdir()
     executor = RecordedStepExecutor.of(cell, calibration_of_run(cell, started), run)
     return executor, started.model_copy(update={"config_sha256": fingerprint_of(contents)})
-
-
-def _in_scratch(controller: ControllerSettings) -> ControllerSettings:
-    """The controller with the files of its config beside the cell file, under names of their own."""
-    further = (
-        one.model_copy(update={"config": f"{CONFIG}-{number}"})
-        for number, one in enumerate(controller.further_files, start=2)
-    )
-    return controller.model_copy(update={"config": CONFIG, "further_files": tuple(further)})
 
 
 def _cell(scratch: Path, started: RunStarted, journal: Path) -> Cell:

@@ -11,7 +11,6 @@ from hexacell.cell.by_mechanism import geometry_settings
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.measuring import IdentificationSettings
 from hexacell.cell.model import CellSettings
-from hexacell.cell.robot import ControllerSettings
 from hexacell.config.change import BEFORE, ConfigChange, kept_paths
 from hexacell.config.layout import Contents, fingerprint_of, read_contents_if_present
 from hexacell.errors import FileError, HexacellError

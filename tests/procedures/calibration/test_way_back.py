@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hexacell.campaign.planner import Plan
 from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.forward import continue_solution
@@ -126,7 +127,7 @@ def test_without_an_estimate_the_return_visits_every_previous_pose(make_rig, sto
     def unknown(*_: Any) -> Any:
         raise IdentifiabilityError("the records cannot be followed")
 
-    monkeypatch.setattr(IdentificationSteps, "_known", unknown)
+    monkeypatch.setattr(Plan, "estimate", unknown)
     step = next_step(make_rig().calibration, fold(story().whole(ORIENTATIONS)[:-2]))
     assert step.key == f"P1/o{ORIENTATIONS - 1:02d}/move"
 

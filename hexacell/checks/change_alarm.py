@@ -37,7 +37,6 @@ class ChangeAlarm(Frozen):
     """Whether the first records of a check contradict a robot that has not changed since, by one parameter.
 
     Attributes:
-        records: number of records that were tested.
         score: the largest of all parameters; each is standard normal for an unchanged robot.
         limit: what the largest exceeds in one of a hundred checks of unchanged robots.
         leg: the leg that changed, if one did, by all records of the check; its likeliest ``parameter``,

@@ -50,7 +50,6 @@ class Check:
         effects: the systematic ones. A check shares the constant ones with the result before it, so that
             its records do not reduce them.
         earlier: what these did to that result, as errors (p, k) of its free parameters by effect.
-        effort: how hard poses are searched for.
     """
 
     settings: CellSettings
@@ -62,6 +61,7 @@ class Check:
     effects: tuple[Effect, ...] = ()
     earlier: Mapping[str, Array] = field(default_factory=dict)
     effort: SearchEffort = USUAL_EFFORT
+    _stated: dict[tuple[Record, ...], CheckStatement | None] = field(default_factory=dict, init=False)
 
     @cached_property
     def plan(self) -> Plan:
@@ -114,7 +114,13 @@ class Check:
         stated = self._statement(measurements, effects)
         if stated is None or stated.is_decided:
             return stated
-        further = self._further_records(measurements, effects) if stated.is_consistent else None
+        likeliest, guarded = self._estimates(measurements)
+        errors, further = (self._errors(likeliest, effects), self._errors(guarded, effects)), None
+        if stated.is_consistent and errors[0] is not None and errors[1] is not None:
+            # Each is as informative as those of well spread sets on average.
+            whole = replace(self.plan, settings=self.settings)
+            each = whole.information_per_record(likeliest.estimate.belief)
+            further = records_to_decide(errors[0], errors[1], self.limits, each)
         return replace(stated, verdict=Verdict.NOT_EVALUATED, further_records=further)
 
     def false_records(self, measurements: MeasurementSet) -> frozenset[RecordId]:
@@ -125,7 +131,7 @@ class Check:
         stated = self.statement(measurements)
         if stated is None or not stated.is_decided:
             return None
-        return f"the error at the task poses is {stated.position} mm: {stated.verdict}"
+        return f"the error at the task poses is {stated.errors.position} mm: {stated.verdict}"
 
     def _statement(
         self, measurements: MeasurementSet, effects: tuple[Effect, ...]
@@ -158,16 +164,6 @@ class Check:
     def _errors(self, estimate: ScaledEstimate, effects: tuple[Effect, ...]) -> ErrorEstimate | None:
         return ErrorEstimate.of(self.plan.task, estimate.estimate, effects, self.earlier)
 
-    def _further_records(self, measurements: MeasurementSet, effects: tuple[Effect, ...]) -> int | None:
-        """How many more would decide, each as informative as those of well spread sets on average."""
-        likeliest, guarded = self._estimates(measurements)
-        first, second = self._errors(likeliest, effects), self._errors(guarded, effects)
-        if first is None or second is None:
-            return None
-        whole = replace(self.plan, settings=self.settings)
-        each = whole.information_per_record(likeliest.estimate.belief)
-        return records_to_decide(first, second, self.limits, each)
-
     @cached_property
     def drifting(self) -> DriftEstimator | None:
         """Estimates the robot from the result before on; None without one."""
@@ -176,10 +172,6 @@ class Check:
     @cached_property
     def _by_drawing(self) -> RecordEstimator:
         return OnlineEstimator(self.robot)
-
-    @cached_property
-    def _stated(self) -> dict[tuple[Record, ...], CheckStatement | None]:
-        return {}
 
 
 def check_settings(settings: CellSettings, budget: int) -> CellSettings:

@@ -14,9 +14,8 @@ from hexacell.checks.check import Check
 from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, RecordId
-from hexacell.results.result import AcceptedResult, LengthResult
+from hexacell.results.result import AcceptedResult
 from hexacell.uncertainty.effects import Effect
-from hexacell.verdict.check_statement import CheckStatement
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy
 from hexacell.verdict.outcome import outcome_of
 
@@ -44,7 +43,6 @@ class CheckResult(Frozen):
         further_records: about how many more would decide; None where no number would, or nothing is open.
         earlier_run, earlier_at: the accepted result that it started from; None where that is the drawing.
         drift_scale: how many times as large as stated the drift since then is.
-        changes: changes of the free parameters, in the mechanism's frame convention.
         left_out: records that the others prove false.
         alarm: the test of a change by the first records; None where the robot was not identified before, or
             where there were fewer.
@@ -89,11 +87,19 @@ def check_result(
     records, points = len(measurements), len(set(measurements.points.tolist()))
     if stated is None:
         return CheckResult(verdict=Verdict.NOT_EVALUATED, records=records, points=points)
+    task = check.plan.task.reachable(stated.estimate.belief)
     return CheckResult(
         verdict=stated.verdict,
         records=records,
         points=points,
-        accuracy=_accuracy(check, stated, None if earlier is None else earlier.length),
+        accuracy=VerifiedAccuracy.of(
+            stated.errors,
+            check.limits,
+            check.robot,
+            task,
+            task_named=bool(check.settings.task.poses),
+            length=None if earlier is None else earlier.length,
+        ),
         is_consistent=stated.is_consistent,
         further_records=stated.further_records,
         earlier_run=earlier and earlier.run,
@@ -121,14 +127,6 @@ def _reason(result: CheckResult) -> str:
     if result.further_records is None:
         return "further records would not decide"
     return f"about {result.further_records} more records would decide"
-
-
-def _accuracy(check: Check, stated: CheckStatement, length: LengthResult | None) -> VerifiedAccuracy:
-    task = check.plan.task.reachable(stated.estimate.belief)
-    is_named = bool(check.settings.task.poses)
-    return VerifiedAccuracy.of(
-        stated.errors, check.limits, check.robot, task, task_named=is_named, length=length
-    )
 
 
 def _changes(estimate: OnlineEstimate) -> Iterator[ParameterChange]:

@@ -39,11 +39,9 @@ class QuickAccuracy(Frozen):
     """How well the quick level knows the robot: predicted errors at the worst task pose, 1 sigma, mm.
 
     Attributes:
-        records: number of records that it measured.
         error_mm: error by these records and what was known before.
         calibrated_mm: error that the result left which it started from.
         drift_scale: how many times as large as stated the drift since then is.
-        further: what more records would leave.
         records_to_calibrated: about how many more would leave as little as that result; 0 where these do,
             None where no sensible number would.
     """

@@ -41,9 +41,7 @@ class VirtualCampaign:
     controller commands with the estimate once the robot is known well enough.
 
     Attributes:
-        state: what the next decision depends on.
         outside: number of records at which the ball left the gauges' travel; they are not taken.
-        reason: why the plan ended.
     """
 
     plan: Plan

@@ -22,7 +22,6 @@ class QuickTrial:
 
     Attributes:
         accuracy: None where no robot could be measured.
-        points: number of points at which is measured.
         minutes: time to measure there, without held-out poses.
     """
 

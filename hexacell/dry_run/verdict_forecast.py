@@ -108,8 +108,12 @@ def forecast_verdicts(stated: Array, budget: UncertaintyBudget, limits: ErrorLim
     parts = [(line.combined_mm, line.effect.name) for line in budget.lines if not line.effect.is_estimated]
     part, name = max([(budget.noise_mm, NOISE), *parts])
     factor = limits.guard_band_factor
+    # The tests of the model fail independently.
+    tested = (1.0 - SMALLEST_PROBABILITY) ** TESTS
+    shares = {verdict: tested * verdicts.count(verdict) / len(verdicts) for verdict in Verdict}
+    shares[Verdict.NOT_EVALUATED] += 1.0 - tested
     return VerdictForecast(
-        _probabilities(verdicts),
+        shares,
         limits,
         ErrorLimits(_passing(positions, factor), _passing(orientations, factor), factor),
         name,
@@ -166,14 +170,6 @@ def _statements(errors: Array, around: Array) -> list[LargestError]:
         largest = np.linalg.norm(one + around, axis=-1).max(axis=-1)
         found.append(LargestError(value, float(np.quantile(np.abs(largest - value), COVERAGE))))
     return found
-
-
-def _probabilities(verdicts: Sequence[Verdict]) -> dict[Verdict, float]:
-    """The share of each verdict, with the tests of the model, which fail independently."""
-    tested = (1.0 - SMALLEST_PROBABILITY) ** TESTS
-    shares = {verdict: tested * verdicts.count(verdict) / len(verdicts) for verdict in Verdict}
-    shares[Verdict.NOT_EVALUATED] += 1.0 - tested
-    return shares
 
 
 def _passing(statements: Sequence[LargestError], guard_band_factor: float) -> float:

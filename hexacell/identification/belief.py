@@ -38,7 +38,6 @@ class RobotBelief:
         free: estimated free parameters (p,), mm.
         covariance: of the free parameters (p, p), mm^2.
         work_frame_turns: axes (k, 3) about which a work frame can be taught.
-        refused: commands that the controller refused.
     """
 
     mechanism: Mechanism

@@ -51,8 +51,17 @@ def read_measurements(path: Path, *, allow_partial: bool = False) -> Measurement
     if allow_partial and not text.strip():
         return MeasurementSet(())
     records = _records(path, text, HEADER)
-    if not allow_partial:
-        _require_two_rows_a_point(path, {record: line for record, (line, _) in records.items()})
+    if not allow_partial and not records:
+        raise FileError("there are no measurements in it", subject=path, action="Measure some first")
+    rows = Counter(point for point, _ in records)
+    for (point, _), (line, _) in records.items():
+        if rows[point] < 2 and not allow_partial:
+            raise FileError(
+                f"point {point} has one row, and at least two are needed to compare",
+                subject=path,
+                line=line,
+                action="Measure it in another orientation, or remove the row",
+            )
     return MeasurementSet(tuple(record for _, record in records.values()))
 
 
@@ -165,17 +174,3 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
     found = f'"{shortened(cell)}"' if cell.strip() else "empty"
     problem = f"{name} is {found}, but must be {expected}"
     raise FileError(problem, subject=path, line=line, action="Correct this cell")
-
-
-def _require_two_rows_a_point(path: Path, lines: dict[RecordId, int]) -> None:
-    if not lines:
-        raise FileError("there are no measurements in it", subject=path, action="Measure some first")
-    rows = Counter(point for point, _ in lines)
-    for (point, _), line in lines.items():
-        if rows[point] < 2:
-            raise FileError(
-                f"point {point} has one row, and at least two are needed to compare",
-                subject=path,
-                line=line,
-                action="Measure it in another orientation, or remove the row",
-            )

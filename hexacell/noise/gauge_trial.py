@@ -11,7 +11,6 @@ more, where 3 is the most.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import permutations, product
@@ -64,26 +63,16 @@ def response_of(moved_mm: Array, shown_mm: Array) -> Array:
 def judge_response(response: Array) -> tuple[TrialFinding, ...]:
     """What is wrong with the gauges by their response (3, 3); nothing if they are as they should be."""
     size = np.linalg.norm(response, axis=1)
-    alive = np.flatnonzero(size >= LEAST_RESPONSE_INCHES)
-    return tuple(_findings(size, *_best_assignment(response, size, alive)))
-
-
-def _findings(size: Array, axes: Numbers, signs: Numbers) -> Iterator[TrialFinding]:
-    """What sizes, the axes that gauges follow and their signs mean.
-
-    Of fewer than three gauges the axes are less certain: these are judged once the others live.
-    """
+    axes, signs = _best_assignment(response, size, np.flatnonzero(size >= LEAST_RESPONSE_INCHES))
+    # Of fewer than three gauges the axes are less certain: these are judged once the others live.
     if dead := [gauge for gauge in range(3) if gauge not in axes]:
-        yield TrialFinding(GaugeMistake.DEAD, tuple(dead))
-        return
+        return (TrialFinding(GaugeMistake.DEAD, tuple(dead)),)
     groups = {
         GaugeMistake.INCHES: [gauge for gauge in axes if size[gauge] < LEAST_RESPONSE],
         GaugeMistake.EXCHANGED: [gauge for gauge, axis in axes.items() if gauge != axis],
         GaugeMistake.REVERSED: [gauge for gauge, sign in signs.items() if sign < 0],
     }
-    for mistake, gauges in groups.items():
-        if gauges:
-            yield TrialFinding(mistake, tuple(gauges))
+    return tuple(TrialFinding(mistake, tuple(gauges)) for mistake, gauges in groups.items() if gauges)
 
 
 def _best_assignment(response: Array, size: Array, alive: NDArray[np.intp]) -> tuple[Numbers, Numbers]:

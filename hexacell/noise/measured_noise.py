@@ -16,7 +16,6 @@ class InstrumentNoise(Frozen):
     Attributes:
         reading: of a single reading at standstill, with its degrees of freedom; None without a series.
         drift: change over the series, zero unless significant.
-        outliers: false readings in the series, which were left out.
         correlation: of successive readings, zero unless significant.
         stated: of a record, by the cell file.
         is_noisier: whether a record is noisier by its readings alone than stated.
@@ -40,7 +39,6 @@ class AveragingForecast(Frozen):
 
     Attributes:
         error_mm: predicted at the worst task pose once all is measured, one standard deviation.
-        minutes: how much longer that takes.
     """
 
     windows: int

@@ -51,7 +51,6 @@ class NoiseReadings:
         series: readings at standstill (n, 9), mm: gauges x, y, z, then the encoders; n may be zero.
         steps: of their displays (9,), mm.
         visits: means of the settled windows at each visit (m, 9), mm, the first one included.
-        window_readings: readings in a window.
     """
 
     reference: Pose
@@ -81,7 +80,11 @@ class _NoiseAssessment:
 
     def result(self) -> MeasuredNoise:
         by_windows = {windows: self._of_records(windows) for windows in WINDOWS}
-        noise = {windows: self._noise(sigma) for windows, sigma in by_windows.items()}
+        stated = self.plan.robot.noise
+        noise = {
+            windows: stated.with_devices(sigma[3:].tolist(), sigma[:3].tolist())
+            for windows, sigma in by_windows.items()
+        }
         forecaster = AveragingForecaster(self.plan)
         forecasts = forecaster.forecasts(noise)
         windows = worthwhile_windows(forecasts, self.plan.settings.noise.averaged_windows)
@@ -122,9 +125,13 @@ class _NoiseAssessment:
 
     def _of_records(self, windows: int) -> Array:
         """The noise (9,) of records that are means of some windows, with what does not repeat."""
-        one = self._at_least(self._allowed())
-        if self.scatter is not None and self.scatter.source is not None:
-            one = np.hypot(one, self.scatter.excess * self.scatter.source.instruments)
+        scatter, allowed = self.scatter, self.stated
+        allows_less = self.plan.settings.noise.figures == "measured"
+        if allows_less and scatter is not None and scatter.source is None:
+            allowed = self.stated * min(scatter.ratio_at_most, 1.0)  # less than stated, if visits prove it
+        one = self._at_least(allowed)
+        if scatter is not None and scatter.source is not None:
+            one = np.hypot(one, scatter.excess * scatter.source.instruments)
         if not self.reading_noise or windows == 1:
             return one
         count = self.readings.window_readings
@@ -145,16 +152,6 @@ class _NoiseAssessment:
             for noise, mm in zip(self.reading_noise, sigma.tolist(), strict=True)
         ]
         return np.array(larger)
-
-    def _allowed(self) -> Array:
-        """The stated noise (9,), or less where the cell file allows it and the visits prove it."""
-        is_allowed = self.plan.settings.noise.figures == "measured"
-        if not is_allowed or self.scatter is None or self.scatter.source is not None:
-            return self.stated
-        return self.stated * min(self.scatter.ratio_at_most, 1.0)
-
-    def _noise(self, sigma: Array) -> Noise:
-        return self.plan.robot.noise.with_devices(sigma[3:].tolist(), sigma[:3].tolist())
 
     def _instruments(self, records: Array) -> Iterator[InstrumentNoise]:
         gauges = sorted(self.plan.settings.gauges, key=lambda gauge: gauge.axis)

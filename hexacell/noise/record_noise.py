@@ -20,7 +20,7 @@ Sources: Patterson and Thompson 1971; Horn, Horn and Duncan 1975 (the fixed poin
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,7 +54,6 @@ class Repeatability:
     Attributes:
         per_axis_mm: pooled standard deviations along x, y and z.
         degrees_of_freedom: of each of them: visits minus poses.
-        poses: the number of poses visited more than once.
     """
 
     per_axis_mm: tuple[float, float, float]
@@ -84,23 +83,18 @@ def repeatability(
 
     ``left_out`` are the point and orientation of each record known to be wrong.
     """
-    groups = [rows for rows in _visits(measurements, left_out) if len(rows) > 1]
+    visits: defaultdict[tuple[float, ...], list[int]] = defaultdict(list)  # rows by point and command
+    for row, record in enumerate(measurements.records):
+        if record.id not in left_out:
+            command = (round(value, COMMAND_DIGITS) for value in record.pose.as_tuple())
+            visits[record.point, *command].append(row)
+    groups = [rows for rows in visits.values() if len(rows) > 1]
     freedom = sum(len(rows) - 1 for rows in groups)
     if not freedom:
         return None
     each = (measurements.deviations[rows] for rows in groups)
     squares = sum(np.sum((one - one.mean(axis=0)) ** 2, axis=0) for one in each)
     return Repeatability(deviation_of(np.sqrt(squares / freedom)), freedom, len(groups))
-
-
-def _visits(measurements: MeasurementSet, left_out: Collection[tuple[int, int]]) -> Iterable[list[int]]:
-    """Rows of each pose commanded at each point."""
-    visits: defaultdict[tuple[float, ...], list[int]] = defaultdict(list)
-    for row, record in enumerate(measurements.records):
-        if record.id not in left_out:
-            command = (round(value, COMMAND_DIGITS) for value in record.pose.as_tuple())
-            visits[record.point, *command].append(row)
-    return visits.values()
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +136,13 @@ def noise_levels(found: Identification) -> NoiseLevels | None:
     stated = np.array([noise.encoder, noise.gauge_mm]) ** 2
     if _Equations.at(found, stated).redundancy < 1.0:
         return None
-    variances = _solve(found, stated)
+    variances = stated
+    for _ in range(MAX_STEPS):
+        before = variances
+        step = _Equations.at(found, variances).step()
+        variances = np.maximum(variances * np.exp(step), MIN_RATIO**2 * stated)
+        if np.abs(np.log(variances / before)).max() < TOLERANCE:
+            break
     covariance = np.linalg.inv(_Equations.at(found, variances).information)
     errors = np.sqrt(np.diag(covariance))
     encoder, gauge = (
@@ -155,18 +155,6 @@ def noise_levels(found: Identification) -> NoiseLevels | None:
         for known, variance, error in zip(stated, variances, errors, strict=True)
     )
     return NoiseLevels(encoder, gauge, float(covariance[0, 1] / (errors[0] * errors[1])))
-
-
-def _solve(found: Identification, stated: Array) -> Array:
-    """The variances (2,), mm^2, that solve the estimating equation."""
-    variances = stated
-    for _ in range(MAX_STEPS):
-        before = variances
-        step = _Equations.at(found, variances).step()
-        variances = np.maximum(variances * np.exp(step), MIN_RATIO**2 * stated)
-        if np.abs(np.log(variances / before)).max() < TOLERANCE:
-            break
-    return variances
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -42,9 +42,7 @@ class ReadingNoise:
 
     Attributes:
         reading: standard deviation of a reading about the line through the series, outliers left out.
-        degrees_of_freedom: of it.
         drift: change over the series, if it is significant; zero otherwise.
-        outliers: readings that were left out.
         correlation: of successive readings, if it is significantly positive; zero otherwise.
     """
 
@@ -133,21 +131,15 @@ def _without_outliers(values: Array, step_mm: float) -> Mask:
         line = _Line.through(values, kept)
         worst = int(np.argmax(np.where(kept, np.abs(line.residuals), -1.0)))
         off = float(abs(line.residuals[worst]))
-        is_outlier = off > OUTLIER_STEPS * step_mm and _is_extreme(line, worst, step_mm)
+        # Whether it is farther off than chance explains (Student's t).
+        share, readings = 1.0 - line.influence[worst], line.freedom + 2
+        variance = (line.squares - off**2 / share) / (line.freedom - 1)
+        statistic = off / np.sqrt(max(variance, step_mm**2 / 12.0) * share)
+        is_extreme = statistic > student_limit(line.freedom - 1, 0.5 * SIGNIFICANCE / readings)
+        is_outlier = is_extreme and off > OUTLIER_STEPS * step_mm
         kept = kept & (np.arange(len(values)) != worst)
         found = kept if is_outlier else found
     return found
-
-
-def _is_extreme(line: _Line, row: int, step_mm: float) -> bool:
-    """Whether the reading with the largest residual is farther off than chance explains (Student's t)."""
-    share = 1.0 - line.influence[row]
-    others = line.squares - line.residuals[row] ** 2 / share
-    freedom = line.freedom - 1
-    variance = max(others / freedom, step_mm**2 / 12.0)
-    statistic = abs(line.residuals[row]) / np.sqrt(variance * share)
-    readings = line.freedom + 2
-    return bool(statistic > student_limit(freedom, 0.5 * SIGNIFICANCE / readings))
 
 
 def _correlation(residuals: Array) -> float:

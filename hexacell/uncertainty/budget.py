@@ -37,7 +37,6 @@ class BudgetLine:
     """One systematic effect; lengths are position errors at the task pose where it is largest.
 
     Attributes:
-        effect: what it is, its size, and where that comes from.
         through_mm: through the result, as the records had the effect.
         direct_mm: by the effect itself at the task pose.
         combined_mm: of both, which partly cancel where the effect is the same.
@@ -65,7 +64,6 @@ class UncertaintyBudget:
     Attributes:
         jacobian: (t, 6, p) of the errors by the free parameters.
         noise: (t, 6, p) errors by the noise of the readings, mm and rad, one standard deviation a column.
-        lines: the systematic effects.
         known: (t, 6) errors by the measured values of effects, mm and rad.
         has_held: whether ``noise`` contains what is not known of parameters that are not identified.
     """

@@ -36,11 +36,6 @@ class Occurrence(Enum):
         """Whether it acts while measuring."""
         return self in {Occurrence.CONSTANT, Occurrence.EVERY_STOP, Occurrence.MEASURING}
 
-    @property
-    def differs_at_stops(self) -> bool:
-        """Whether it is another one at every task pose."""
-        return self in {Occurrence.EVERY_STOP, Occurrence.STOPS_AT_WORK}
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Effect:
@@ -49,8 +44,6 @@ class Effect:
     Attributes:
         name: in tables, unique within a budget.
         size: one standard deviation of each cause, in ``unit``; of a wave, its amplitude.
-        source: where the size comes from.
-        occurrence: when it acts.
         on_poses: errors of poses (n, 6, k), mm and rad, in the base frame, by one unit of each cause.
         on_readings: likewise errors (n, 3, k), mm, of the deviations that the gauges measure.
         is_estimated: the estimator has these causes as nuisance parameters of this size, so that the

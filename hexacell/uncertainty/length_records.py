@@ -118,7 +118,6 @@ class LengthError:
     """Errors of the records by one source.
 
     Attributes:
-        name: of the source.
         columns: (n, 3, k) of the places, mm, by one standard deviation of each of its causes.
         is_shared: whether the judged geometry has the same causes.
     """

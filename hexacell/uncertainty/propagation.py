@@ -39,7 +39,6 @@ class TaskColumns:
 
     Attributes:
         through: through the result; of the opposite sign of the parameters' errors.
-        direct: by the effect itself.
         combined: of both together. Where they have the same cause, they partly cancel.
     """
 
@@ -53,12 +52,9 @@ class Propagation:
     """The linear maps at one identification, for one task.
 
     Attributes:
-        found: the identification.
         zeros: these alone are identified; None where all parameters are.
-        task: the t task poses.
         workspace: poses over which the frames are fitted.
         jacobian: (t, 6, p) of the errors at the task poses by the free parameters.
-        frames: the fit of the frames.
         earlier: errors (p, k) of the estimate that was the prior, by one unit of each cause, by the names
             of the effects; empty where the prior is a drawing.
     """
@@ -156,7 +152,7 @@ class Propagation:
         if effect.on_poses is None or effect.occurrence is Occurrence.MEASURING:
             return np.zeros((len(self.task), 6, 0))
         errors = effect.on_poses(self.task)
-        if effect.occurrence.differs_at_stops:
+        if effect.occurrence in {Occurrence.EVERY_STOP, Occurrence.STOPS_AT_WORK}:
             return each_alone(errors)
         return self.frames.remove_frame_motion(self.task.poses, errors, effect.on_poses(self.workspace))
 

@@ -128,41 +128,26 @@ def assess(
         belief = replace(belief, covariance=zeros.free_covariance)
     task = Task.of(settings, robot, belief)
     accuracy = predicted_accuracy(belief, task=task.poses, workspace=task.workspace)
+    pairs, goodness = found.strongly_correlated(), found.goodness
+    separating = decorrelating_poses(robot.belief(found), found, pairs[:SEPARATED_PAIRS])
+    commands = [pose and replace(pose, command=robot.to_command(pose.command)) for pose in separating]
+    record_noise = record_covariance(found.prediction.by_joints, found.problem.noise)
+    # Residuals that are too large, and small enough to be explained to first order.
+    is_doubtful = goodness.agreement is ChiSquareVerdict.TOO_LARGE and goodness.ratio <= CONTRADICTED_RATIO
     return Assessment(
         found=found,
         drawing=robot.mechanism.normalize_frames(robot.drawing)[0],
         noise=noise_levels(found),
         repeatability=repeatability(measurements, left_out),
-        record_noise_mm=_record_noise_mm(found),
-        correlated=_correlated(robot, found),
+        record_noise_mm=float(np.sqrt(np.mean(np.trace(record_noise, axis1=-2, axis2=-1)))),
+        correlated=tuple(zip(pairs, chain(commands, repeat(None)), strict=False)),
         task=tuple(robot.to_command(task.poses.pose(row)) for row in range(len(task.poses))),
         task_named=bool(settings.task.poses),
-        accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
+        accuracy=accuracy and replace(accuracy, after=accuracy.after.times(goodness.noise_factor)),
         budget=task.budget(found, belief, robot.effects, robot.known_effects, zeros=zeros),
         tolerance_violations=robot.tolerance_violations(found.estimate),
-        possible_causes=possible_causes(found) if _is_doubtful(found) else (),
+        possible_causes=possible_causes(found) if found.converged and is_doubtful else (),
         measured_noise=measured_noise,
         points=leave_one_point_out(found) if found.converged else (),
         zeros=zeros,
     )
-
-
-def _is_doubtful(found: Identification) -> bool:
-    """Whether the residuals are too large, and small enough to be explained to first order."""
-    goodness = found.goodness
-    is_near = found.converged and goodness.ratio <= CONTRADICTED_RATIO
-    return is_near and goodness.agreement is ChiSquareVerdict.TOO_LARGE
-
-
-def _record_noise_mm(found: Identification) -> float:
-    covariance = record_covariance(found.prediction.by_joints, found.problem.noise)
-    return float(np.sqrt(np.mean(np.trace(covariance, axis1=-2, axis2=-1))))
-
-
-def _correlated(
-    robot: Robot, found: Identification
-) -> tuple[tuple[CorrelatedPair, DecorrelatingPose | None], ...]:
-    pairs = found.strongly_correlated()
-    poses = decorrelating_poses(robot.belief(found), found, pairs[:SEPARATED_PAIRS])
-    in_commands = [pose and replace(pose, command=robot.to_command(pose.command)) for pose in poses]
-    return tuple(zip(pairs, chain(in_commands, repeat(None)), strict=False))

@@ -13,7 +13,7 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.design.criteria import add_information
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.statement import LargestError, TaskErrors
+from hexacell.uncertainty.statement import TaskErrors
 from hexacell.verdict.decision import ErrorLimits, Verdict
 
 MOST_FURTHER_RECORDS = 200
@@ -25,12 +25,9 @@ class CheckStatement:
     """Errors of the robot and the verdict on them, by the records so far.
 
     Attributes:
-        estimate: the estimate that it is made from.
         errors: of the controller's geometry at the task poses that the estimated robot reaches.
-        verdict: the verdict on these errors.
         drift_scale: the likeliest scale of the drift; None where the robot was not identified before.
         is_consistent: whether the residuals agree with the stated noise.
-        records: number of records that it is made from.
         further_records: about how many more would decide; None where no number would, or nothing is open.
     """
 
@@ -41,16 +38,6 @@ class CheckStatement:
     is_consistent: bool
     records: int
     further_records: int | None = None
-
-    @property
-    def position(self) -> LargestError:
-        """The largest position error over the task poses, mm."""
-        return self.errors.position
-
-    @property
-    def orientation(self) -> LargestError:
-        """The largest orientation error, deg."""
-        return self.errors.orientation
 
     @property
     def is_decided(self) -> bool:

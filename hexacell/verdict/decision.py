@@ -130,7 +130,6 @@ class VerifiedAccuracy(Frozen):
     Attributes:
         poses: their number, and whether the cell file names them; else they span the workspace.
         worst: the pose with the largest position error, in the controller's frames.
-        length: what a length check found; None without one.
         scale_of: what says how long a millimetre is: the encoders, or the drawing where these read angles.
     """
 

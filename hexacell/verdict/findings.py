@@ -96,7 +96,11 @@ def _verdict(assessed: Assessment) -> str:
     if assessed.does_not_repeat:
         return _no_gain(assessed)
     if assessed.refused:
-        return _contradicted(found.goodness)
+        return (
+            f"Refused: the residuals are {found.goodness.ratio:.0f} times the stated noise, and no single "
+            "mistake explains them. Check that the drawing, the controller's config and the branch are "
+            "this machine's, and that the ball and the gauges are clamped."
+        )
     if assessed.undetermined:
         return _incomplete(assessed)
     return _point_verdict(assessed) or _residual_verdict(found.goodness)
@@ -139,14 +143,6 @@ def _beyond_tolerance(violations: Sequence[ToleranceViolation], convention: Fram
     return (
         f"Refused: {names}{instead}. A good residual is no proof: measure that on the machine, and correct "
         "the drawing or its tolerance in the cell file, or find the other cause."
-    )
-
-
-def _contradicted(goodness: ChiSquareTest) -> str:
-    return (
-        f"Refused: the residuals are {goodness.ratio:.0f} times the stated noise, and no single mistake "
-        "explains them. Check that the drawing, the controller's config and the branch are this machine's, "
-        "and that the ball and the gauges are clamped."
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,11 +11,9 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import LengthCheckSettings
-from hexacell.identification.belief import RobotBelief
 from hexacell.identification.problem.prior import RecordPlacement
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.results.result import AcceptedResult, LengthResult, LengthSource
 from hexacell.robot.model import Robot
@@ -70,26 +68,14 @@ def length_statement(
     check = length_check(settings, robot, belief.estimate, judged, measured, robot.effects)
     result = length_result(check, settings.uncertainty.common_scale_um_m)
     known = judged.with_scale(belief.mechanism, belief.estimate).parameter_columns
-    error = _error_by_scale(settings, robot, belief, known, result)
+    task, error = Task.of(settings, robot, belief).reachable(belief), None
+    if len(task.poses):
+        unit = errors_by_scale(belief, task.poses, task.workspace, known)
+        sigma, limits = result.expanded_um_m / COVERAGE_FACTOR, settings.acceptance
+        errors = TaskErrors(-result.long_um_m * unit, sigma * unit[..., np.newaxis])
+        error = JudgedError.of(errors.position, limits.position_mm, limits.guard_band_factor)
     verdict = error.verdict if error is not None and result.is_consistent else Verdict.NOT_EVALUATED
     return LengthStatement(verdict=verdict, result=result, error=error)
-
-
-def _error_by_scale(
-    settings: CellSettings,
-    robot: Robot,
-    belief: RobotBelief,
-    known: Mapping[str, Array],
-    result: LengthResult,
-) -> JudgedError | None:
-    task = Task.of(settings, robot, belief).reachable(belief)
-    if not len(task.poses):
-        return None
-    unit = errors_by_scale(belief, task.poses, task.workspace, known)
-    sigma = result.expanded_um_m / COVERAGE_FACTOR
-    errors = TaskErrors(-result.long_um_m * unit, sigma * unit[..., np.newaxis])
-    limits = settings.acceptance
-    return JudgedError.of(errors.position, limits.position_mm, limits.guard_band_factor)
 
 
 def length_check(

@@ -55,14 +55,20 @@ def model_tests(found: Identification, updated: Identification) -> tuple[ModelTe
     held_out = ~np.isin(updated.problem.labels[:, 0], found.problem.labels[:, 0])
     predicted = prediction_test(updated, held_out)
     return (
-        _residual_test(found.goodness),
-        _prediction_test(HELD_OUT, predicted, "The held-out records", SMALLEST_PROBABILITY),
+        _model_test("residuals", found.goodness, "The residuals", passed=found.goodness.is_explained),
+        # Records that are too close to their prediction are no evidence against the model.
+        _model_test(
+            HELD_OUT,
+            predicted,
+            "The held-out records",
+            passed=predicted.probability >= SMALLEST_PROBABILITY,
+        ),
         *(
-            _prediction_test(
+            _model_test(
                 f"point {one.point} from the others",
                 one.test,
                 f"The records of point {one.point}, predicted from the other points,",
-                SMALLEST_PROBABILITY / len(points),
+                passed=one.test.probability >= SMALLEST_PROBABILITY / len(points),
             )
             for one in points
         ),
@@ -95,7 +101,8 @@ def confirmed(tests: Sequence[ModelTest], updated: Identification, rows: Mask) -
     """
     what = "The confirming records, predicted from all others,"
     test = prediction_test(updated, rows)
-    confirming = _prediction_test("confirming records", test, what, CONFIRMING_PROBABILITY)
+    agrees = test.probability >= CONFIRMING_PROBABILITY
+    confirming = _model_test("confirming records", test, what, passed=agrees)
     if not confirming.passed:
         return (*tests, confirming)
     by_chance = (
@@ -111,23 +118,10 @@ def _with_sentence(test: ModelTest, further: str) -> ModelTest:
     return test.model_copy(update={"sentence": f"{test.sentence.rstrip('.')}; {further}"})
 
 
-def _residual_test(test: ChiSquareTest) -> ModelTest:
-    sentence = _sentence("The residuals", test, test.is_explained)
-    return ModelTest(
-        name="residuals", passed=test.is_explained, sentence=sentence, probability=test.probability
-    )
-
-
-def _prediction_test(name: str, test: ChiSquareTest, what: str, smallest: float) -> ModelTest:
-    """Records that are too close to their prediction are no evidence against the model."""
-    passed = test.probability >= smallest
-    sentence = _sentence(what, test, passed)
-    return ModelTest(name=name, passed=passed, sentence=sentence, probability=test.probability)
-
-
-def _sentence(what: str, test: ChiSquareTest, passed: bool) -> str:
+def _model_test(name: str, test: ChiSquareTest, what: str, *, passed: bool) -> ModelTest:
+    sentence = f"{what} are {test.ratio:.1f} times as far off as the stated noise explains."
     if passed:
-        return f"{what} agree with the stated noise."
-    if test.expected < 0.5:
-        return f"{what} prove nothing: there are no more records than unknowns."
-    return f"{what} are {test.ratio:.1f} times as far off as the stated noise explains."
+        sentence = f"{what} agree with the stated noise."
+    elif test.expected < 0.5:
+        sentence = f"{what} prove nothing: there are no more records than unknowns."
+    return ModelTest(name=name, passed=passed, sentence=sentence, probability=test.probability)

@@ -74,7 +74,6 @@ class Verification(Frozen):
     Attributes:
         accuracy: None where the robot can reach no task pose, or no estimate was found.
         before_mm, after_mm: mean deviation at the held-out poses that were measured before and after.
-        is_worse: whether the deviations after are significantly larger.
     """
 
     verdict: Verdict
@@ -136,7 +135,12 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
     if settings.encoders.are_of_controller and settings.controller.joints_include_zeros:
         tests = with_zeros_doubted(tests)
     accuracy = verified_accuracy(settings, robot, found, updated, held_out.length)
-    tests = (*tests, *_length_test(accuracy))
+    if accuracy is not None and (length := accuracy.length) is not None:
+        sentence = "The records of the length check agree with each other."
+        if not length.is_consistent:
+            sentence = f"The length check says nothing: {length.reason}."
+        test = ModelTest(name="length check", passed=length.is_consistent, sentence=sentence)
+        tests = (*tests, test)
     worse = is_worse(before, after, _noise_in_mm(robot, updated))
     return Verification(
         verdict=_verdict(tests, accuracy, worse=worse),
@@ -184,16 +188,6 @@ def _noise_in_mm(robot: Robot, updated: Identification) -> Noise:
     covariances = robot.noise.encoder_covariance(updated.prediction.by_joints)
     ball_mm = float(np.sqrt(np.mean(np.trace(covariances, axis1=1, axis2=2)) / 3.0))
     return replace(robot.noise, encoder=ball_mm)
-
-
-def _length_test(accuracy: VerifiedAccuracy | None) -> tuple[ModelTest, ...]:
-    """Whether the records of a length check agree with each other; empty without one."""
-    length = accuracy and accuracy.length
-    if not length:
-        return ()
-    agree = "The records of the length check agree with each other."
-    sentence = agree if length.is_consistent else f"The length check says nothing: {length.reason}."
-    return (ModelTest(name="length check", passed=length.is_consistent, sentence=sentence),)
 
 
 def _verdict(tests: Sequence[ModelTest], accuracy: VerifiedAccuracy | None, *, worse: bool) -> Verdict:

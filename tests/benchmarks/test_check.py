@@ -115,7 +115,7 @@ def checked(job: tuple[Calibrated, Array, int]) -> Outcome:
     campaign = campaign_of(check, change, number)
     stated = check.final_statement(campaign.measurements)
     assert stated is not None
-    value, expanded = stated.position.value, stated.position.expanded
+    value, expanded = stated.errors.position.value, stated.errors.position.expanded
     true = error_of(check, change)
     return Outcome(stated.verdict, stated.records, value, expanded, true, campaign.outside)
 
@@ -163,7 +163,7 @@ def hidden_changes(known: Calibrated) -> list[Array]:
     factor = np.linalg.cholesky(check.before.drift)
     by_drift = jacobian[:, :3] @ factor
     estimated = jacobian[:, :3] @ (factor - belief.covariance @ np.linalg.solve(prior, factor))
-    wanted = LIMIT_MM + stated.position.expanded
+    wanted = LIMIT_MM + stated.errors.position.expanded
     found = []
     for errors in by_drift:
         axes = np.linalg.svd(errors)[0].T[:2]

@@ -56,13 +56,11 @@ class DeletionTest:
     """The test of a record against a fit without it, and what is wrong with it if it disagrees.
 
     Attributes:
-        kind: what is wrong.
         gauges: the faulty gauges, of ``xyz``; empty if no single one is at fault.
         offset_mm: the errors of the gauges x, y and z; None next to a singularity.
         leg: a leg (from 1) whose joint variable is an outlier, and its distance from the commanded
             position, mm.
         statistics: the tests of the fit's records and this one; None next to a singularity.
-        row: the record among them.
     """
 
     record: RecordId

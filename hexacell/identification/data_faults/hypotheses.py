@@ -34,7 +34,6 @@ class FaultHypothesis(ABC):
 
     Attributes:
         gain: the decrease of the chi-square if it is true, to first order.
-        unknowns: how many numbers it is free to choose.
     """
 
     gain: float = field(compare=False)

@@ -151,7 +151,6 @@ class UncorrectableFaultError(Exception):
     """A fault of the records that cannot be corrected by leaving some of them out.
 
     Attributes:
-        fault: what is wrong.
         before: the fit that does not explain it.
         after: the fit corrected for it.
         left: the records that are left without it.

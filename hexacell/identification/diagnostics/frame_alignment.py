@@ -101,20 +101,16 @@ class FrameFit:
 
     def coefficients(self, errors: Array) -> Array:
         """The best (t, f, p) (9, ...), mm and rad, for errors (n, 6, ...)."""
-        scale, free = np.repeat([1.0, self.length], 3), self._free
+        scale = np.repeat([1.0, self.length], 3)
+        # From shifts, turns about the free axes and of the platform to (t, f, p).
+        free = np.zeros((9, 6 + len(self.turns)))
+        free[:3, :3] = free[6:, -3:] = np.eye(3)
+        free[3:6, 3:-3] = self.turns.T
         design = (frame_derivatives(self.workspace) * scale[:, None]).reshape(-1, 9) @ free
         values = (errors.reshape(len(errors), 6, -1) * scale[:, None]).reshape(len(design), -1)
         # Equal poses do not determine the frames; lstsq then gives the smallest change.
         best: Array = free @ np.linalg.lstsq(design, values)[0]
         return best.reshape(9, *errors.shape[2:])
-
-    @property
-    def _free(self) -> Array:
-        """Matrix (9, 6 + k) from shifts, turns about the free axes and of the platform to (t, f, p)."""
-        free = np.zeros((9, 6 + len(self.turns)))
-        free[:3, :3] = free[6:, -3:] = np.eye(3)
-        free[3:6, 3:-3] = self.turns.T
-        return free
 
     def remove_frame_motion(self, poses: PoseBatch, errors: Array, workspace_errors: Array) -> Array:
         """Errors (k, 6, ...) of other poses minus what the best frames explain, to first order."""
@@ -198,34 +194,22 @@ def closest_frames(
 ) -> FrameTransform:
     """The change of frames that brings n poses closest to n others; rotations count by ``length``, mm."""
     pivot = np.where([axis in freedom.shift for axis in "xyz"], targets.positions.mean(axis=0), 0.0)
-    solution = _pseudoinverse(freedom, length, targets, pivot)
+    # Turns are about the pivot and times the length: where the poses leave a choice, the smallest change is
+    # then a small one everywhere among them.
+    design = frame_derivatives(PoseBatch(targets.positions - pivot, targets.rotations))
+    design[:, 3:] *= length
+    design[:, :, 3:] /= length
+    solution = np.linalg.pinv(design.reshape(-1, 9)[:, freedom.columns], rcond=UNDETERMINED)
     weights = np.repeat([1.0, length], 3)
     frames = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
     for _ in range(CHOICE_ITERATIONS):
         errors = pose_errors(frames.poses(reached), targets) * weights
         step = np.zeros(9)
         step[freedom.columns] = solution @ errors.ravel()
-        frames = frames.then(_change(step, length, pivot))
+        shift, base, platform = step.reshape(3, 3) / np.array([[1.0], [length], [length]])
+        turn = rotations.from_vector(-base)
+        moved = pivot + turn.T @ (shift - pivot)
+        frames = frames.then(FrameTransform(turn, moved, rotations.from_vector(platform)))
         if np.abs(step).max() < CHOICE_TOLERANCE * length:
             break
     return frames
-
-
-def _pseudoinverse(freedom: FrameFreedom, length: float, targets: PoseBatch, pivot: Array) -> Array:
-    """The best free changes (k, 6n), all in mm, for weighted errors.
-
-    Turns are about the pivot and times the length: where the poses leave a choice, the smallest change
-    is then a small one everywhere among them.
-    """
-    centred = PoseBatch(targets.positions - pivot, targets.rotations)
-    design = frame_derivatives(centred)
-    design[:, 3:] *= length
-    design[:, :, 3:] /= length
-    return np.asarray(np.linalg.pinv(design.reshape(-1, 9)[:, freedom.columns], rcond=UNDETERMINED))
-
-
-def _change(step: Array, length: float, pivot: Array) -> FrameTransform:
-    """The change of frames that removes a shift, a turn of the base and one of the platform (9,), mm."""
-    shift, base, platform = step.reshape(3, 3) / np.array([[1.0], [length], [length]])
-    turn = rotations.from_vector(-base)
-    return FrameTransform(turn, pivot + turn.T @ (shift - pivot), rotations.from_vector(platform))

@@ -77,7 +77,6 @@ class ToleranceViolation:
 
     Attributes:
         change: from the drawing, in the frames and with the ball's offset that suit the robot best.
-        unit: ``mm`` or ``mrad``.
         instead: joints in text, such as "B3" or "leg 2 length", any of which out of its tolerance would
             explain the records as well.
     """
@@ -155,7 +154,8 @@ def _violations(
 ) -> tuple[ToleranceViolation, ...]:
     """The parameters whose ``errors`` (P,), in units of their tolerances, are not zero."""
     parameters = fitter.drawing.parameters
-    sizes = np.array([errors * fitter.widths, fitter.widths, fitter.sigma(frames)]) / parameters.like_a_mm
+    sigma = np.sqrt(np.diag(fitter.covariance_in(frames))) * fitter.widths
+    sizes = np.array([errors * fitter.widths, fitter.widths, sigma]) / parameters.like_a_mm
     return tuple(
         ToleranceViolation(
             name=parameter.name,
@@ -177,7 +177,6 @@ class ToleranceFit:
     Attributes:
         frames: from the convention's to those of the drawing.
         errors: (P,) of its parameters, in units of their tolerances.
-        distance: T.
         limit: which T exceeds with ``PROBABILITY`` if the robot is within its tolerances.
         pressure: (P,) how much T falls with more of a tolerance.
     """
@@ -217,17 +216,15 @@ class ToleranceFitter:
             best = at.solve(reach)
             if not at.distance(best) < (1.0 - LEAST_GAIN) * distance:
                 return at.result(best)
-            there = _Step(self, at.changed_frames(best), without)
+            change = np.zeros(9)
+            change[self.frame_columns] = best[: at.frame_count] * self.frame_scales
+            there = _Step(self, at.frames.then(_small_change(change)), without)
             moved = np.concatenate([np.zeros(at.frame_count), best[at.frame_count :]])
             if there.distance(moved) < (1.0 - LEAST_GAIN) * distance:
                 at, values, distance = there, moved, there.distance(moved)
             else:
                 reach *= SMALLER
         return at.result(values)
-
-    def sigma(self, frames: FrameTransform) -> Array:
-        """Standard deviations (P,) of the identified parameters in some frames, in their own units."""
-        return np.asarray(np.sqrt(np.diag(self.covariance_in(frames))) * self.widths)
 
     @cached_property
     def widths(self) -> Array:
@@ -255,11 +252,6 @@ class ToleranceFitter:
         steps = STEP * np.eye(9)[self.frame_columns]
         derivatives = np.array([changed(step) - changed(-step) for step in steps]).T / (2.0 * STEP)
         return np.asarray(derivatives * self.frame_scales / self.widths[:, None])
-
-    @cached_property
-    def by_ball(self) -> Array:
-        """Derivatives (P, 3) by the ball's offset, in units of its tolerance and the parameters'."""
-        return self.tolerances.ball_mm * self.drawing.parameters.ball_offset.T / self.widths[:, None]
 
     @property
     def frame_columns(self) -> list[int]:
@@ -290,7 +282,10 @@ class _Step:
         self.largest[list(without)] = np.inf
         noise = fitter.covariance_in(frames) + ROUNDING**2 * np.eye(len(self.largest))
         self.root = np.linalg.cholesky(noise)
-        self.moving = np.hstack([fitter.by_frames(frames), fitter.by_ball])
+        drawing = fitter.drawing.parameters
+        # By the ball's offset, in units of its tolerance and the parameters'.
+        by_ball = fitter.tolerances.ball_mm * drawing.ball_offset.T / fitter.widths[:, None]
+        self.moving = np.hstack([fitter.by_frames(frames), by_ball])
         self.columns = np.linalg.solve(self.root, np.hstack([self.moving, -np.eye(len(self.largest))]))
         self.constant = np.linalg.solve(self.root, fitter.difference(frames))
         self.frame_count = len(fitter.frame_columns)
@@ -320,12 +315,6 @@ class _Step:
             method="bvls",
         )
         return np.asarray(solved.x)
-
-    def changed_frames(self, values: Array) -> FrameTransform:
-        """The frames after the small change in some values."""
-        change = np.zeros(9)
-        change[self.fitter.frame_columns] = values[: self.frame_count] * self.fitter.frame_scales
-        return self.frames.then(_small_change(change))
 
     def result(self, values: Array) -> ToleranceFit:
         """The fit of the best values."""

@@ -49,7 +49,6 @@ class Problem:
         joints: (n, 6), mm, measured by the encoders.
         deviations: (n, 3), mm, in the convention's base frame.
         first_rows: (m,) row at which each point begins.
-        commands: the commanded poses.
         initial_parameters: free parameters (p,), mm, at which the solver starts: those of the last
             provisional geometry, or of the geometry that commanded most records, usually the drawing.
         start: poses that close ``initial_parameters`` at ``joints``.
@@ -220,13 +219,10 @@ class Assumptions:
 
     Attributes:
         controller: under which the records were commanded.
-        branch: of the controller's inverse kinematics.
         provisional: geometries, in the frame convention, that commanded in the controller's frames for a
             while; the last one was used last.
         earlier: geometries that may have commanded records from before the last calibration, in frames of
             their own.
-        systematic: the errors of records that are no noise.
-        unknowns: how many parameters the records are to determine; 0: all.
     """
 
     mechanism: Mechanism
@@ -272,7 +268,10 @@ class Assumptions:
         initial = self.provisional[-1] if self.provisional else commands.most_frequent_geometry
         free = mechanism.convention.free_parameters(initial)
         if known is not None and np.array_equal(known.initial_parameters, free):
-            start = _extended_start(known, rows, initial, commands, joints)
+            added = np.flatnonzero(rows < 0)
+            solved = commands[added].solve_poses(initial, joints[added])
+            found = _interleaved(known.has_start_pose, rows, solved.found)
+            start = ForwardResult(known.start[rows].with_rows(added, solved.poses), found)
         else:
             start = commands.solve_poses(initial, joints)
         _require_start_poses(start.found, labels)
@@ -299,16 +298,6 @@ def _interleaved(known: Values, rows: NDArray[np.intp], new: Values) -> Values:
     values = known[rows]
     values[rows < 0] = new
     return values
-
-
-def _extended_start(
-    known: Problem, rows: NDArray[np.intp], initial: Geometry, commands: CommandedPoses, joints: Array
-) -> ForwardResult:
-    """The start poses of a known problem, in the order of ``rows`` (n,), and of the new records."""
-    new = np.flatnonzero(rows < 0)
-    solved = commands[new].solve_poses(initial, joints[new])
-    found = _interleaved(known.has_start_pose, rows, solved.found)
-    return ForwardResult(known.start[rows].with_rows(new, solved.poses), found)
 
 
 def _require_start_poses(found: Mask, labels: NDArray[np.int_]) -> None:

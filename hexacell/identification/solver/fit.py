@@ -73,7 +73,6 @@ class SolverOptions:
     """Options of the solver.
 
     Attributes:
-        damping: initial damping.
         step_mm: the iteration ends when the largest step is below this; mrad of an angle.
         iterations: the largest number of iterations in one search.
         searches: the largest number of searches around singularities.

@@ -35,7 +35,6 @@ class LinearizedModel:
     """The linear model of n records at its own minimum.
 
     Attributes:
-        problem: the records.
         weights: (n, 3, 3), 1/mm^2.
         residuals: (n, 3), mm, centred: predicted position less measured deviation.
         jacobian: (n, 3, p), centred.
@@ -146,7 +145,12 @@ class LinearCosts:
         step, cost = _least_squares(both, np.concatenate([values, from_centre]))
         of_prior = from_centre + factor @ step[: len(self.prediction.free)]
         covariance = np.linalg.inv(both.T @ both)[: len(step) - self.common.shape[-1]]
-        taken = float(np.sum(covariance[:, : len(covariance)] * self._information(system)))
+        # Fisher information (p, p) of the rows on the parameters, whatever the causes are.
+        by_parameters, by_causes = np.split(system, [len(self.prediction.free)], axis=1)
+        shared = by_causes.T @ by_parameters
+        information = by_parameters.T @ by_parameters
+        information = information - shared.T @ np.linalg.solve(by_causes.T @ by_causes, shared)
+        taken = float(np.sum(covariance[:, : len(covariance)] * information))
         return ChiSquareTest(cost - float(of_prior @ of_prior), self.problem.coordinates - taken)
 
     def _system(self, rows: Mask) -> tuple[Array, Array]:
@@ -157,13 +161,6 @@ class LinearCosts:
         causes = self.common.shape[-1]
         unit = np.eye(jacobian.shape[-1])[jacobian.shape[-1] - causes :]
         return np.concatenate([system.rows, unit]), np.concatenate([system.values, np.zeros(causes)])
-
-    def _information(self, system: Array) -> Array:
-        """Fisher information (p, p) of the rows on the parameters, whatever the causes are."""
-        by_parameters, by_causes = np.split(system, [len(self.prediction.free)], axis=1)
-        shared = by_causes.T @ by_parameters
-        information: Array = by_parameters.T @ by_parameters
-        return information - shared.T @ np.linalg.solve(by_causes.T @ by_causes, shared)
 
     def _only_parameters(self, factor: Array) -> Array:
         """Rows that do not depend on the causes."""

@@ -34,15 +34,12 @@ class Prediction:
     """The measurement model at one geometry, linearized.
 
     Attributes:
-        free: free parameters (p,), mm.
-        poses: the platform's poses at the measured joint variables.
         residuals: (n, 3), mm: predicted position minus measured deviation, with each point's unknown
             constant.
         weights: (n, 3, 3), 1/mm^2: inverse covariance of one record.
         pose_jacobian: (n, 6, p) of position, mm, and rotation vector, rad, by the free parameters.
         by_joints: (n, 3, 6) of the ball's position by the joint variables.
         mode: (n,) the assembly mode, see :func:`hexacell.kinematics.sensitivity.assembly_mode`.
-        singular: (n,) whether a record is next to a singularity.
     """
 
     free: Array
@@ -112,12 +109,7 @@ def record_weights(position_by_joints: Array, noise: Noise) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReducedSystem:
-    """Whitened rows of the linear least-squares problem, those of the priors on w and k included.
-
-    Attributes:
-        rows: (r, p).
-        values: (r,).
-    """
+    """Whitened rows (r, p) and values (r,) of least squares, those of the priors on w and k included."""
 
     rows: Array
     values: Array

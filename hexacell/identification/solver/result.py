@@ -44,9 +44,7 @@ class DataFault:
     """Records that disagree with the others, and why.
 
     Attributes:
-        kind: what is wrong with them.
         sentence: what is wrong and how it shows, for people.
-        action: the next thing to do.
         gauges: the gauges concerned, of ``xyz``; empty if no single one is at fault.
         left_out: the records left out; empty where the data are refused.
         offset_mm: what the gauges x, y and z of a record read too much; None where that is unknown.
@@ -91,7 +89,6 @@ class Solution:
     """The last iterate of the solver.
 
     Attributes:
-        prediction: the model at the solution.
         information: Fisher information of the data alone (p, p), 1/mm^2.
         chi2: weighted sum of squares of the centred residuals.
         singular: (n,) bool, the records that ended the iteration with ``SINGULAR``.
@@ -140,7 +137,6 @@ class Identification:
         problem: the records that were used.
         solution: the solver's last iterate.
         active_prior: precision (p, p), 1/mm^2, of the prior where it was not released.
-        data_faults: what is wrong with the records that were left out.
     """
 
     problem: Problem

@@ -84,7 +84,7 @@ def test_an_unchanged_robot_passes_before_the_budget_is_used(unchanged) -> None:
     check, state = unchanged
     stated = said(check, state.measurements)
     assert stated.verdict is Verdict.PASS
-    assert stated.position.value + stated.position.expanded <= 0.15
+    assert stated.errors.position.value + stated.errors.position.expanded <= 0.15
     assert stated.drift_scale == 1.0
     assert stated.records == len(state.measurements) < check.budget
     assert stated.further_records is None
@@ -92,7 +92,7 @@ def test_an_unchanged_robot_passes_before_the_budget_is_used(unchanged) -> None:
 
 def test_the_statement_covers_the_true_error(unchanged) -> None:
     check, state = unchanged
-    position = said(check, state.measurements).position
+    position = said(check, state.measurements).errors.position
     assert abs(position.value) <= position.expanded
 
 
@@ -150,7 +150,7 @@ def test_without_a_result_a_robot_as_drawn_is_checked_from_its_tolerances(make_c
     stated = said(check, carried_out(check, truth).measurements)
     assert stated.drift_scale is None
     assert stated.verdict in {Verdict.FAIL, Verdict.NOT_EVALUATED}
-    assert stated.position.value > 1.0
+    assert stated.errors.position.value > 1.0
 
 
 def test_systematic_effects_may_forbid_a_pass(unchanged) -> None:
@@ -158,7 +158,7 @@ def test_systematic_effects_may_forbid_a_pass(unchanged) -> None:
     effects = (encoder_scales(300.0),)
     stated = said(replace(check, effects=effects), state.measurements)
     assert stated.verdict is not Verdict.PASS
-    assert stated.position.expanded > said(check, state.measurements).position.expanded
+    assert stated.errors.position.expanded > said(check, state.measurements).errors.position.expanded
 
 
 def test_what_an_effect_did_to_the_earlier_result_is_not_averaged_away(unchanged) -> None:
@@ -170,7 +170,7 @@ def test_what_an_effect_did_to_the_earlier_result_is_not_averaged_away(unchanged
     before = 1e-6 * convention.free_parameters(belief.controller)[:, None]
     shared = said(replace(check, effects=effects, earlier={effects[0].name: before}), state.measurements)
     alone = said(replace(check, effects=effects), state.measurements)
-    assert shared.position.expanded != pytest.approx(alone.position.expanded, rel=1e-3)
+    assert shared.errors.position.expanded != pytest.approx(alone.errors.position.expanded, rel=1e-3)
 
 
 def test_an_effect_that_was_measured_before_has_its_value_in_the_errors(unchanged) -> None:
@@ -181,9 +181,9 @@ def test_an_effect_that_was_measured_before_has_its_value_in_the_errors(unchange
     known = replace(check, effects=(replace(scale, value=1000.0),))
     stated = said(known, state.measurements)
     (line,) = known.plan.task.budget(stated.estimate.identification, stated.estimate.belief, [scale]).lines
-    assert plain.position.value < 0.03
-    assert stated.position.value == pytest.approx(1000.0 * line.per_unit_mm, abs=0.05)
-    assert stated.position.expanded == pytest.approx(plain.position.expanded, rel=0.3)
+    assert plain.errors.position.value < 0.03
+    assert stated.errors.position.value == pytest.approx(1000.0 * line.per_unit_mm, abs=0.05)
+    assert stated.errors.position.expanded == pytest.approx(plain.errors.position.expanded, rel=0.3)
 
 
 def test_settings_of_a_check_leave_the_calibration_s_targets_out(make_plan) -> None:

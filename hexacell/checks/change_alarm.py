@@ -62,9 +62,6 @@ def change_alarm_at(check: Check, measurements: MeasurementSet, warmer: Array | 
     """The alarm of a check whose legs were ``warmer`` (n, 6), K, at each record than at the earlier result.
 
     None where that is not known (NaN), or where no test is possible.
-
-    Raises:
-        IdentifiabilityError: the records do not belong to this robot.
     """
     if warmer is None or not warmer.any():
         return change_alarm(check, measurements)
@@ -81,9 +78,6 @@ def change_alarm(
 
     Records that the others prove false are not tested. ``expansion`` (n, P) is by how much the parameters
     differ at each record from those of the result before.
-
-    Raises:
-        IdentifiabilityError: the records do not belong to this robot.
     """
     before, false = check.before, check.false_records(measurements)
     sound = [row for row, one in enumerate(measurements.records) if one.id not in false]

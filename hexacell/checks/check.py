@@ -42,6 +42,8 @@ FEWEST_POINTS = 2
 class Check:
     """The check of one robot against limits of the errors at its task poses.
 
+    Its statements raise an ``IdentifiabilityError`` where the records do not belong to this robot.
+
     Attributes:
         before: the last accepted result, and its drift since; None without such a result.
         limits: largest errors at the worst task pose.
@@ -89,11 +91,7 @@ class Check:
         return self._decided(measurements) if is_measured else None
 
     def statement(self, measurements: MeasurementSet) -> CheckStatement | None:
-        """The statement by some records; None if the estimated robot can take no task pose.
-
-        Raises:
-            IdentifiabilityError: the records do not belong to this robot.
-        """
+        """The statement by some records; None if the estimated robot can take no task pose."""
         records = measurements.records
         if records not in self._stated:
             self._stated.clear()  # only the last one is asked for again
@@ -106,9 +104,6 @@ class Check:
         """The statement at the end of the check, where what is not decided is not evaluated.
 
         ``effects`` are the systematic ones as they are known by then, if not as before.
-
-        Raises:
-            IdentifiabilityError: the records do not belong to this robot.
         """
         effects = self.effects if effects is None else effects
         stated = self._statement(measurements, effects)

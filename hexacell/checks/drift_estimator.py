@@ -62,11 +62,7 @@ class DriftEstimator:
         return self._robots[GUARDED_SCALE]
 
     def estimate(self, measurements: MeasurementSet) -> OnlineEstimate:
-        """The estimate that poses are chosen by.
-
-        Raises:
-            IdentifiabilityError: the records do not belong to this robot.
-        """
+        """The estimate that poses are chosen by."""
         least = FIRST_SCALE if len(measurements) < FIRST_RECORDS else GUARDED_SCALE
         return self.at_least(least, measurements).estimate
 

@@ -103,11 +103,7 @@ class QuickLevel:
         return self.reached(measurements)
 
     def robot_after(self, measurements: MeasurementSet) -> Robot:
-        """The robot with what was known before the records, under the drift's scale that they show.
-
-        Raises:
-            IdentifiabilityError: they do not belong to this robot.
-        """
+        """The robot with what was known before the records, under the drift's scale that they show."""
         scale = self._drifting.likeliest(measurements).scale if len(measurements) else 1.0
         robot, known = self.check.robot, self._before.prior(scale)
         # What the records leave as uncertain as the drawing is not determined, whatever was known before.
@@ -115,11 +111,7 @@ class QuickLevel:
         return replace(robot, known=known)
 
     def accuracy(self, measurements: MeasurementSet) -> QuickAccuracy | None:
-        """How well the robot is known; None if it can take no task pose.
-
-        Raises:
-            IdentifiabilityError: the records do not belong to this robot.
-        """
+        """How well the robot is known; None if it can take no task pose."""
         likeliest, wanted = self._drifting.likeliest(measurements), self.calibrated_mm
         error = self._worst(likeliest.estimate.belief)
         if error is None or wanted is None:

@@ -55,11 +55,6 @@ class VirtualCampaign:
         """The records taken so far."""
         return self.state.measurements
 
-    @property
-    def visited(self) -> tuple[VisitedPose, ...]:
-        """The poses of these records, in their order."""
-        return tuple((one.point, one.orientation, one.pose) for one in self.measurements.records)
-
     def carry_out(self) -> None:
         """Carry out all that the plan decides.
 
@@ -242,7 +237,7 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
     errors = [outcome.forecast.now_mm for outcome in identified if outcome.forecast is not None]
     verdicts = [outcome.verdicts for outcome in identified if outcome.verdicts is not None]
     expanded = [outcome.budget.expanded_mm for outcome in identified if outcome.budget is not None]
-    held_out = plan.settings.verification
+    held_out, first = plan.settings.verification, identified[0].campaign
     straight = TimeModel.of(plan.settings, moves=1.0)
     points_held_out = len(held_out.points)
     common, wide = points_held_out * held_out.orientations, points_held_out * (held_out.orientations - 1)
@@ -260,5 +255,5 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
         + after,
         expanded_mm=median(expanded) if expanded else None,
         verdicts=VerdictForecast.mean(verdicts) if verdicts else None,
-        visited=identified[0].campaign.visited,
+        visited=tuple((one.point, one.orientation, one.pose) for one in first.measurements.records),
     )

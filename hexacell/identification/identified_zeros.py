@@ -115,7 +115,13 @@ class IdentifiedZeros:
     @cached_property
     def projector(self) -> Array:
         """G (p, p): what becomes of a change of the estimate of all parameters."""
-        return self.kept.gain(_pose_errors(self.found))
+        found = self.found
+        radius = float(found.problem.mechanism.platform_radius(found.geometry))
+        weights = np.repeat([1.0, radius], 3)[:, None]
+        # Derivatives (6 n, p) of the records' poses, rotations times the radius, less those by the frames.
+        columns = (weights * found.prediction.pose_jacobian).reshape(-1, len(found.free))
+        frames, _ = np.linalg.qr((weights * frame_derivatives(found.poses)).reshape(-1, 9))
+        return self.kept.gain(columns - frames @ (frames.T @ columns))
 
     @cached_property
     def free(self) -> Array:
@@ -159,15 +165,3 @@ class IdentifiedZeros:
         names = self.found.geometry.parameters.names
         unknown = {names[row] for row in np.flatnonzero(by_noise > limits)}
         return tuple(name for name in self.names if name in unknown)
-
-
-def _pose_errors(found: Identification) -> Array:
-    """Derivatives (6 n, p) of the records' poses by the free parameters, less those by changes of frames.
-
-    Rotations are times the platform's radius, mm.
-    """
-    mechanism, prediction = found.problem.mechanism, found.prediction
-    weights = np.repeat([1.0, float(mechanism.platform_radius(found.geometry))], 3)[:, None]
-    columns = (weights * prediction.pose_jacobian).reshape(-1, len(found.free))
-    frames, _ = np.linalg.qr((weights * frame_derivatives(prediction.poses)).reshape(-1, 9))
-    return np.asarray(columns - frames @ (frames.T @ columns))

@@ -76,14 +76,11 @@ def write_measurements(path: Path, measurements: MeasurementSet) -> None:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(HEADER)
-    rows.writerows(map(_row, measurements.records))
+    for one in measurements.records:
+        numbers = (*one.pose.as_tuple(), *one.joints, *one.deviation)
+        # float(): the repr of a numpy number contains its type.
+        rows.writerow([one.point, one.orientation, *(repr(float(number)) for number in numbers)])
     write_atomically(path, text.getvalue().encode())
-
-
-def _row(record: Record) -> list[str]:
-    numbers = (*record.pose.as_tuple(), *record.joints, *record.deviation)
-    # float(): the repr of a numpy number contains its type.
-    return [str(record.point), str(record.orientation), *(repr(float(number)) for number in numbers)]
 
 
 def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, tuple[int, Record]]:

@@ -9,7 +9,6 @@ import numpy as np
 from hexacell.identification.data_faults.deletion_tests import DeletionTest
 from hexacell.identification.data_faults.hypotheses import (
     MM_PER_INCH,
-    GaugeFault,
     GaugeFaultHypothesis,
     ZeroShiftHypothesis,
 )
@@ -19,6 +18,28 @@ from hexacell.measurements.records import Deviation, RecordId
 
 NAMED_SHARE = 0.3
 """Share of the largest component of a zero shift below which a gauge is not named."""
+
+GAUGE_FAULT_WORDS = {
+    DataFaultKind.INCHES: (
+        "seems to read in inches",
+        "seem to read in inches",
+        f"if these readings are multiplied by {MM_PER_INCH}",
+        f"Switch to millimetres and measure again, or multiply {{columns}} by {MM_PER_INCH}",
+    ),
+    DataFaultKind.REVERSED: (
+        "looks reversed",
+        "look reversed",
+        "with the sign of these readings changed",
+        "Correct the counting direction and measure again, or change the sign of {columns}",
+    ),
+    DataFaultKind.EXCHANGED: (
+        "look exchanged",
+        "look exchanged",
+        "with these readings exchanged",
+        "Check which gauge is on which channel and measure again, or put {columns} in the right order",
+    ),
+}
+"""How a fault of one gauge looks, and of several, what corrects it, and what to do."""
 
 
 def left_out(selected: CorrectedFit, tests: Mapping[RecordId, DeletionTest]) -> tuple[DataFault, ...]:
@@ -72,15 +93,17 @@ def _gauge_fault(hypothesis: GaugeFaultHypothesis, before: CorrectedFit, after: 
     """The residuals before and after the correction are the evidence."""
     fault = hypothesis.gauge_fault
     where = "at every point" if hypothesis.point is None else f"at point {hypothesis.point}"
-    looks, correction, action = _looks_correction_action(fault, where)
+    is_plural, columns = len(fault.gauges) > 1, " and ".join(f"d{gauge}" for gauge in fault.gauges)
+    *looks, correction, action = GAUGE_FAULT_WORDS[fault.kind]
     without = ""
     if before.lost:
         without = f" without {before.lost} record{'s' if before.lost > 1 else ''} that no geometry explains"
     ratio, corrected_ratio = before.fit.goodness.ratio, after.fit.goodness.ratio
     sentence = (
-        f"{_names(fault.gauges)} {looks} {where}: the residuals are {ratio:.3g} times the stated "
-        f"noise{without}, and {corrected_ratio:.3g} times {correction}"
+        f"{_names(fault.gauges)} {looks[is_plural]} {where}: the residuals are {ratio:.3g} times the "
+        f"stated noise{without}, and {corrected_ratio:.3g} times {correction}"
     )
+    action = action.format(columns=f"{columns} {where}")
     return DataFault(fault.kind, sentence, action, gauges=fault.gauges)
 
 
@@ -123,30 +146,3 @@ def _names(gauges: str) -> str:
     if len(gauges) == 1:
         return f"gauge {gauges}"
     return f"gauges {', '.join(gauges[:-1])} and {gauges[-1]}"
-
-
-def _looks_correction_action(fault: GaugeFault, where: str) -> tuple[str, str, str]:
-    """How a gauge fault looks, what corrects it, and what to do."""
-    plural = len(fault.gauges) > 1
-    columns = " and ".join(f"d{gauge}" for gauge in fault.gauges)
-    match fault.kind:
-        case DataFaultKind.INCHES:
-            look = "seem to read in inches" if plural else "seems to read in inches"
-            correction = f"if these readings are multiplied by {MM_PER_INCH}"
-            action = (
-                f"Switch to millimetres and measure again, or multiply {columns} {where} by {MM_PER_INCH}"
-            )
-        case DataFaultKind.REVERSED:
-            look = "look reversed" if plural else "looks reversed"
-            correction = "with the sign of these readings changed"
-            action = (
-                f"Correct the counting direction and measure again, or change the sign of {columns} {where}"
-            )
-        case _:
-            look = "look exchanged"
-            correction = "with these readings exchanged"
-            action = (
-                "Check which gauge is on which channel and measure again, or put "
-                f"{columns} {where} in the right order"
-            )
-    return look, correction, action

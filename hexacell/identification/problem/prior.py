@@ -302,11 +302,6 @@ class SystematicErrors:
     common: Array
     own: Array
 
-    @property
-    def are_none(self) -> bool:
-        """Whether the records have noise alone."""
-        return not self.common.shape[-1] and not self.own.any()
-
 
 SystematicModel = Callable[[RecordPlacement], SystematicErrors]
 """The errors of records that are no noise."""

@@ -122,9 +122,10 @@ class LinearCosts:
         """Linearize at the ``prediction`` of all records of a problem."""
         errors = systematic_errors(problem, prediction)
         weights = prediction.weights
+        is_of_noise = not errors.common.shape[-1] and not errors.own.any()
         if errors.own.any():
             weights = np.linalg.inv(np.linalg.inv(weights) + errors.own)
-        return cls(problem, prediction, weights, errors.common, errors.are_none)
+        return cls(problem, prediction, weights, errors.common, is_of_noise)
 
     def least(self, rows: Mask) -> float:
         """The least cost of some records (n,), the full prior included."""

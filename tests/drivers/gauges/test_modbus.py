@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, PortLost
-from drivers.gauges.described import ModbusGauge
+from drivers.gauges.modbus import ModbusGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, instrument_class
 from drivers.simulated.gauges.described import crc
@@ -209,5 +209,5 @@ def test_places_that_cannot_be_are_refused(change):
 
 
 def test_the_library_is_not_imported_with_the_driver():
-    code = "import sys, drivers.gauges.described; sys.exit('pymodbus' in sys.modules)"
+    code = "import sys, drivers.gauges.modbus; sys.exit('pymodbus' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

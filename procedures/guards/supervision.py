@@ -25,9 +25,9 @@ from drivers.interfaces import Controller
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from hexacell.storage import atomic_files
-from procedures.guards import rules
 from procedures.guards.polling import PolledDevices
-from procedures.guards.rules import GuardLimits
+from procedures.guards.rules.base import GuardLimits
+from procedures.guards.rules.registry import first_trip
 from procedures.run.cancellation import cancel_and_wait, shielded
 from procedures.run.trips import Guard, GuardTripped, Trip
 
@@ -169,7 +169,7 @@ class GuardMonitor:
             self._updated.clear()
             await self._updated.wait()
         self._raise_failure()
-        self.trip = rules.first_trip(self.devices, self.limits) or self.trip
+        self.trip = first_trip(self.devices, self.limits) or self.trip
         return self.trip
 
     async def _measure_silence(self) -> None:
@@ -185,7 +185,7 @@ class GuardMonitor:
 
     def _evaluate(self) -> None:
         if self.trip is None:
-            self.trip = rules.first_trip(self.devices, self.limits)
+            self.trip = first_trip(self.devices, self.limits)
         if self.trip is not None:
             self._ended.set()
         self._updated.set()

@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "add-a-step.md").read_text()
-FILES = ("procedures/steps/read_temperatures.py",)
+FILES = ("procedures/steps/read_temperatures.py", "procedures/guards/rules/controller_hot.py")
 
 RUN = """
 import asyncio, json, sys
@@ -24,8 +24,8 @@ from drivers.interfaces import ControllerStatus
 from hexacell.errors import Interruption
 from hexacell.text.line_face import activity, event_text
 from procedures.engine.commands import Abort
-from procedures.guards import rules
 from procedures.guards.polling import DevicePoller, PolledDevices
+from procedures.guards.rules.registry import first_trip
 from procedures.journal.journal import read_journal
 from procedures.run.state import fold
 from procedures.steps.read_temperatures import TemperaturesRead
@@ -47,7 +47,7 @@ async def status():
     raise AssertionError
 
 report = DevicePoller("controller", status, value=ControllerStatus(False, True, ("drive 2 is too hot",)))
-trip = rules.first_trip(PolledDevices(controller=report), None)
+trip = first_trip(PolledDevices(controller=report), None)
 print(json.dumps({
     "begun": history[place - 1].step.key,
     "doing": history[place - 1].step.doing,

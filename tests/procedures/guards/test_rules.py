@@ -17,9 +17,10 @@ from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import DeviceError, ExitCode, LimitError
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.limits.gauge_travel import GaugeRoom
-from procedures.guards import rules
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
-from procedures.guards.rules import GuardLimits, following_error, stuck_gauge
+from procedures.guards.rules.after_a_move import following_error, stuck_gauge
+from procedures.guards.rules.base import GuardLimits
+from procedures.guards.rules.registry import first_trip
 from procedures.guards.supervision import low_disk_space
 from procedures.run.trips import DriftTripped, Guard, GuardTripped, Trip
 from procedures.steps import events
@@ -67,14 +68,14 @@ WELL = PolledDevices(
 def tripped(limits: GuardLimits = LIMITS, **changes: Any) -> Trip:
     from dataclasses import replace
 
-    trip = rules.first_trip(replace(WELL, **changes), limits)
+    trip = first_trip(replace(WELL, **changes), limits)
     assert trip is not None
     return trip
 
 
 def test_a_snapshot_without_faults_trips_no_guard() -> None:
-    assert rules.first_trip(WELL, LIMITS) is None
-    assert rules.first_trip(PolledDevices(), LIMITS) is None
+    assert first_trip(WELL, LIMITS) is None
+    assert first_trip(PolledDevices(), LIMITS) is None
 
 
 def test_a_device_without_an_answer_trips_only_by_its_silence() -> None:
@@ -84,7 +85,7 @@ def test_a_device_without_an_answer_trips_only_by_its_silence() -> None:
         polled("controller"),
         polled("stop line"),
     )
-    assert rules.first_trip(unanswered, LIMITS) is None
+    assert first_trip(unanswered, LIMITS) is None
     assert tripped(encoders=polled("encoders", silent_s=0.13)).guard is Guard.STALE
 
 
@@ -115,7 +116,7 @@ def test_a_controller_that_forbids_motion_trips_with_its_reason(
 
 def test_error_messages_of_an_enabled_controller_trip_nothing() -> None:
     enabled = PolledDevices(controller=status("joint 3 following error"))
-    assert rules.first_trip(enabled, LIMITS) is None
+    assert first_trip(enabled, LIMITS) is None
 
 
 def test_an_encoder_is_named_with_its_error() -> None:
@@ -130,14 +131,14 @@ def test_a_plunger_that_comes_to_its_end() -> None:
 
 
 def test_a_plunger_that_was_at_its_end_may_leave_it() -> None:
-    assert rules.first_trip(PolledDevices((gauge(None, None, error=AT_END),)), LIMITS) is None
+    assert first_trip(PolledDevices((gauge(None, None, error=AT_END),)), LIMITS) is None
 
 
 def test_the_ball_may_go_as_far_as_each_side_has_room() -> None:
     limits = GuardLimits(0.12, GaugeRoom((-5.0, -5.0, -5.0), (1.2, 5.0, 5.0)))
-    assert rules.first_trip(PolledDevices((gauge(-4.9, 0.0, 0),)), limits) is None
-    assert rules.first_trip(PolledDevices((gauge(4.9, 0.0, 1),)), limits) is None
-    trip = rules.first_trip(PolledDevices((gauge(1.3, 0.0, 0),)), limits)
+    assert first_trip(PolledDevices((gauge(-4.9, 0.0, 0),)), limits) is None
+    assert first_trip(PolledDevices((gauge(4.9, 0.0, 1),)), limits) is None
+    trip = first_trip(PolledDevices((gauge(1.3, 0.0, 0),)), limits)
     assert trip is not None
     assert "+1.30 mm from its reference along x, farther than 1.20 mm" in trip.problem
 
@@ -146,7 +147,7 @@ def test_the_ball_may_go_as_far_as_each_side_has_room() -> None:
 def test_a_ball_must_not_go_farther_than_allowed_nor_than_it_was(
     deviation: float, first: float, axis: int
 ) -> None:
-    trip = rules.first_trip(PolledDevices((gauge(deviation, first, axis),)), LIMITS)
+    trip = first_trip(PolledDevices((gauge(deviation, first, axis),)), LIMITS)
     if abs(deviation) > max(5.5, abs(first)):
         assert trip is not None
         assert (trip.guard, trip.device) == (Guard.PLATE, f"gauge {'xyz'[axis]}")
@@ -160,8 +161,8 @@ def test_a_slider_that_moves_at_standstill_trips_the_following_guard(leg: int, w
     now = [10.0] * 6
     now[leg] += way
     snapshot = PolledDevices(encoders=sliders(tuple(now), (10.0,) * 6))
-    assert rules.first_trip(snapshot, LIMITS) is None, "a robot that moves may"
-    trip = rules.first_trip(snapshot, GuardLimits(0.12, PLATE, 1.0, Hexaglide.words))
+    assert first_trip(snapshot, LIMITS) is None, "a robot that moves may"
+    trip = first_trip(snapshot, GuardLimits(0.12, PLATE, 1.0, Hexaglide.words))
     if abs(now[leg] - 10.0) > 1.0:
         assert trip is not None
         assert (trip.guard, trip.device) == (Guard.FOLLOWING, f"slider {leg + 1}")
@@ -181,7 +182,7 @@ def test_devices_that_fail_are_all_named() -> None:
 def test_a_device_trips_only_after_three_garbled_answers(garbled: int, trips: bool) -> None:
     nonsense = WrongAnswer("answers b'0'", subject="gauge y", action="Check it")
     snapshot = PolledDevices((gauge(axis=1, error=nonsense, garbled_count=garbled),))
-    trip = rules.first_trip(snapshot, LIMITS)
+    trip = first_trip(snapshot, LIMITS)
     assert (trip is not None and trip.guard is Guard.DEVICE) is trips
 
 
@@ -192,8 +193,8 @@ def test_any_device_silent_beyond_the_limit_trips_the_stale_guard(device: str) -
         only: dict[str, Any] = {device: (heard,) if device == "gauges" else heard}
         return PolledDevices(**only)
 
-    assert rules.first_trip(snapshot(0.12), LIMITS) is None
-    trip = rules.first_trip(snapshot(0.121), LIMITS)
+    assert first_trip(snapshot(0.12), LIMITS) is None
+    trip = first_trip(snapshot(0.121), LIMITS)
     assert trip is not None
     assert (trip.guard, trip.device) == (Guard.STALE, "it")
 
@@ -210,7 +211,7 @@ def test_the_trip_of_a_cause_precedes_those_of_its_effects() -> None:
         order.append(tripped(**everything).guard)
         everything[key] = getattr(WELL, key)
     assert order == [Guard.STOP_LINE, Guard.EMERGENCY_STOP, Guard.ENCODERS, Guard.GAUGE_END]
-    assert rules.first_trip(PolledDevices(**everything), LIMITS) is None
+    assert first_trip(PolledDevices(**everything), LIMITS) is None
 
 
 def test_a_slider_beyond_the_following_limit_is_named() -> None:

@@ -1,4 +1,4 @@
-"""The robot goes to a pose, unless the controller refuses it; where it is, after that had been unknown."""
+"""Move: the robot goes to a pose, unless the controller refuses it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.pose import Pose
-from hexacell.measurements.records import joints_of
 from procedures.run.cancellation import in_thread
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.trips import GuardTripped, WatchedSet
-from procedures.steps.base import BaseEvent, BaseStep, StepAtPose
+from procedures.steps.base import BaseEvent, StepAtPose
 from procedures.steps.sample import RecordRejected
 
 if TYPE_CHECKING:
@@ -30,42 +29,9 @@ if TYPE_CHECKING:
 MOST_REFUSALS = 40
 """The controller refuses at most so many poses of one set; then a person is to look at its limits."""
 
+
 STUCK_GAUGE_SIGMAS = 5.0
 """An expected displacement is reduced by so many standard deviations before a gauge counts as stuck."""
-
-
-class Located(BaseEvent):
-    """Controller and encoders agree on where the robot is.
-
-    ``joints`` are the controller's joint variables, None where it reports none; mm or deg.
-    """
-
-    kind: Literal["located"] = "located"
-    pose: SixNumbers
-    joints: SixNumbers | None
-    encoders: SixNumbers
-
-    def applied_to(self, state: RunState) -> RunState:
-        """The robot is at a pose of no set."""
-        return replace(state, at_pose=None, off_plan=True, target=self.pose, position_unknown=False)
-
-
-class Locate(BaseStep):
-    """Ask the controller for its pose: no path can be checked from an unknown one."""
-
-    kind: Literal["locate"] = "locate"
-
-    outcomes: ClassVar = (Located,)
-    doing: ClassVar[str] = "asking the controller where the robot is"
-
-    async def perform(self, run: RunResources, state: RunState) -> Located:
-        """Compare what controller and encoders report; raises ``GuardTripped`` if they do not agree."""
-        found = await run.locate()
-        return Located(
-            pose=found.pose.as_tuple(),
-            joints=None if found.joints is None else joints_of(found.joints),
-            encoders=joints_of(found.encoders),
-        )
 
 
 class Arrived(BaseEvent):

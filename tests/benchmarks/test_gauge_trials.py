@@ -20,7 +20,7 @@ import pytest
 from hexacell.errors import HexacellError
 from procedures.journal.journal import read_journal
 from procedures.steps import events
-from procedures.steps.sample import MountingError
+from procedures.steps.place import MountingError
 from tests.procedures.rig import new_rig
 from tests.procedures.runs.gauge_mistakes import MISTAKES, drawn_robots, make_mistake
 from tests.small_cell import choose_among_few

@@ -31,8 +31,9 @@ from procedures.run.state import RunState, apply
 from procedures.steps import events
 from procedures.steps.base import StepOfSet
 from procedures.steps.move import Move
-from procedures.steps.noise import Pilot
-from procedures.steps.sample import Place, Sample
+from procedures.steps.pilot import Pilot
+from procedures.steps.place import Place
+from procedures.steps.sample import Sample
 
 LARGEST_COUNT = 2**63 - 1
 LARGEST_VARIANCE = 1e12

@@ -16,7 +16,7 @@ from procedures.run.state import RunState
 from procedures.steps import events
 from procedures.steps.base import StepOfSet
 from procedures.steps.move import Expectation, Move
-from procedures.steps.sample import Place
+from procedures.steps.place import Place
 
 NO_RUN = {
     "Now": "no run is being measured here",

@@ -14,8 +14,8 @@ from procedures.calibration.calibration import campaign_state, expected_records
 from procedures.run.keys import Phase
 from procedures.run.state import fold
 from procedures.steps import events
+from procedures.steps.close import CloseSet
 from procedures.steps.move import Expectation, Move
-from procedures.steps.reference import CloseSet
 from tests.procedures.story import next_step
 
 

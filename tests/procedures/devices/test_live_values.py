@@ -16,7 +16,7 @@ from procedures.devices.settling import settle
 from procedures.guards.guards import Guards
 from procedures.run.state import fold
 from procedures.steps import events
-from procedures.steps.write_back import Commit
+from procedures.steps.commit import Commit
 
 
 @pytest.fixture

@@ -12,8 +12,9 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events
 from procedures.steps.base import BaseStep
-from procedures.steps.provisional import Lend, TakeBack
-from procedures.steps.write_back import RollBack
+from procedures.steps.lend import Lend
+from procedures.steps.roll_back import RollBack
+from procedures.steps.take_back import TakeBack
 
 ROLL_BACK, TAKE_BACK = RollBack(), TakeBack()
 ZERO = (0.0, 0.0, 0.0)

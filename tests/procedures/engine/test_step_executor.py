@@ -15,9 +15,10 @@ from procedures.devices.device_set import Devices, MountedGauge
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events
+from procedures.steps.close import CloseSet
 from procedures.steps.move import Move
-from procedures.steps.reference import CloseSet
-from procedures.steps.sample import Place, Sample
+from procedures.steps.place import Place
+from procedures.steps.sample import Sample
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 POSE = (100.0, -100.0, 500.0, 0.0, 0.0, 0.0)

@@ -11,7 +11,7 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Temperature
 from procedures.run.state import RunState, apply, fold
 from procedures.steps import events
-from procedures.steps.reference import CloseSet
+from procedures.steps.close import CloseSet
 from tests.procedures.identified import an_identification
 from tests.procedures.story import located
 

@@ -31,16 +31,26 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Reading
 from procedures.run.trips import Guard
 from procedures.steps import events
+from procedures.steps.accept import Accept
+from procedures.steps.assess_noise import AssessNoise
+from procedures.steps.close import CloseSet
+from procedures.steps.commit import Commit
 from procedures.steps.events import EVENTS
-from procedures.steps.gauge_trial import Probe, Try
 from procedures.steps.identify import Identify
 from procedures.steps.judge import Judge
-from procedures.steps.move import Expectation, Locate, Move
-from procedures.steps.noise import AssessNoise, Pilot, Repeat, Standstill
-from procedures.steps.reference import CloseSet, Revisit
+from procedures.steps.locate import Locate
+from procedures.steps.move import Expectation, Move
+from procedures.steps.pilot import Pilot
+from procedures.steps.place import Place
+from procedures.steps.probe import Probe
+from procedures.steps.propose import Propose
 from procedures.steps.registry import Step
-from procedures.steps.sample import Place, Sample
-from procedures.steps.write_back import Accept, Commit, Propose, RollBack
+from procedures.steps.repeat import Repeat
+from procedures.steps.revisit import Revisit
+from procedures.steps.roll_back import RollBack
+from procedures.steps.sample import Sample
+from procedures.steps.standstill import Standstill
+from procedures.steps.try_gauges import Try
 from tests.procedures.identified import an_identification
 
 POSE = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)

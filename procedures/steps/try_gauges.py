@@ -1,4 +1,4 @@
-"""The trial of the gauges beside a reference: whether each follows small known moves of the ball."""
+"""Try: back at a set's reference it is judged whether each gauge followed the ball."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of
 from hexacell.noise.gauge_trial import GaugeMistake, TrialFinding, judge_response, response_of
 from procedures.run.keys import SetKey, ThreeNumbers
-from procedures.run.readings import Reading
 from procedures.steps.base import BaseEvent, StepOfSet
-from procedures.steps.sample import MountingError
+from procedures.steps.place import MountingError
 
 if TYPE_CHECKING:
     from procedures.resources.run_resources import RunResources
@@ -47,32 +46,6 @@ MISTAKES: Mapping[GaugeMistake, tuple[str, str, str]] = {
     ),
 }
 """What each mistake of one gauge and of several is called, and what to do."""
-
-
-class GaugesProbed(BaseEvent):
-    """The ball was moved by a small known distance from a set's reference, and the gauges were read."""
-
-    kind: Literal["probed"] = "probed"
-    at: SetKey
-    moved_mm: ThreeNumbers
-    reading: Reading
-
-    def applied_to(self, state: RunState) -> RunState:
-        measured = state.set(self.at)
-        return state.with_set(self.at, replace(measured, probes=(*measured.probes, self)))
-
-
-class Probe(StepOfSet):
-    """Beside a set's reference, after a small known move of the ball: read the gauges."""
-
-    kind: Literal["probe"] = "probe"
-    moved_mm: ThreeNumbers
-
-    outcomes: ClassVar = (GaugesProbed,)
-    purpose: ClassVar[str] = "trying the gauges"
-
-    async def perform(self, run: RunResources, state: RunState) -> GaugesProbed:
-        return GaugesProbed(at=self.at, moved_mm=self.moved_mm, reading=await run.read())
 
 
 class GaugesTried(BaseEvent):

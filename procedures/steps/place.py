@@ -1,0 +1,50 @@
+"""Place: the gauges are put around the ball, by a person unless they are fixed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+from hexacell.errors import DeviceError
+from hexacell.kinematics.pose import Pose
+from procedures.run.keys import Phase, SetKey, SixNumbers
+from procedures.run.questions import ask_mounting, ask_placement
+from procedures.steps.base import BaseEvent, StepOfSet
+
+if TYPE_CHECKING:
+    from procedures.resources.run_resources import RunResources
+    from procedures.run.state import RunState
+
+
+class MountingError(DeviceError):
+    """Gauges are not mounted as a set needs them; nothing can be measured with them before they are."""
+
+
+class GaugesPlaced(BaseEvent):
+    """The gauges are placed around the ball."""
+
+    kind: Literal["placed"] = "placed"
+    at: SetKey
+
+    def applied_to(self, state: RunState) -> RunState:
+        return state.with_set(self.at, replace(state.set(self.at), placed=True))
+
+
+class Place(StepOfSet):
+    """Have the gauges put around the ball, plungers in the middle of their travel."""
+
+    kind: Literal["place"] = "place"
+    pose: SixNumbers
+
+    outcomes: ClassVar = (GaugesPlaced,)
+    doing: ClassVar[str] = "the gauges are to be placed"
+
+    async def perform(self, run: RunResources, state: RunState) -> GaugesPlaced:
+        """Ask a person where one is needed; the robot stands still meanwhile."""
+        settings, pose = run.settings, Pose(*self.pose)
+        if self.at.phase is Phase.LENGTH and settings.length_check is not None:
+            if settings.length_check.mounting == "by-hand":
+                await run.ask_at_standstill(ask_mounting(self.at.point, self.at.seat, pose))
+        elif settings.stations.placement == "by-hand":
+            await run.ask_at_standstill(ask_placement(self.at, pose))
+        return GaugesPlaced(at=self.at)

@@ -15,7 +15,7 @@ from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.config.interface import ControllerGeometry, ControllerLimits
 from hexacell.config.layout import ConfigLayout, FormatOfFile
-from hexacell.config.linuxcnc import limits_of_ini
+from hexacell.config.linuxcnc_ini import limits_of_ini
 from hexacell.errors import FileError, UsageError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations

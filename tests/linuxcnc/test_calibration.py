@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from hexacell.cell.loader import load_cell
-from hexacell.config.linuxcnc import limits_of_ini
+from hexacell.config.linuxcnc_ini import limits_of_ini
 from hexacell.robot.model import config_layout
 from tests.linuxcnc.conftest import LinuxCNC
 from tests.waiting import wait_until

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexacell.config.interface import NumberToken, number_of, replace_tokens
-from hexacell.config.linuxcnc import IniText
+from hexacell.config.linuxcnc_ini import IniText
 from hexacell.errors import FileError
 from hexacell.storage.atomic_files import read_text
 

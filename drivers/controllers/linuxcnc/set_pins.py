@@ -21,7 +21,9 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from hexacell.config.linuxcnc import SETP, IniText
+from hexacell.config.linuxcnc_hal import SETP
+from hexacell.config.linuxcnc_ini import IniText
+
 from hexacell.errors import HexacellError, UsageError
 from hexacell.storage.atomic_files import read_text
 

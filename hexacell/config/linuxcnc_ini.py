@@ -1,4 +1,4 @@
-"""The config formats of LinuxCNC's files: ``linuxcnc-ini``, variables of the INI file or an included one.
+"""The config format ``linuxcnc-ini``: variables of LinuxCNC's INI file, or of a file that it includes.
 
     [HEXAGLIDE]
     S1X = -400.0
@@ -12,17 +12,11 @@ LinuxCNC looks for a variable in the first section of that name alone and takes 
 are case-sensitive; what stands behind the number belongs to the value, comments too; a backslash at the end
 of a line, even of a comment, makes the next one a part of it (seen with ``inivar`` of LinuxCNC 2.9). What
 LinuxCNC would not see, or see otherwise than a person, is refused.
-
-``linuxcnc-hal``: pins that a HAL file sets to numbers, as of ``genhexkins``. Where the value is a variable
-of the INI file (``[GENHEXKINS]BASE0X``), that is the config.
-
-    setp genhexkins.base.0.x -22.950
 """
 
 from __future__ import annotations
 
 import re
-from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -42,14 +36,8 @@ from hexacell.config.interface import (
 )
 from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, NumberKeys, NumberLookup, options_of
 from hexacell.errors import FileError
-from hexacell.kinematics.parameters import LEGS, GeometricParameter, ParameterSet
+from hexacell.kinematics.parameters import LEGS, ParameterSet
 from hexacell.storage import atomic_files
-
-SETP = re.compile(r"[ \t]*setp[ \t]+(?P<pin>\S+)[ \t]+(?P<value>\S+)[ \t]*(?:#.*)?\r?")
-"""A line that sets a pin."""
-
-VARIABLE = "["
-"""Begins a variable of the INI file: ``[SECTION]NAME``."""
 
 
 class LinuxcncIniOptions(KeyedOptions):
@@ -247,76 +235,3 @@ def _limit(ini: NumberLookup, key: str, source: Path | None) -> NumberToken | No
     token = ini.number(key)
     number_of(token, source)
     return token
-
-
-class HalPinsOptions(KeyedOptions):
-    """Options of the format; ``component`` is that of the pins without a pattern of their own."""
-
-    component: Text = Field("genhexkins", min_length=1)
-
-
-class HalPins(KeyedConfig):
-    """A :class:`~hexacell.config.interface.ConfigFormat`; raises ``UsageError`` for options."""
-
-    def __init__(
-        self, parameters: ParameterSet, given: Mapping[str, Any], *, is_part: bool = False
-    ) -> None:
-        options = options_of(HalPinsOptions, "linuxcnc-hal", given)
-        keys = NumberKeys.of(
-            parameters, options, lambda parameter: _pin(options.component, parameter), is_part=is_part
-        )
-        super().__init__(parameters, keys, HalText, options.unit_mm)
-
-
-def _pin(component: str, parameter: GeometricParameter) -> str:
-    """``genhexkins.base.0.x``."""
-    parts = (component, parameter.kind.symbol.lower(), str(parameter.leg - 1), parameter.component)
-    return ".".join(filter(None, parts))
-
-
-@dataclass(frozen=True)
-class HalText:
-    """A :class:`~hexacell.config.keyed_config.NumberLookup` in a HAL text."""
-
-    text: str
-    source: Path | None
-
-    def number(self, key: str) -> NumberToken:
-        """What a pin is set to.
-
-        Raises:
-            FileError: it is not set, or twice, or to a variable of the INI file.
-        """
-        tokens = self._tokens[key]
-        if not tokens:
-            raise FileError(
-                f"no line sets the pin {key}",
-                subject=self.source,
-                action="Correct [controller.config_options], or name the file that sets it",
-            )
-        if len(tokens) > 1:
-            problem = f"{key} is set a second time, after line {tokens[0].line}"
-            raise FileError(problem, subject=self.source, line=tokens[1].line, action="Remove one")
-        if tokens[0].text.startswith(VARIABLE):
-            raise FileError(
-                f"{key} is set to {tokens[0].text}, a variable of the INI file",
-                subject=self.source,
-                line=tokens[0].line,
-                action='Name the INI file as the config, with config_format = "linuxcnc-ini"',
-            )
-        return tokens[0]
-
-    def has(self, key: str) -> bool:
-        """Whether a line sets a pin to a number: to a variable of the INI file, it is that which has it."""
-        return any(not token.text.startswith(VARIABLE) for token in self._tokens.get(key, ()))
-
-    @cached_property
-    def _tokens(self) -> Mapping[str, list[NumberToken]]:
-        found: defaultdict[str, list[NumberToken]] = defaultdict(list)
-        start = 0
-        for line, content in enumerate(self.text.split("\n"), start=1):
-            if setp := SETP.fullmatch(content):
-                first, end = (start + place for place in setp.span("value"))
-                found[setp["pin"]].append(NumberToken(setp["value"], first, end, line))
-            start += len(content) + 1
-        return found

@@ -52,8 +52,6 @@ FEW_CHOICES = SearchEffort(
     held_out_candidates=128,
     checked_candidates=8,
     checked_robots=4,
-    rounds=(),
-    late_rounds=(),
 )
 """Poses are chosen among few, and a plan is checked on few robots: what is chosen is not under test."""
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hexacell.config.linuxcnc_hal import HalPins
-from hexacell.config.linuxcnc_ini import LinuxcncIni
-
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.layout import ConfigLayout, FormatOfFile
+from hexacell.config.linuxcnc_hal import HalPins
+from hexacell.config.linuxcnc_ini import LinuxcncIni
 from hexacell.config.toml_format import NativeToml
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS

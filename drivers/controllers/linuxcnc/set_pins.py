@@ -23,7 +23,6 @@ from pathlib import Path
 
 from hexacell.config.linuxcnc_hal import SETP
 from hexacell.config.linuxcnc_ini import IniText
-
 from hexacell.errors import HexacellError, UsageError
 from hexacell.storage.atomic_files import read_text
 

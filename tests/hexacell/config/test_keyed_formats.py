@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hexacell.config.linuxcnc_hal import HalPins
-from hexacell.config.linuxcnc_ini import LinuxcncIni
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.config.interface import ConfigFormat, write_number
 from hexacell.config.line_templates import LineTemplates
+from hexacell.config.linuxcnc_hal import HalPins
+from hexacell.config.linuxcnc_ini import LinuxcncIni
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS

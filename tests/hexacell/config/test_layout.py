@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hexacell.config.linuxcnc_hal import HalPins
-from hexacell.config.linuxcnc_ini import LinuxcncIni
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.cell.loader import load_cell
 from hexacell.config.layout import ConfigLayout, FormatOfFile
 from hexacell.config.line_templates import LineTemplates
+from hexacell.config.linuxcnc_hal import HalPins
+from hexacell.config.linuxcnc_ini import LinuxcncIni
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.kinematics.geometry import Geometry

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hexacell.config.linuxcnc_ini import limits_of_ini
 
 from hexacell.cell.fields import LARGEST_NUMBER
 from hexacell.config.interface import ControllerLimits
+from hexacell.config.linuxcnc_ini import limits_of_ini
 from hexacell.errors import FileError
 
 CONFIGS = Path(__file__).parents[3] / "configs"

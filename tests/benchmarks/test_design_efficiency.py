@@ -40,8 +40,8 @@ from tests.benchmarks.continuous_design import (
 pytestmark = pytest.mark.benchmark
 
 ROBOTS = int(os.environ.get("ROBOTS", "10"))
-WANTED, LEAST = 0.90, 0.85
-"""The target of the median by D, which is missed by 0.01, and what it must be all the same."""
+LEAST = 0.90
+"""The target of the median by D; missed by 0.01 as last measured (docs/measured.md)."""
 D_GAP, I_GAP = 0.005, 0.03
 """Shares by which a better design may exceed the best one that was found."""
 UNSEEN, BEYOND = 4096, 0.02
@@ -100,7 +100,7 @@ def test_the_efficiency_of_adaptive_campaigns(say) -> None:
         found = [one for one in executor.map(rated, range(ROBOTS)) if one is not None]
     assert len(found) >= 0.95 * ROBOTS
     for name, values, wanted in (
-        ("D", [one.d for one in found], f"{WANTED:g}"),
+        ("D", [one.d for one in found], f"{LEAST:g}"),
         ("I", [one.i for one in found], "-"),
     ):
         tenth, median = np.quantile(values, [0.1, 0.5])

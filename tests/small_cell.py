@@ -20,7 +20,7 @@ from procedures.steps import events
 
 FREE: dict[str, Any] = {
     "identification.provisional": False,
-    "limits.turn_deg": 180.0,
+    "limits.turn_deg": 60.0,
     "limits.leg_distance_mm": 0.0,
     "limits.passive_joints.base_cone_deg": 180.0,
     "limits.passive_joints.platform_cone_deg": 180.0,

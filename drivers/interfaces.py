@@ -125,11 +125,9 @@ class Device(Protocol[Identity_co]):
         Returns:
             Its identity, or those of all its parts.
         """
-        ...
 
     async def close(self) -> None:
         """Release the connection; closing twice is harmless."""
-        ...
 
 
 class Gauge(Device[DeviceIdentity], Protocol):
@@ -138,7 +136,6 @@ class Gauge(Device[DeviceIdentity], Protocol):
     @property
     def name(self) -> str:
         """Its name in the cell file."""
-        ...
 
     async def read(self) -> GaugeReading:
         """The plunger's position now.
@@ -146,7 +143,6 @@ class Gauge(Device[DeviceIdentity], Protocol):
         Returns:
             The value, mm, in the instrument's own zero and direction, once readings agree.
         """
-        ...
 
     async def read_once(self) -> GaugeReading:
         """The displayed value at this moment, also during motion: for supervision, never for a record.
@@ -157,11 +153,9 @@ class Gauge(Device[DeviceIdentity], Protocol):
         Raises:
             drivers.errors.WrongAnswer: the answer is garbled.
         """
-        ...
 
     async def check(self) -> None:
         """Raise if unit, preset, direction or hold changed since ``open``: the zero is then void."""
-        ...
 
 
 class EncoderBank(Device[tuple[DeviceIdentity, ...]], Protocol):
@@ -173,7 +167,6 @@ class EncoderBank(Device[tuple[DeviceIdentity, ...]], Protocol):
         Returns:
             One complete sample, all of the same instant.
         """
-        ...
 
 
 class Controller(Device[DeviceIdentity], Protocol):
@@ -188,7 +181,6 @@ class Controller(Device[DeviceIdentity], Protocol):
         Raises:
             drivers.errors.StartupNotPermitted: it needs an action that is not permitted.
         """
-        ...
 
     async def move(self, pose: Pose, duration_s: float) -> None:
         """Move straight to a pose; returns on arrival.
@@ -197,7 +189,6 @@ class Controller(Device[DeviceIdentity], Protocol):
             pose: the target, mm and deg, in the controller's own frames.
             duration_s: shortest duration, s.
         """
-        ...
 
     async def position(self) -> ReportedPosition | None:
         """Where it has the robot now.
@@ -205,7 +196,6 @@ class Controller(Device[DeviceIdentity], Protocol):
         Returns:
             Pose and joints; None before it is homed, when nobody knows.
         """
-        ...
 
     async def status(self) -> ControllerStatus:
         """Its status now, also during ``move``.
@@ -213,11 +203,9 @@ class Controller(Device[DeviceIdentity], Protocol):
         Returns:
             Emergency stop, enabled, error messages and heartbeat.
         """
-        ...
 
     async def stop(self) -> None:
         """Stop the motion in place, at once, also during ``move``."""
-        ...
 
     async def reload(self, permitted: StartupActions) -> None:
         """Make it reload its config; joints must not move. Afterwards it is as ``prepare`` leaves it.
@@ -230,7 +218,6 @@ class Controller(Device[DeviceIdentity], Protocol):
         Raises:
             drivers.errors.StartupNotPermitted: it needs another action; ``prepare`` may complete it.
         """
-        ...
 
 
 @runtime_checkable
@@ -239,7 +226,6 @@ class CheckedController(Protocol):
 
     async def check(self) -> None:
         """Raise if units, offsets or modes of it lead commands elsewhere; nothing is set, nothing moves."""
-        ...
 
 
 class StopInput(Device[DeviceIdentity | None], Protocol):
@@ -251,7 +237,6 @@ class StopInput(Device[DeviceIdentity | None], Protocol):
         Returns:
             The reason in words; None if motion is allowed.
         """
-        ...
 
 
 class Thermometer(Device[DeviceIdentity], Protocol):
@@ -260,7 +245,6 @@ class Thermometer(Device[DeviceIdentity], Protocol):
     @property
     def name(self) -> str:
         """Its name in the cell file."""
-        ...
 
     async def read(self) -> TemperatureReading:
         """The temperature now.
@@ -268,4 +252,3 @@ class Thermometer(Device[DeviceIdentity], Protocol):
         Returns:
             The temperature, deg C, within the time-out of the cell file.
         """
-        ...

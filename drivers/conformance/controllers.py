@@ -25,21 +25,17 @@ class ControllerTwin(Protocol):
     @property
     def settings(self) -> ControllerSettings:
         """The settings of the controller, with the address at which the twin answers."""
-        ...
 
     @property
     def target(self) -> Pose:
         """A pose in reach, other than that in which it starts."""
-        ...
 
     @property
     def out_of_reach(self) -> Pose:
         """A pose that it refuses."""
-        ...
 
     def inject(self, fault: FaultKind, *, on: bool) -> None:
         """Switch ``unplugged`` or ``silent`` on or off; ``emergency stop`` on."""
-        ...
 
 
 class ControllerConformance(Suite[Controller, ControllerTwin]):

@@ -25,15 +25,12 @@ class EncoderTwin(Protocol):
     @property
     def settings(self) -> EncoderSettings:
         """The settings of the encoders, with the address at which the twin answers."""
-        ...
 
     def stand_at(self, joints: Sequence[float]) -> None:
         """Move all joints at once, in the unit of the joint variables; from any thread."""
-        ...
 
     def inject(self, fault: FaultKind, *, on: bool) -> None:
         """Switch ``unplugged`` or ``silent`` of the encoder of leg 3, or of all, on or off."""
-        ...
 
 
 class EncoderConformance(Suite[EncoderBank, EncoderTwin]):

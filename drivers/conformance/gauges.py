@@ -25,15 +25,12 @@ class GaugeTwin(Protocol):
     @property
     def settings(self) -> GaugeSettings:
         """The settings of the gauge, with the port on which the twin answers."""
-        ...
 
     def show(self, mm: float) -> None:
         """Move the plunger, mm from the middle of its travel."""
-        ...
 
     def inject(self, fault: FaultKind, *, on: bool) -> None:
         """Switch ``unplugged``, ``silent`` or ``damaged`` on or off."""
-        ...
 
 
 class GaugeConformance(Suite[Gauge, GaugeTwin]):

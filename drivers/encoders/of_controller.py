@@ -34,7 +34,6 @@ class JointPositions(Protocol):
 
     async def joints_now(self) -> tuple[float, ...] | None:
         """The six joints, in the unit of the joint variables; None before they are homed."""
-        ...
 
 
 class ControllerScales:

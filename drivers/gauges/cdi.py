@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 from enum import IntEnum
 from functools import partial
-from typing import ClassVar
 
 from drivers.errors import GaugeAtEnd, GaugeSilent
 from drivers.gauges.protocol import (
@@ -60,10 +59,8 @@ def parse_parameter(frame: bytes, parameter: Parameter) -> int | None:
 class CdiGauge(SerialGauge):
     """A CDI or Starrett dial indicator."""
 
-    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
-        "cdi", "CDI or Starrett indicator", LineSettings(9600), "+  2.1380, MM\r\n"
-    )
-    normal_modes: ClassVar[frozenset[str]] = frozenset({"ABS", "INCR"})
+    spec = ProtocolSpec("cdi", "CDI or Starrett indicator", LineSettings(9600), "+  2.1380, MM\r\n")
+    normal_modes = frozenset({"ABS", "INCR"})
     value_request = b"R\r"
 
     _knows_parameters: bool | None = None

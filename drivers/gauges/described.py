@@ -11,7 +11,7 @@ import re
 from typing import ClassVar
 
 from drivers.gauges.plausibility import decimals_of
-from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec, Unit
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import SerialGauge, ValueOnlyGauge
 from drivers.gauges.streaming import Origin, StreamingGauge
 from drivers.serial.framing import LINE_ENDS
@@ -23,7 +23,7 @@ from hexacell.cell.devices import GaugeSettings
 class _DescribedGauge(SerialGauge):
     """A dial indicator, or what stands in its place, whose frames are ``frame`` of the cell file."""
 
-    probe: ClassVar[Probe | None] = None
+    probe = None
     protocol: ClassVar[str]
     vendors: ClassVar[str]
     frame: DescribedFrame

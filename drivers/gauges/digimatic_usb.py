@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from typing import ClassVar
 
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec
 from drivers.gauges.serial_gauge import ValueOnlyGauge
@@ -21,9 +20,7 @@ class DigimaticUsbGauge(ValueOnlyGauge):
     parity.
     """
 
-    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
-        "digimatic-usb", "Digimatic by microcontroller", LineSettings(115200), "-1.234\n"
-    )
+    spec = ProtocolSpec("digimatic-usb", "Digimatic by microcontroller", LineSettings(115200), "-1.234\n")
     value_request = b"\n"
     terminator = b"\n"
 

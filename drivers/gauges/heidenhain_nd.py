@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from typing import ClassVar
 
 from drivers.errors import WrongSetting
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec, Unit
@@ -21,10 +20,10 @@ class HeidenhainGauge(ValueOnlyGauge):
     return and line feed (ND 281B manual, page 47). The display may be set to add blank lines.
     """
 
-    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
+    spec = ProtocolSpec(
         "heidenhain-nd", "Heidenhain ND", LineSettings(9600, 7, "E", 2), "-      5.23  =A\r\n"
     )
-    probe: ClassVar[Probe | None] = Probe(is_last=True)  # others add STX to the question after it
+    probe = Probe(is_last=True)  # others add STX to the question after it
     value_request = b"\x02"
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from typing import ClassVar
 
 from drivers.errors import EmptyChannel
-from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec, Unit
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import ValueOnlyGauge
 from hexacell.errors import DeviceError
 
@@ -23,11 +22,11 @@ class KeyenceGauge(ValueOnlyGauge):
     ``ER,M0,nn`` is an error (DL-RS1A manual, pages 9 to 15). Values are within 199.9999; others mean none.
     """
 
-    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
+    spec = ProtocolSpec(
         "keyence-dl-rs1a", "Keyence DL-RS1A", LineSettings(9600), "M0,+001.2345,-000.0010\r\n"
     )
-    probe: ClassVar[Probe | None] = None  # the question stops machines: it is a G code
-    has_channels: ClassVar[bool] = True
+    probe = None  # the question stops machines: it is a G code
+    has_channels = True
     value_request = b"M0\r\n"
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:

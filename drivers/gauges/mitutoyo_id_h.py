@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from typing import ClassVar
 
 from drivers.errors import WrongSetting
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec
@@ -23,10 +22,8 @@ class IdHGauge(ValueOnlyGauge):
     feed (ID-H manual 99MAH016B, page 4-5). An inch display has five decimals.
     """
 
-    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
-        "mitutoyo-id-h", "Mitutoyo ID-H", LineSettings(9600), "GN01,+0016.2345\r\n"
-    )
-    has_channels: ClassVar[bool] = True
+    spec = ProtocolSpec("mitutoyo-id-h", "Mitutoyo ID-H", LineSettings(9600), "GN01,+0016.2345\r\n")
+    has_channels = True
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         super().__init__(settings, ports)

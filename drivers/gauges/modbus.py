@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import struct
-from typing import ClassVar
 
 from drivers.errors import WrongAnswer
 from drivers.gauges.plausibility import decimals_of
-from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec, Unit
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import ValueOnlyGauge
 from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort
 from drivers.serial.shared_port import SharedSerialPorts
@@ -27,7 +26,7 @@ class ModbusGauge(ValueOnlyGauge):
 
     terminator = b""
     port_factory = ModbusPort
-    probe: ClassVar[Probe | None] = None
+    probe = None
     spec = ProtocolSpec("modbus", "Modbus register", LineSettings(19200, parity="E"), "00 01 86 a0")
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:

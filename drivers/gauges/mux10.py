@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import re
 from contextlib import suppress
-from typing import ClassVar
 
 from drivers.errors import EmptyChannel, GaugeAtEnd, GaugeSilent, WrongAnswer
 from drivers.gauges.protocol import (
@@ -56,12 +55,10 @@ def parse_identification(frame: bytes) -> str:
 class Mux10Gauge(SerialGauge):
     """A dial indicator on one channel of a Mitutoyo MUX-10 or a multiplexer with its format."""
 
-    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
-        "mux10", "Mitutoyo MUX-10 channel", LineSettings(9600), "01A+0000.123\r"
-    )
-    probe: ClassVar[Probe | None] = Probe((19200, 4800, 2400, 38400, 57600, 115200))
-    has_channels: ClassVar[bool] = True
-    busy_pause_s: ClassVar[float] = 0.05
+    spec = ProtocolSpec("mux10", "Mitutoyo MUX-10 channel", LineSettings(9600), "01A+0000.123\r")
+    probe = Probe((19200, 4800, 2400, 38400, 57600, 115200))
+    has_channels = True
+    busy_pause_s = 0.05
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         super().__init__(settings, ports)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import ClassVar
 
 from drivers.errors import WrongAnswer
 from drivers.gauges.protocol import (
@@ -66,10 +65,10 @@ class SylvacGauge(SerialGauge):
     """A dial indicator that speaks Sylvac's opto-RS duplex protocol."""
 
     # duplex cables are powered by DTR high and RTS low
-    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
+    spec = ProtocolSpec(
         "sylvac", "Sylvac opto-RS indicator", LineSettings(4800, 7, "E", 2, rts=False), "+12.345\r"
     )
-    normal_modes: ClassVar[frozenset[str]] = frozenset({"NOR", "REF", "REF1", "REF2"})
+    normal_modes = frozenset({"NOR", "REF", "REF1", "REF2"})
     value_request = b"?\r"
 
     _previous = (b"", b"")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from typing import ClassVar
 
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, LineSettings, Probe, ProtocolSpec, Unit
 from drivers.gauges.streaming import Origin, StreamingGauge
@@ -30,12 +29,10 @@ class UwaveGauge(StreamingGauge):
     itself if its event-driven mode is on.
     """
 
-    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
-        "uwave", "Mitutoyo U-WAVE", LineSettings(57600), "DT10002-0000000.001M\r"
-    )
-    probe: ClassVar[Probe | None] = Probe(channel_of=channel_of)
-    has_channels: ClassVar[bool] = True
-    usual_delay_s: ClassVar[float] = 0.5  # its radio, and the transmitter's own interval
+    spec = ProtocolSpec("uwave", "Mitutoyo U-WAVE", LineSettings(57600), "DT10002-0000000.001M\r")
+    probe = Probe(channel_of=channel_of)
+    has_channels = True
+    usual_delay_s = 0.5  # its radio, and the transmitter's own interval
 
     def _origin(self, frame: bytes) -> Origin:
         if header := UWAVE_HEADER.match(frame):

@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cached_property, partial
-from typing import Any, ClassVar
+from typing import Any
 
 from drivers.errors import PortLost, WrongSetting
 from drivers.gauges.plausibility import decimals_of
@@ -22,7 +22,6 @@ from drivers.gauges.protocol import (
     FrameRejected,
     GaugeState,
     LineSettings,
-    Probe,
     ProtocolSpec,
     Unit,
 )
@@ -188,10 +187,8 @@ class VisaPort(RequestPort):
 class VisaGauge(SerialGauge):
     """A length that an instrument with SCPI measures."""
 
-    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
-        "visa", "instrument with SCPI", LineSettings(9600), "+1.23450000E-03\n"
-    )
-    probe: ClassVar[Probe | None] = None
+    spec = ProtocolSpec("visa", "instrument with SCPI", LineSettings(9600), "+1.23450000E-03\n")
+    probe = None
     terminator = b"\n"
     port_factory = VisaPort
 

@@ -36,7 +36,6 @@ class Switch(Protocol):
 
     def __call__(self, *, on: bool) -> object:
         """Inject it, or clear it; from any thread."""
-        ...
 
 
 def setting(owner: object, attribute: str, faulty: object = True, sound: object = False) -> Switch:

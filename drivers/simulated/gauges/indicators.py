@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -42,7 +41,7 @@ class Mux10(Instrument):
 
 
 class Sylvac(SingleIndicator):
-    """Sylvac's opto-RS duplex protocol: a command that is obeyed has no answer."""
+    """Sylvac's opto-RS duplex protocol."""
 
     baudrate: ClassVar[int] = 4800
     bits_a_byte: ClassVar[int] = 11
@@ -59,56 +58,23 @@ class Sylvac(SingleIndicator):
         word = command.replace(" ", "").upper()
         if word in {"?", "PRI"}:
             return self._value(1)
-        if word.endswith("?"):
-            return self._settings().get(word, "ERR1").encode("ascii") + b"\r"
-        return b"" if self._obeys(word) else b"ERR1\r"
-
-    def _settings(self) -> dict[str, str]:
         indicator = self.indicator
-        return {
+        settings = {
             "UNI?": "IN" if indicator.inch else "MM",
             "ID?": "SY276",
             "MOD?": "NOR" if indicator.peak_mm is None else "MAX",
             "STO?": "STO0" if indicator.held_mm is None else "STO1",
             "CHA?": "CHA-" if indicator.reversed else "CHA+",
-            "PRE?": f"PRE {indicator.preset_mm:+.3f}",
+            "PRE?": "PRE +0.000",
             "BAT?": "BAT0" if indicator.battery_low else "BAT1",
         }
-
-    def _obeys(self, word: str) -> bool:
-        """Carry out a command; whether it is one."""
-        indicator = self.indicator
-        match word:
-            case "MM" | "IN":
-                indicator.inch = word == "IN"
-            case "CHA+" | "CHA-":
-                indicator.reversed = word == "CHA-"
-            case "STO0" | "STO1":
-                indicator.set_hold(on=word == "STO1")
-            case "PRE":
-                indicator.recall_preset()
-            case "OFF":
-                indicator.powered = False
-            case _:
-                return word.startswith("PRE") and self._set_preset(word[3:])
-        return True
-
-    def _set_preset(self, number: str) -> bool:
-        try:
-            self.indicator.preset_mm = float(number)
-        except ValueError:
-            return False
-        return True
+        return settings.get(word, "ERR1").encode("ascii") + b"\r"
 
 
 class Cdi(SingleIndicator):
     """The serial ASCII protocol of CDI and Starrett, with the parameters that can falsify a value."""
 
     at_end: ClassVar[bytes] = b"OUT OF BOUNDS\r\n"
-
-    def __init__(self, indicators: Mapping[int, Indicator]) -> None:
-        super().__init__(indicators)
-        self._without_effect = {"011": 0, "040": 0}  # mode and ratio are only stored
 
     @staticmethod
     def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
@@ -118,52 +84,19 @@ class Cdi(SingleIndicator):
         return sign + number + (b", IN\r\n" if inch else b", MM\r\n")
 
     def _reply(self, command: str) -> bytes:
-        """Parameters are asked for as ``?p013`` and set as ``p013=2``."""
-        match command:
-            case "R":
-                return self._value(1)
-            case "C":
-                self.indicator.recall_preset()
-                return b"SUCCESS\r\n"
-            case "H":
-                self.indicator.set_hold(on=self.indicator.held_mm is None)
-                return b"SUCCESS\r\n"
-        return self._parameter(command)
-
-    def _parameter(self, command: str) -> bytes:
-        match = re.fullmatch(r"(\?)?[pP](\d{3})(?:=(.*))?", command)
-        parameters = self._parameters()
-        if match is None or match[2] not in parameters:
-            return b"NOT FOUND\r\n"
-        asked, number, setting = match.groups()
-        return b"%d\r\n" % parameters[number] if asked else self._set(number, setting or "")
-
-    def _parameters(self) -> dict[str, int]:
+        """Parameters are asked for as ``?p013``: the mode is TIR with a peak, else ABS; no ratio."""
+        if command == "R":
+            return self._value(1)
         indicator = self.indicator
-        peak = {} if indicator.peak_mm is None else {"011": 1}
-        return self._without_effect | {
-            "013": 1 if indicator.inch else 2,
-            "019": int(indicator.reversed),
-            "021": int(indicator.held_mm is not None),
-            **peak,
+        parameters = {
+            "?P011": indicator.peak_mm is not None,
+            "?P013": 1 if indicator.inch else 2,
+            "?P019": indicator.reversed,
+            "?P021": indicator.held_mm is not None,
+            "?P040": 0,
         }
-
-    def _set(self, number: str, setting: str) -> bytes:
-        if not setting.isdigit():
-            return b"NON NUMERIC\r\n"
-        value = int(setting)
-        if value not in {"011": range(3), "013": range(1, 3)}.get(number, range(2)):
-            return b"OUT OF BOUNDS\r\n"
-        match number:
-            case "013":
-                self.indicator.inch = value == 1
-            case "019":
-                self.indicator.reversed = value == 1
-            case "021":
-                self.indicator.set_hold(on=value == 1)
-            case _:
-                self._without_effect[number] = value
-        return b"SUCCESS\r\n"
+        number = parameters.get(command.replace("p", "P"))
+        return b"NOT FOUND\r\n" if number is None else b"%d\r\n" % number
 
 
 class IdH(Instrument):

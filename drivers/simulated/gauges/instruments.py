@@ -37,7 +37,6 @@ class Indicator:
         self.inch = False
         self.reversed = False
         self.battery_low = False
-        self.preset_mm = 0.0
         self.powered = True
         self.held_mm: float | None = None
         self.plunger = plunger
@@ -69,18 +68,14 @@ class Indicator:
     def set_zeroed(self, *, on: bool) -> None:
         """Press the zero key; what it did stays."""
         if on:
-            self.recall_preset()
-
-    def recall_preset(self) -> None:
-        """Set the display to the preset value; with a preset of 0 this is the zero key."""
-        self._offset_mm += self.preset_mm - (self._live_mm() or 0.0)
+            self._offset_mm -= self._live_mm() or 0.0
 
     def switch_on(self) -> None:
         """Switch on: no hold, and the zero at the present plunger position."""
         self.powered = True
         self.set_hold(on=False)
         self._offset_mm = 0.0
-        self._offset_mm = -(self._live_mm() or 0.0)
+        self.set_zeroed(on=True)
 
     def set_frozen(self, *, on: bool) -> None:
         """Jam the plunger at its position, or free it; the instrument still answers."""

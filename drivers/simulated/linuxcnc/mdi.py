@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from hexacell.kinematics.pose import Pose
@@ -16,8 +16,7 @@ _FEED_MODES = (93.0, 94.0)
 _MODES = (17.0, 21.0, 49.0, 54.0, 64.0, 90.0)
 """G codes of the modes that are always active here."""
 
-_MACHINE_COORDINATES, _SET_COORDINATE_SYSTEM = 53.0, 10.0
-_SET_OFFSET, _NO_OFFSET = 92.0, 92.1
+_MACHINE_COORDINATES = 53.0
 _NOWHERE = (0.0,) * len(_AXES)
 
 INVERSE_TIME, PER_MINUTE = 93, 94
@@ -80,8 +79,6 @@ def parse_block(block: str, current: Pose, modes: ModalState | None = None) -> P
     codes = [value for letter, value in words if letter == "G"]
     numbers = {letter: value for letter, value in words if letter != "G"}
     before = modes or ModalState()
-    if {_SET_COORDINATE_SYSTEM, _SET_OFFSET, _NO_OFFSET} & {*codes}:
-        return ParsedBlock(_coordinates_after(codes, numbers, current, before))
     for letter in numbers:
         if letter not in (*_AXES, "F"):
             raise BlockError(f"Bad character '{letter.lower()}' used")
@@ -90,31 +87,12 @@ def parse_block(block: str, current: Pose, modes: ModalState | None = None) -> P
     if not numbers and 1.0 not in codes:
         return ParsedBlock(after)
     system = ModalState() if _MACHINE_COORDINATES in codes else after
-    turned = _rotated(_with(_in_system(current, system), numbers), system.rotation_deg)
+    stated = zip(_AXES, _in_system(current, system).as_tuple(), strict=True)
+    turned = _rotated(Pose(*(numbers.get(axis, value) for axis, value in stated)), system.rotation_deg)
     pairs = zip(turned.as_tuple(), system.offsets, strict=True)
     target = Pose(*(value + offset for value, offset in pairs))
     duration_s = _duration(after, feed, current, target)
     return ParsedBlock(after, target, duration_s) if numbers else ParsedBlock(after)
-
-
-def _coordinates_after(
-    codes: Sequence[float], numbers: Mapping[str, float], current: Pose, before: ModalState
-) -> ModalState:
-    if _NO_OFFSET in codes:
-        return replace(before, offset=_NOWHERE)
-    if _SET_OFFSET in codes:
-        here = _in_system(current, before).as_tuple()
-        wanted = _with(Pose(*here), numbers).as_tuple()
-        pairs = zip(before.offset, here, wanted, strict=True)
-        return replace(before, offset=tuple(old + now - new for old, now, new in pairs))
-    work = _with(Pose(*before.work_offset), numbers).as_tuple()
-    return replace(before, work_offset=work, rotation_deg=numbers.get("R", before.rotation_deg))
-
-
-def _with(pose: Pose, numbers: Mapping[str, float]) -> Pose:
-    """The pose with the coordinates that are among the words of a block."""
-    pairs = zip(_AXES, pose.as_tuple(), strict=True)
-    return Pose(*(numbers.get(axis, value) for axis, value in pairs))
 
 
 def _in_system(pose: Pose, system: ModalState) -> Pose:

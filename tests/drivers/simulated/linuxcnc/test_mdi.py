@@ -59,7 +59,7 @@ def test_a_move_lasts_as_its_feed_or_inverse_time_says(block, duration_s):
 
 
 def test_a_rotated_coordinate_system_turns_every_move_but_one_in_machine_coordinates():
-    rotated = parse_block("G10 L2 P1 R90", HERE).modes
+    rotated = ModalState(rotation_deg=90.0)
     there = Pose(100.0, 0.0, 550.0, 0.0, 0.0, 0.0)
     words = "X100 Y0 Z550 A0 B0 C0"
     turned = parse_block(f"G0 {words}", HERE, rotated).target
@@ -67,24 +67,14 @@ def test_a_rotated_coordinate_system_turns_every_move_but_one_in_machine_coordin
     assert turned.as_tuple() == pytest.approx((0.0, 100.0, 550.0, 0.0, 0.0, 0.0))
     assert parse_block(f"G53 G0 {words}", HERE, rotated).target == there
     assert parse_block("G94", HERE, rotated).modes.rotation_deg == 90.0
-    assert parse_block("G10 L2 P1 R0", HERE, rotated).modes.rotation_deg == 0.0
 
 
-@pytest.mark.parametrize("block", ["G10 L2 P1 X10 C5", "G92 X90 C-5"])
-def test_an_offset_moves_every_target_but_one_in_machine_coordinates(block):
+def test_offsets_move_every_target_but_one_in_machine_coordinates():
     here = Pose(100.0, 0.0, 550.0, 0.0, 0.0, 0.0)
-    shifted = parse_block(block, here).modes
-    assert shifted.offsets == (10.0, 0.0, 0.0, 0.0, 0.0, 5.0)
+    shifted = ModalState(work_offset=(4.0, 0.0, 0.0, 0.0, 0.0, 5.0), offset=(6.0,) + (0.0,) * 5)
     moved = parse_block("G0 X20 C1", here, shifted).target
     assert moved == Pose(30.0, 0.0, 550.0, 0.0, 0.0, 6.0)
     assert parse_block("G53 G0 X20 C1", here, shifted).target == Pose(20.0, 0.0, 550.0, 0.0, 0.0, 1.0)
-
-
-def test_one_offset_is_added_to_the_other_and_cleared_alone():
-    shifted = parse_block("G92 X4", HERE, parse_block("G10 L2 P1 X1", HERE).modes).modes
-    assert shifted.offsets[0] == HERE.x - 4.0
-    assert parse_block("G92.1", HERE, shifted).modes.offsets[0] == 1.0
-    assert parse_block("G10 L2 P1 X0", HERE, shifted).modes.offsets[0] == HERE.x - 5.0
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol
 
-from drivers.conformance.suite import Suite, against_twin, failure, require_named
+from drivers.conformance.suite import FAULTS, Suite, against_twin, failure, require_named
 from drivers.encoders.bank import joint_variables
 from drivers.interfaces import EncoderBank
 from hexacell.cell.devices import EncoderSettings
@@ -52,9 +52,7 @@ class EncoderConformance(Suite[EncoderBank, EncoderTwin]):
         return self.driver(twin)
 
     @against_twin
-    async def test_they_are_the_same_whenever_they_are_opened(
-        self, bank: EncoderBank, twin: EncoderTwin
-    ) -> None:
+    async def test_they_are_the_same_when_reopened(self, bank: EncoderBank, twin: EncoderTwin) -> None:
         first = await bank.open()
         await bank.close()
         assert await bank.open() == first
@@ -68,9 +66,7 @@ class EncoderConformance(Suite[EncoderBank, EncoderTwin]):
             await self._require_at(bank, twin, joints)
 
     @against_twin
-    async def test_counts_are_raw_and_give_the_positions_again(
-        self, bank: EncoderBank, twin: EncoderTwin
-    ) -> None:
+    async def test_raw_counts_give_the_positions(self, bank: EncoderBank, twin: EncoderTwin) -> None:
         twin.stand_at(POSITIONS[1])
         await bank.open()
         sample = await bank.read()
@@ -88,9 +84,7 @@ class EncoderConformance(Suite[EncoderBank, EncoderTwin]):
                 assert max(found) - min(found) <= 2 * self.tolerance, found
 
     @against_twin
-    async def test_closing_twice_is_harmless_and_closed_ones_are_named(
-        self, bank: EncoderBank, twin: EncoderTwin
-    ) -> None:
+    async def test_closing_twice_is_harmless(self, bank: EncoderBank, twin: EncoderTwin) -> None:
         await bank.close()
         await bank.open()
         await bank.close()
@@ -98,21 +92,19 @@ class EncoderConformance(Suite[EncoderBank, EncoderTwin]):
         require_named(await failure(bank.read), self.name)
 
     @against_twin
-    async def test_one_that_is_unplugged_fails_all_and_can_be_opened_again(
-        self, bank: EncoderBank, twin: EncoderTwin
-    ) -> None:
-        await self._fails_and_comes_back(bank, twin, "unplugged")
+    async def test_they_reopen_after_a_fault_of_one(self, bank: EncoderBank, twin: EncoderTwin) -> None:
+        for fault in FAULTS:
+            await bank.open()
+            twin.inject(fault, on=True)
+            require_named(await failure(bank.read), self.name)
+            twin.inject(fault, on=False)
+            twin.stand_at(POSITIONS[1])
+            await bank.close()
+            await bank.open()
+            await self._require_at(bank, twin, POSITIONS[1])
 
     @against_twin
-    async def test_one_that_is_silent_fails_all_and_can_be_opened_again(
-        self, bank: EncoderBank, twin: EncoderTwin
-    ) -> None:
-        await self._fails_and_comes_back(bank, twin, "silent")
-
-    @against_twin
-    async def test_a_sample_that_is_given_up_leaves_them_in_step(
-        self, bank: EncoderBank, twin: EncoderTwin
-    ) -> None:
+    async def test_a_cancelled_read_leaves_them_in_step(self, bank: EncoderBank, twin: EncoderTwin) -> None:
         await bank.open()
         for joints in POSITIONS:
             given_up = asyncio.create_task(bank.read())
@@ -121,16 +113,6 @@ class EncoderConformance(Suite[EncoderBank, EncoderTwin]):
             await asyncio.gather(given_up, return_exceptions=True)
             twin.stand_at(joints)
             await self._require_at(bank, twin, joints)
-
-    async def _fails_and_comes_back(self, bank: EncoderBank, twin: EncoderTwin, fault: FaultKind) -> None:
-        await bank.open()
-        twin.inject(fault, on=True)
-        require_named(await failure(bank.read), self.name)
-        twin.inject(fault, on=False)
-        twin.stand_at(POSITIONS[1])
-        await bank.close()
-        await bank.open()
-        await self._require_at(bank, twin, POSITIONS[1])
 
     async def _require_at(self, bank: EncoderBank, twin: EncoderTwin, joints: Sequence[float]) -> None:
         sample = await bank.read()

@@ -9,8 +9,10 @@ from contextlib import AbstractContextManager, asynccontextmanager
 from typing import Any, Generic, TypeVar
 
 from drivers.interfaces import Device
+from hexacell.cell.simulation import FaultKind
 from hexacell.errors import DeviceError
 
+FAULTS: tuple[FaultKind, ...] = ("unplugged", "silent")
 LONGEST_S = 60.0
 """No call may take longer, whatever the device does."""
 

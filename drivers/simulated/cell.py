@@ -6,9 +6,8 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
-from drivers.simulated.encoders.bank import SimulatedEncoderBank
+from drivers.simulated.encoders.bank import Positions, SimulatedEncoderBank
 from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
 from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.fault_schedule import CellFaults, FaultSchedule
@@ -19,7 +18,7 @@ from drivers.simulated.robot import SimulatedMachine
 from drivers.simulated.serial_line import PtyLine
 from drivers.simulated.served_device import ServedGroup
 from drivers.simulated.slcan import SlcanServer
-from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.devices import EncoderSettings, GaugeSettings
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
@@ -48,16 +47,13 @@ class SimulatedSensors(ServedGroup):
             self.gauges = served.enter_context(
                 SimulatedGaugeBank(settings.gauges, plungers, simulation.gauges, clock)
             )
-            self.encoders = _encoder_bank(settings, simulation, physics, clock)
+            latency_s = simulation.encoders.latency_s
+            self.encoders = encoder_bank(settings.encoders, physics.encoder_positions, clock, latency_s)
             served.enter_context(self.encoders)
-            self._address: dict[str, Any] = {}
-            if isinstance(self.encoders, SimulatedModbusBank):
-                self._address = {"modbus": self.encoders.described}
-            elif other_processes:
+            self._address = self.encoders.address
+            if other_processes and not isinstance(self.encoders, SimulatedModbusBank):
                 adapter = served.enter_context(SlcanServer(self.encoders.channel, PtyLine("slcan")))
                 self._address = {"bus": adapter.bus_settings}
-            else:
-                self._address = {"bus": self.encoders.bus_settings}
             self._served = served.pop_all()
 
     def addressed(self, settings: CellSettings) -> CellSettings:
@@ -68,15 +64,10 @@ class SimulatedSensors(ServedGroup):
         )
 
 
-def _encoder_bank(
-    settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
+def encoder_bank(
+    encoders: EncoderSettings, positions: Positions, clock: CellClock, latency_s: float = 0.0
 ) -> SimulatedEncoderBank | SimulatedDbcBank | SimulatedModbusBank:
-    encoders, latency_s = settings.encoders, simulation.encoders.latency_s
-
-    def positions() -> list[float]:
-        found: list[float] = physics.encoder_positions().tolist()
-        return found
-
+    """The six encoders that the settings describe, served; ``address`` is where a driver finds them."""
     if encoders.modbus is not None:
         return SimulatedModbusBank(encoders, encoders.modbus, positions, clock, latency_s)
     if encoders.dbc is not None:

@@ -8,7 +8,6 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell.identification.problem.prior import Tolerances
 from hexacell.kinematics import rotations
@@ -69,9 +68,12 @@ class MechanismExample:
         at = self.poses if poses is None else poses
         return self.mechanism.inverse(geometry, self.branch, at)
 
-    def reached(self, geometry: Geometry) -> NDArray[np.intp]:
-        """Which of the poses a robot reaches."""
-        return np.flatnonzero(np.isfinite(self.joints(geometry)).all(axis=-1))
+    def robots_in_reach(self) -> Iterator[tuple[Geometry, PoseBatch, Array]]:
+        """Each of the robots with the poses (n,) that it reaches, and its joint variables (n, 6) there."""
+        for geometry in self.robots():
+            joints = self.joints(geometry)
+            reached = np.flatnonzero(np.isfinite(joints).all(axis=-1))
+            yield geometry, self.poses[reached], joints[reached]
 
     def changes_of_frames(self) -> Iterator[FrameTransform]:
         """Changes that the mechanism's parameters can express: each axis alone, and all together."""
@@ -90,8 +92,7 @@ class MechanismExample:
         poses = poses[np.flatnonzero(reached)]
         margins = singularity_margin(self.mechanism, self.drawing, poses, self.joints(self.drawing, poses))
         clear = np.flatnonzero(margins > LEAST_MARGIN)[:TURNS]
-        if len(clear) < TURNS:
-            raise AssertionError(f"the drawing's robot reaches too few orientations at the point {point}")
+        assert len(clear) == TURNS, f"the drawing's robot reaches too few orientations at the point {point}"
         return poses[clear]
 
     def labels(self) -> Iterator[tuple[int, int]]:

@@ -41,14 +41,10 @@ class FrameTests:
         example = self.example
         convention, parameters = example.mechanism.convention, example.mechanism.parameters
         ruled = [*convention.zero, *(name for group in convention.equal for name in group)]
-        if not set(ruled) <= set(parameters.names) or len(set(ruled)) != len(ruled):
-            raise AssertionError("a rule names no parameter, or one that another rule names")
-        fixed = len(parameters) - len(convention.free_names)
-        if fixed != len(example.mechanism.frame_freedom.columns):
-            raise AssertionError(
-                f"the rules fix {fixed} numbers, the frames may be changed in "
-                f"{len(example.mechanism.frame_freedom.columns)} ways"
-            )
+        assert set(ruled) <= set(parameters.names), "a rule names no parameter"
+        assert len(set(ruled)) == len(ruled), "a rule names a parameter that another rule names"
+        fixed, ways = len(parameters) - len(convention.free_names), example.mechanism.frame_freedom.columns
+        assert fixed == len(ways), f"the rules fix {fixed} numbers, frames change in {len(ways)} ways"
 
     def test_the_convention_is_idempotent(self) -> None:
         """The convention's frames satisfy its rules exactly, and are found again from any others."""
@@ -95,15 +91,11 @@ class FrameTests:
         free = _by_parameters(example, convention.basis)
         rank = int(np.sum(all_together > LEAST_DETERMINED * all_together[0]))
         determined = len(free) - example.mechanism.frame_freedom.size
-        if rank != determined:
-            raise AssertionError(
-                f"the poses determine {rank} parameters, the convention leaves {len(free)} free"
-                + (", one of them the size" if example.mechanism.frame_freedom.size else "")
-            )
-        if free[determined - 1] < LEAST_DETERMINED * free[0]:
-            raise AssertionError(
-                f"a free parameter is not determined: {free[determined - 1] / free[0]:.1e}"
-            )
+        size = ", one of them the size" if example.mechanism.frame_freedom.size else ""
+        words = f"the poses determine {rank} parameters, the convention leaves {len(free)} free{size}"
+        assert rank == determined, words
+        least = free[determined - 1] / free[0]
+        assert least >= LEAST_DETERMINED, f"a free parameter is not determined: {least:.1e}"
 
     def test_exact_records_are_identified(self) -> None:
         """A robot within the tolerances is identified from its records, commanded with the drawing."""
@@ -119,13 +111,11 @@ class FrameTests:
         ).problem(records_without_noise(example, truth))
         found = identify(problem)
         # How large a machine is, records without noise seem to show, and sigma says that they do not.
-        if found.undetermined and not example.mechanism.frame_freedom.size:
-            raise AssertionError(f"not determined: {', '.join(found.undetermined)}")
+        size = example.mechanism.frame_freedom.size
+        assert size or not found.undetermined, f"not determined: {', '.join(found.undetermined)}"
         unseen, error = _error(found, example.mechanism.convention.free_parameters(normal))
-        if unseen != example.mechanism.frame_freedom.size:
-            raise AssertionError(f"the records leave {unseen} directions to the tolerances")
-        if not error < LARGEST_ERROR:
-            raise AssertionError(f"the identified geometry is {error:.1e} off")
+        assert unseen == size, f"the records leave {unseen} directions to the tolerances"
+        assert error < LARGEST_ERROR, f"the identified geometry is {error:.1e} off"
 
 
 def _by_parameters(example: MechanismExample, basis: Array) -> Array:
@@ -179,6 +169,5 @@ def records_without_noise(example: MechanismExample, truth: Geometry) -> Measure
             deviation = deviation_of(balls[row] - zeros.setdefault(point, balls[row]))
             pose = example.poses.pose(row)
             records.append(Record(point, orientation, pose, joints_of(joints[row]), deviation))
-    if 2 * len(records) < len(balls):
-        raise AssertionError("the robot cannot take most of the drawing's poses")
+    assert 2 * len(records) >= len(balls), "the robot cannot take most of the drawing's poses"
     return MeasurementSet(tuple(records))

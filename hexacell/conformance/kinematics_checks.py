@@ -41,16 +41,13 @@ class KinematicsTests:
         """The inverse closes every leg, is on its branch, and gives NaN or a number anywhere."""
         example = self.example
         mechanism = example.mechanism
-        for geometry in example.robots():
-            reached = example.reached(geometry)
-            poses, joints = example.poses[reached], example.joints(geometry)[reached]
+        for geometry, poses, joints in example.robots_in_reach():
             residual = mechanism.residual_and_jacobian(geometry, poses, joints)[0]
             np.testing.assert_allclose(residual, 0.0, atol=ROUNDING, err_msg="the inverse leaves legs open")
             sides = np.array(example.branch or (1,) * 6)
             found = mechanism.branch(geometry, poses, joints)
-            np.testing.assert_array_equal(
-                found, np.broadcast_to(sides, found.shape), "branch of the inverse"
-            )
+            expected = np.broadcast_to(sides, found.shape)
+            np.testing.assert_array_equal(found, expected, "branch of the inverse")
         far = PoseBatch.at(np.full(3, FAR_MM), example.poses.rotations)
         with np.errstate(all="raise"):
             mechanism.inverse(example.drawing, example.branch, far)
@@ -66,47 +63,37 @@ class KinematicsTests:
     def test_derivatives_are_those_of_the_constraints(self) -> None:
         """All derivatives are those of the constraints (central differences), off closed poses too."""
         example = self.example
-        for geometry in example.robots():
-            random = np.random.default_rng(3)
-            reached = example.reached(geometry)
-            off = OFF * random.uniform(-1.0, 1.0, (len(reached), 6))
-            poses = apply_twist(example.poses[reached], off)
-            _check_derivatives_at(example, geometry, poses, example.joints(geometry)[reached])
+        for geometry, poses, joints in example.robots_in_reach():
+            off = OFF * np.random.default_rng(3).uniform(-1.0, 1.0, (len(poses), 6))
+            _check_derivatives_at(example, geometry, apply_twist(poses, off), joints)
 
     def test_encoder_zeros_are_changes_of_parameters(self) -> None:
         """A leg with another zero closes with as much less on its encoder; no other leg changes."""
         example = self.example
         mechanism = example.mechanism
-        for geometry in example.robots():
-            reached = example.reached(geometry)
-            poses, joints = example.poses[reached], example.joints(geometry)[reached]
+        for geometry, poses, joints in example.robots_in_reach():
             zeros = mechanism.encoder_zeros(geometry)
             for leg in range(6):
                 changed = Geometry(mechanism.parameters, geometry.vector + zeros[:, leg])
                 shown = joints - np.eye(6)[leg]
                 left = mechanism.residual_and_jacobian(changed, poses, shown)[0]
-                np.testing.assert_allclose(
-                    left, 0.0, atol=ROUNDING, err_msg=f"encoder zero of leg {leg + 1}"
-                )
+                words = f"encoder zero of leg {leg + 1}"
+                np.testing.assert_allclose(left, 0.0, atol=ROUNDING, err_msg=words)
 
     def test_forward_and_inverse_agree(self) -> None:
         """Forward kinematics from the drawing's pose leads back to where the inverse sends the robot."""
         example = self.example
-        for geometry in example.robots():
-            reached = example.reached(geometry)
+        for geometry, poses, joints in example.robots_in_reach():
             found = continue_solution(
                 example.mechanism,
                 geometry,
-                example.joints(geometry)[reached],
-                start=example.poses[reached],
+                joints,
+                start=poses,
                 start_geometry=example.drawing,
-                start_joints=example.joints(example.drawing)[reached],
+                start_joints=example.joints(example.drawing, poses),
             )
-            if not found.found.all():
-                raise AssertionError(
-                    "forward kinematics finds no pose within the tolerances of the drawing"
-                )
-            poses = example.poses[reached]
+            words = "forward kinematics finds no pose within the tolerances of the drawing"
+            assert found.found.all(), words
             np.testing.assert_allclose(found.poses.positions, poses.positions, atol=1e-6)
             np.testing.assert_allclose(found.poses.rotations, poses.rotations, atol=1e-8)
 
@@ -139,8 +126,8 @@ class KinematicsTests:
         radius = np.linalg.norm(own[0], axis=-1).mean()
         np.testing.assert_allclose(mechanism.platform_radius(example.drawing), radius, atol=ROUNDING)
         has_guides = mechanism.guides(example.drawing, poses, example.joints(example.drawing)) is not None
-        if has_guides != (mechanism.words.guide is not None):
-            raise AssertionError("a mechanism has a word for its guides exactly if it has guides")
+        words = "a mechanism has a word for its guides exactly if it has guides"
+        assert has_guides == (mechanism.words.guide is not None), words
 
 
 def _check_derivatives_at(

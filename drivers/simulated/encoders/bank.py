@@ -15,8 +15,9 @@ from hexacell.cell.devices import NM, EncoderSettings, RotaryEncoderSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.clock import CellClock
 from hexacell.kinematics.parameters import JointUnit
+from hexacell.kinematics.rotations import Array
 
-Positions = Callable[[], Sequence[float]]
+Positions = Callable[[], Sequence[float] | Array]
 
 _SYNC = 0x080
 _ALL_BITS = 1 << 32
@@ -28,7 +29,7 @@ JUMP = 400.0
 def shown_positions(settings: EncoderSettings, positions: Positions) -> list[float]:
     """What each encoder shows now, from its own zero and in its own direction."""
     places = zip(positions(), settings.offset, settings.direction, strict=True)
-    return [(position - offset) * direction for position, offset, direction in places]
+    return [(float(position) - offset) * direction for position, offset, direction in places]
 
 
 class SimulatedEncoderBank(Closeable):
@@ -49,6 +50,7 @@ class SimulatedEncoderBank(Closeable):
     ) -> None:
         self.channel = f"hexacell-encoders-{uuid.uuid4().hex}"
         self.bus_settings: dict[str, Any] = {"interface": "virtual", "channel": self.channel}
+        self.address: dict[str, Any] = {"bus": self.bus_settings}
         self.bus = SimulatedCanBus(self.channel)
         self._settings = settings
         self._positions = positions

@@ -62,6 +62,7 @@ class SimulatedDbcBank(Closeable):
             raise FileError("legs share a message", subject=described.file, action="Give each leg its own")
         self.channel = f"hexacell-encoders-{uuid.uuid4().hex}"
         self.bus_settings: dict[str, Any] = {"interface": "virtual", "channel": self.channel}
+        self.address: dict[str, Any] = {"bus": self.bus_settings}
         self.bus = SimulatedCanBus(self.channel)
         self._encoders = tuple(SimulatedDbcEncoder(one, described.must_be) for one in self._signals)
         if described.request is None:

@@ -6,7 +6,7 @@ import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from drivers.simulated.encoders.bank import JUMP, Positions, shown_positions
 from drivers.simulated.gauges.described import BROADCAST, WRITE_REGISTER, answer, refusal, split_requests
@@ -112,6 +112,7 @@ class SimulatedModbusBank(Closeable):
             faults=LineFaults(LATE_TIMEOUTS * settings.timeout_s),
         )
         self.described = described.model_copy(update={"port": self._served.url})
+        self.address: dict[str, Any] = {"modbus": self.described}
 
     def faults(self, leg: int) -> dict[FaultKind, Switch]:
         scale = self._faulty[leg - 1]

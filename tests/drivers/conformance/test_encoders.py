@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,18 +16,14 @@ from drivers.encoders.dbc import DbcBank
 from drivers.encoders.modbus import ModbusBank
 from drivers.encoders.of_controller import ControllerScales
 from drivers.interfaces import DeviceIdentity, EncoderBank, EncoderSample, StartupAction
-from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
-from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.cell.robot import ControllerSettings
 from hexacell.cell.simulation import FaultKind
-from hexacell.clock import CellClock
 from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
 
 TIMEOUT_S = 1.0
-QUICKER = 100.0
 
 
 class Cia406(EncoderConformance):
@@ -115,60 +111,21 @@ class TestScalesOfAController(EncoderConformance):
             yield ControllerTwin(machine, server)
 
 
-class DbcTwin:
-    """Six encoders that a DBC file describes."""
-
-    def __init__(self, folder: Path) -> None:
-        (folder / "encoders.dbc").write_text(dbc_text())
-        described = {"file": str(folder / "encoders.dbc"), "signals": SIGNALS, "request": "080#"}
-        stated = LinearEncoderSettings.model_validate(
-            {"protocol": "dbc", "timeout_s": TIMEOUT_S, "measuring_step_nm": 500, "dbc": described}
-        )
-        assert stated.dbc is not None
-        self._joints: tuple[float, ...] = (0.0,) * 6
-        self.bank = SimulatedDbcBank(stated, stated.dbc, lambda: self._joints)
-        self.settings = stated.model_copy(update={"bus": self.bank.bus_settings})
-
-    def stand_at(self, joints: Sequence[float]) -> None:
-        self._joints = tuple(joints)
-
-    def inject(self, fault: FaultKind, *, on: bool) -> None:
-        self.bank.faults(3)[fault](on=on)
-
-    def close(self) -> None:
-        self.bank.close()
-
-
 class TestByDbcFile(EncoderConformance):
     def driver(self, twin: EncoderTwin) -> EncoderBank:
         return DbcBank(twin.settings)
 
     @contextmanager
     def twin(self) -> Iterator[EncoderTwin]:
-        with TemporaryDirectory() as folder, closing(DbcTwin(Path(folder))) as twin:
-            yield twin
-
-
-class ModbusTwin:
-    """Six encoders with Modbus RTU."""
-
-    def __init__(self, modbus: dict[str, object]) -> None:
-        stated = LinearEncoderSettings.model_validate(
-            {"protocol": "modbus", "timeout_s": TIMEOUT_S, "modbus": modbus}
-        )
-        assert stated.modbus is not None
-        self._joints: tuple[float, ...] = (0.0,) * 6
-        self.bank = SimulatedModbusBank(stated, stated.modbus, lambda: self._joints, CellClock(QUICKER))
-        self.settings = stated.model_copy(update={"modbus": self.bank.described})
-
-    def stand_at(self, joints: Sequence[float]) -> None:
-        self._joints = tuple(joints)
-
-    def inject(self, fault: FaultKind, *, on: bool) -> None:
-        self.bank.faults(3)[fault](on=on)
-
-    def close(self) -> None:
-        self.bank.close()
+        with TemporaryDirectory() as folder:
+            (Path(folder) / "encoders.dbc").write_text(dbc_text())
+            described = {"file": f"{folder}/encoders.dbc", "signals": SIGNALS, "request": "080#"}
+            with served_encoder_twin(
+                LinearEncoderSettings.model_validate(
+                    {"protocol": "dbc", "timeout_s": TIMEOUT_S, "measuring_step_nm": 500, "dbc": described}
+                )
+            ) as twin:
+                yield twin
 
 
 class TestModbusOfOneDevice(EncoderConformance):
@@ -177,10 +134,9 @@ class TestModbusOfOneDevice(EncoderConformance):
     def driver(self, twin: EncoderTwin) -> EncoderBank:
         return ModbusBank(twin.settings)
 
-    @contextmanager
-    def twin(self) -> Iterator[EncoderTwin]:
-        with closing(ModbusTwin(dict(self.modbus))) as twin:
-            yield twin
+    def twin(self) -> AbstractContextManager[EncoderTwin]:
+        stated = {"protocol": "modbus", "timeout_s": TIMEOUT_S, "modbus": self.modbus}
+        return served_encoder_twin(LinearEncoderSettings.model_validate(stated))
 
 
 class TestModbusOfSixDevicesThatLatch(TestModbusOfOneDevice):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sched
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -95,7 +94,7 @@ def _set_stop_file(stop_file: Path, *, on: bool) -> None:
 
 
 class FaultSchedule(Closeable):
-    """Injects and clears scheduled faults, on a thread of its own.
+    """Injects and clears scheduled faults, from timers.
 
     Attributes:
         move_count: how many moves have started.
@@ -111,14 +110,11 @@ class FaultSchedule(Closeable):
         self._faults = faults
         self._clock = clock
         self._waiting: list[SimulatedFault] = []
+        self._timers: list[threading.Timer] = []
+        self._is_closed = False
         self._lock = threading.Lock()
-        self._due = sched.scheduler(clock.now)
-        self._changed = threading.Event()
-        self._closing = False
         for fault in planned:
             self.schedule(fault)
-        self._thread = threading.Thread(target=self._serve, name="simulated faults")
-        self._thread.start()
 
     def schedule(self, fault: SimulatedFault) -> None:
         """Schedule a fault: in a move, or some time after now.
@@ -142,19 +138,17 @@ class FaultSchedule(Closeable):
                 self._enqueue(fault)
 
     def close(self) -> None:
-        self._closing = True
-        self._changed.set()
-        self._thread.join()
+        with self._lock:
+            self._is_closed = True
+        for timer in self._timers:
+            timer.cancel()
+            timer.join()
 
     def _enqueue(self, fault: SimulatedFault) -> None:
-        due_s = self._clock.now() + fault.after_s
-        self._due.enterabs(due_s, 0, self._faults.inject, (fault.kind, fault.device))
+        switches = [(fault.after_s, self._faults.inject)]
         if fault.lasts_s is not None:
-            self._due.enterabs(due_s + fault.lasts_s, 0, self._faults.clear, (fault.kind, fault.device))
-        self._changed.set()
-
-    def _serve(self) -> None:
-        while not self._closing:
-            left_s = self._due.run(blocking=False)
-            self._changed.wait(None if left_s is None else self._clock.real_seconds(left_s))
-            self._changed.clear()
+            switches.append((fault.after_s + fault.lasts_s, self._faults.clear))
+        for after_s, switch in switches if not self._is_closed else ():
+            timer = threading.Timer(self._clock.real_seconds(after_s), switch, (fault.kind, fault.device))
+            self._timers.append(timer)
+            timer.start()

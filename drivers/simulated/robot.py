@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -24,38 +25,32 @@ LINE_STEPS = 24
 """Number of segments of a straight line, at whose ends joint variables are computed."""
 
 
+@dataclass(eq=False)
 class SimulatedMachine:
     """The machine behind a controller that reads its geometry whenever it is switched on.
 
     Attributes:
+        config: the file, or the files, with its geometry, in ``layout``.
+        start: the pose in which it is at first, and its home.
+        includes_zeros: the joints that it reports include the zeros of its geometry.
         fails_forward: its forward kinematics fails: the pose that it reports is that of its home.
         keeps_geometry: it does not read its geometry again.
     """
 
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        layout: ConfigLayout,
-        config: tuple[Path, ...],
-        physics: RobotPhysics,
-        clock: CellClock,
-        home: Pose,
-        soft_limits: SoftLimits | None = None,
-        *,
-        includes_zeros: bool = False,
-    ) -> None:
-        self._includes_zeros = includes_zeros
-        self._soft_limits = soft_limits or SoftLimits()
-        self._mechanism = mechanism
-        self._layout = layout
-        self._config = config
-        self._physics = physics
-        self._clock = clock
-        self._geometry = layout.read(*config)
-        self._home = home
-        self._line = PoseBatch.of([home, home])
-        self.fails_forward = False
-        self.keeps_geometry = False
+    mechanism: Mechanism
+    layout: ConfigLayout
+    config: tuple[Path, ...]
+    physics: RobotPhysics
+    clock: CellClock
+    start: Pose
+    soft_limits: SoftLimits = field(default_factory=SoftLimits)
+    includes_zeros: bool = False
+    fails_forward: bool = False
+    keeps_geometry: bool = False
+
+    def __post_init__(self) -> None:
+        self._geometry = self.layout.read(*self.config)
+        self._line = PoseBatch.of([self.start, self.start])
         self._lock = threading.Lock()
         self._stop_count = 0
         self._stopped = threading.Event()
@@ -66,7 +61,7 @@ class SimulatedMachine:
         Raises:
             MotionRefused: it is beyond a soft limit, or a pose on the line is out of reach.
         """
-        limits = self._soft_limits
+        limits = self.soft_limits
         for axis, value, low, high in zip(
             "XYZABC", pose.as_tuple(), limits.lowest, limits.highest, strict=True
         ):
@@ -85,26 +80,26 @@ class SimulatedMachine:
                 return
             self._stopped.clear()
             self._line = line
-            motion = self._physics.start_motion(joints, duration_s)
-        self._clock.wait(motion.duration_s, self._stopped)
+            motion = self.physics.start_motion(joints, duration_s)
+        self.clock.wait(motion.duration_s, self._stopped)
 
     def stop(self) -> None:
         with self._lock:
             self._stop_count += 1
-            self._physics.stop()
+            self.physics.stop()
             self._stopped.set()
 
     def pose(self) -> Pose:
         """The pose by the controller's geometry, or of its home where its forward kinematics fails."""
         with self._lock:
-            return self._home if self.fails_forward else self._pose_now().pose(0)
+            return self.start if self.fails_forward else self._pose_now().pose(0)
 
     def joints(self) -> tuple[float, ...]:
         """The joints (6,), mm, that the controller reports: as commanded."""
         with self._lock:
             joints = self._joints(self._pose_now())[0]
-            if self._includes_zeros:
-                joints = joints + joint_zeros(self._mechanism, self._geometry.geometry)
+            if self.includes_zeros:
+                joints = joints + joint_zeros(self.mechanism, self._geometry.geometry)
             return tuple(float(value) for value in joints)
 
     def switch_on(self) -> None:
@@ -118,13 +113,13 @@ class SimulatedMachine:
         with self._lock:
             here = self._pose_now()
             joints = self._joints(here)
-            new = self._layout.read(*self._config)
+            new = self.layout.read(*self.config)
             found = continue_solution(
-                self._mechanism, new.geometry, joints, start=here, start_geometry=self._geometry.geometry
+                self.mechanism, new.geometry, joints, start=here, start_geometry=self._geometry.geometry
             )
             if not found.found[0]:
                 raise FileError(
-                    "this geometry has no pose at the present joint variables", subject=self._config[0]
+                    "this geometry has no pose at the present joint variables", subject=self.config[0]
                 )
             self._geometry = new
             self._line = found.poses[[0, 0]]
@@ -135,7 +130,7 @@ class SimulatedMachine:
     def _pose_now(self) -> PoseBatch:
         """The pose on the line that the present progress of the joints corresponds to."""
         line = self._line
-        place = self._physics.progress() * (len(line) - 1)
+        place = self.physics.progress() * (len(line) - 1)
         row = min(int(place), len(line) - 2)
         share = place - row
         if share >= 1.0:
@@ -145,4 +140,4 @@ class SimulatedMachine:
         return PoseBatch(position[None], (rotations.from_vector(share * turn) @ line.rotations[row])[None])
 
     def _joints(self, poses: PoseBatch) -> Array:
-        return self._mechanism.inverse(self._geometry.geometry, self._geometry.branch, poses)
+        return self.mechanism.inverse(self._geometry.geometry, self._geometry.branch, poses)

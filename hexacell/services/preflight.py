@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import ipaddress
+import struct
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
 
-from drivers.listening_ports import accepts_from_network, is_loopback
 from hexacell.cell.limits import NEAR_DEG, NEAR_MM
 from hexacell.cell.loader import Cell, checked_cell
 from hexacell.cell.operation import scheme_of
@@ -17,6 +20,10 @@ from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.pose import Pose
 from hexacell.storage.atomic_files import BYTE_ORDER_MARK, read_bytes, write_atomically
+
+_TABLES = (Path("/proc/net/tcp"), Path("/proc/net/tcp6"))
+"""The kernel's tables of the ports of this computer."""
+_LISTENING = "0A"
 
 
 def toggle_exclusion(cell: Cell, name: str, planned: Sequence[VisitedPose]) -> Cell:
@@ -144,3 +151,30 @@ def exposure_warnings(cell: Cell) -> Iterator[str]:
             f"{where}: it accepts connections from the network too, and whoever reaches that port may move "
             "the robot. Let it listen on 127.0.0.1 alone, or close the port in the firewall"
         )
+
+
+def accepts_from_network(port: int, tables: Sequence[Path] = _TABLES) -> bool:
+    """Whether something listens at ``port`` beyond the loopback addresses; False if that is not known."""
+    return any(not address.is_loopback for address in _listening_at(port, tables))
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a network name or address is this computer's own."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host.lower() == "localhost"
+
+
+def _listening_at(
+    port: int, tables: Sequence[Path]
+) -> Iterator[ipaddress.IPv4Address | ipaddress.IPv6Address]:
+    for table in tables:
+        with suppress(OSError, ValueError, LookupError):
+            for line in table.read_text(encoding="ascii").splitlines()[1:]:
+                _, local, _, state = line.split()[:4]
+                address, _, own_port = local.partition(":")
+                if state == _LISTENING and int(own_port, 16) == port:
+                    # As the kernel writes it: words of four bytes, each in the computer's own order.
+                    words = [int(address[start : start + 8], 16) for start in range(0, len(address), 8)]
+                    yield ipaddress.ip_address(struct.pack(f"={len(words)}I", *words))

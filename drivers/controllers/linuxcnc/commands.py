@@ -60,9 +60,9 @@ class ControllerCommands:
 
     def __init__(self, connection: Connection, messages: ErrorMessages | None = None) -> None:
         self.connection = connection
-        self.subject = connection.address.name
-        self.unit_mm = connection.address.unit_mm
-        self.joint_unit_mm = connection.address.joint_unit_mm
+        self.subject = connection.subject
+        self.unit_mm = connection.settings.unit_mm
+        self.joint_unit_mm = connection.settings.joint_unit_mm
         self._messages = messages or ErrorMessages()
 
     async def get(self, what: str) -> str:

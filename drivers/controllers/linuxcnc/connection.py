@@ -12,7 +12,6 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager, nullcon
 from typing import Self
 
 from drivers.controllers.linuxcnc.protocol import (
-    Address,
     LineBuffer,
     Response,
     Timeouts,
@@ -20,9 +19,11 @@ from drivers.controllers.linuxcnc.protocol import (
     loop_time,
     parse_explanation,
     parse_response,
+    subject_of,
 )
 from drivers.errors import ConnectionLost, ResponseTimeout
 from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
+from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError, UsageError
 
 _log = logging.getLogger("drivers.controllers.linuxcnc")
@@ -46,26 +47,26 @@ class SendArbiter:
     =================  ==============================  =========================================
     for commands       ``command_turn``                the end of a stop, then the line
     for status         ``query_turn``                  the line
-    opening either     ``exclusive``                   the line, which it keeps until greeted
-    for a stop         no turn                         nothing, except another stop
+    opening either     ``line``                        the line, which it keeps until greeted
+    for a stop         ``stop``                        nothing, except another stop
     =================  ==============================  =========================================
     """
 
     def __init__(self) -> None:
-        self._line = asyncio.Lock()
-        self._stop = asyncio.Lock()
+        self.line = asyncio.Lock()
+        self.stop = asyncio.Lock()
 
     @asynccontextmanager
     async def query_turn(self) -> AsyncIterator[None]:
         """Send inside; the line is released after ``PARSED_S`` even if the answer is still awaited."""
-        await self._line.acquire()
+        await self.line.acquire()
         is_held = True
 
         def release() -> None:
             nonlocal is_held
             if is_held:
                 is_held = False
-                self._line.release()
+                self.line.release()
 
         timer = asyncio.get_running_loop().call_later(PARSED_S, release)
         try:
@@ -81,21 +82,9 @@ class SendArbiter:
         async with self.query_turn():
             yield
 
-    @asynccontextmanager
-    async def exclusive(self) -> AsyncIterator[None]:
-        """Send inside, however long it takes; no other connection sends meanwhile."""
-        async with self._line:
-            yield
-
-    @asynccontextmanager
-    async def stopping(self) -> AsyncIterator[None]:
-        """Stop the machine inside: no command is sent meanwhile; stops run one after another."""
-        async with self._stop:
-            yield
-
     async def stop_ended(self) -> None:
         """Wait until no stop is in progress."""
-        async with self._stop:
+        async with self.stop:
             pass
 
 
@@ -107,14 +96,15 @@ class Connection:
     taken for the response to another one.
 
     Attributes:
-        address: the server's.
+        settings: of the server: its address, its passwords, its units.
+        subject: of error messages.
         server: name and version of the server.
         send_turn: entered to send a command; see :class:`SendArbiter`. Unrestricted at first.
     """
 
     def __init__(
         self,
-        address: Address,
+        settings: ControllerSettings,
         timeouts: Timeouts,
         recorder: TraceRecorder | None,
         reader: asyncio.StreamReader,
@@ -122,8 +112,8 @@ class Connection:
     ) -> None:
         self.server = ""
         self.send_turn: Callable[[], AbstractAsyncContextManager[None]] = nullcontext
-        self._wire = LineRecord(address.name, recorder)
-        self.address = address
+        self.settings, self.subject = settings, subject_of(settings)
+        self._wire = LineRecord(self.subject, recorder)
         self._timeouts = timeouts
         self._reader = reader
         self._writer = writer
@@ -134,7 +124,7 @@ class Connection:
     @classmethod
     async def open(
         cls,
-        address: Address,
+        settings: ControllerSettings,
         timeouts: Timeouts,
         recorder: TraceRecorder | None = None,
         *,
@@ -146,16 +136,16 @@ class Connection:
             ConnectionLost: Nothing listens there, or it does not respond.
             DeviceError: Something else listens there, or a password is wrong.
         """
-        connection = cls(address, timeouts, recorder, *await _connect(address, timeouts))
+        connection = cls(settings, timeouts, recorder, *await _connect(settings, timeouts))
         try:
             await connection._greet()
             if commanding:
                 await connection.take_control()
         except BaseException as error:
-            _log.warning("%s: no connection: %s", address.name, error)
+            _log.warning("%s: no connection: %s", connection.subject, error)
             await connection.close()
             raise
-        _log.info("%s: connected to %s", address.name, connection.server)
+        _log.info("%s: connected to %s", connection.subject, connection.server)
         return connection
 
     async def request(self, command: str, timeout_s: float | None = None) -> Response:
@@ -180,7 +170,7 @@ class Connection:
         if self._outstanding is not None:
             await self._outstanding_response(self._outstanding, self._timeouts.answer)
         if self._reader.at_eof():
-            raise ConnectionLost("closed the connection", subject=self.address.name)
+            raise ConnectionLost("closed the connection", subject=self.subject)
 
     async def take_control(self, timeout_s: float | None = None) -> None:
         """Become the client that may command; on LinuxCNC 2.9 the previous one loses control.
@@ -188,11 +178,12 @@ class Connection:
         Raises:
             DeviceError: The password is wrong.
         """
-        answer = await self.request(f"set enable {self.address.enable_password}", timeout_s)
+        password = self.settings.enable_password.get_secret_value()
+        answer = await self.request(f"set enable {password}", timeout_s)
         if not answer.accepted:
             raise DeviceError(
                 "refuses the enable password",
-                subject=self.address.name,
+                subject=self.subject,
                 action="Set enable_password in the password_file to linuxcncrsh's own (--enablepw)",
             )
 
@@ -203,7 +194,8 @@ class Connection:
             await self._writer.wait_closed()
 
     async def _greet(self) -> None:
-        await self._write(self._encoded(f"hello {self.address.connect_password} {_CLIENT}"))
+        password = self.settings.connect_password.get_secret_value()
+        await self._write(self._encoded(f"hello {password} {_CLIENT}"))
         deadline = loop_time() + self._timeouts.answer
         try:
             while (line := await self._line(deadline)).lower().startswith("warning:"):
@@ -213,7 +205,7 @@ class Connection:
                 raise self._not_linuxcncrsh(self._buffer.rest) from None
             raise ResponseTimeout(
                 "is frozen: it accepts the connection but does not respond",
-                subject=self.address.name,
+                subject=self.subject,
                 action="Check that linuxcncrsh listens there, and restart LinuxCNC",
             ) from None
         match line.split():
@@ -222,7 +214,7 @@ class Connection:
             case ["HELLO", "NAK"]:
                 raise DeviceError(
                     "refuses the connect password",
-                    subject=self.address.name,
+                    subject=self.subject,
                     action="Set connect_password in the password_file to linuxcncrsh's own (--connectpw)",
                 )
             case _:
@@ -235,7 +227,7 @@ class Connection:
     def _not_linuxcncrsh(self, said: str) -> DeviceError:
         return DeviceError(
             f"is no linuxcncrsh, it says {said[:_SHOWN]!r}",
-            subject=self.address.name,
+            subject=self.subject,
             action="Check controller.host and controller.port",
         )
 
@@ -243,7 +235,7 @@ class Connection:
         try:
             return encode_command(command)
         except ValueError as error:
-            raise UsageError(str(error), subject=self.address.name) from error
+            raise UsageError(str(error), subject=self.subject) from error
 
     async def _write(self, line: bytes) -> None:
         self._record(TrafficDirection.SENT, line)
@@ -251,7 +243,7 @@ class Connection:
             self._writer.write(line)
             await self._writer.drain()
         except OSError as error:
-            raise ConnectionLost("closed the connection", subject=self.address.name) from error
+            raise ConnectionLost("closed the connection", subject=self.subject) from error
 
     async def _outstanding_response(self, command: str, timeout_s: float) -> Response:
         deadline = loop_time() + timeout_s
@@ -266,10 +258,10 @@ class Connection:
                 self._outstanding = None
                 return Response(accepted=False, explanations=tuple(remarks))
             asked = " ".join(command.split()[:2])  # no passwords in messages
-            _log.warning("%s: no answer to '%s' within %g s", self.address.name, asked, timeout_s)
+            _log.warning("%s: no answer to '%s' within %g s", self.subject, asked, timeout_s)
             raise ResponseTimeout(
                 f"is frozen: it is connected, but did not answer '{asked}' within {timeout_s:g} s",
-                subject=self.address.name,
+                subject=self.subject,
                 action="Restart LinuxCNC, and find out why",
             ) from None
         self._outstanding = None
@@ -284,10 +276,10 @@ class Connection:
                     data = b""
             self._record(TrafficDirection.RECEIVED, data)
             if not data:
-                _log.warning("%s: the connection was closed", self.address.name)
+                _log.warning("%s: the connection was closed", self.subject)
                 raise ConnectionLost(
                     "closed the connection: it was ended or restarted",
-                    subject=self.address.name,
+                    subject=self.subject,
                     action="Start LinuxCNC if it does not run",
                 )
             self._lines.extend(self._buffer.feed(data))
@@ -295,28 +287,29 @@ class Connection:
 
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if self._wire.is_on:
-            self._wire.add(direction, without_passwords(data, self.address))  # traces are handed to others
+            self._wire.add(direction, without_passwords(data, self.settings))  # traces are handed to others
 
 
-def without_passwords(data: bytes, address: Address) -> bytes:
+def without_passwords(data: bytes, settings: ControllerSettings) -> bytes:
     """Traffic with every password masked as a whole, even where one begins with the other."""
-    for password in (address.connect_password, address.enable_password):
-        data = re.sub(rb"(?<= )" + re.escape(password.encode()) + rb"(?![^\s])", b"***", data)
+    for secret in (settings.connect_password, settings.enable_password):
+        password = re.escape(secret.get_secret_value().encode())
+        data = re.sub(rb"(?<= )" + password + rb"(?![^\s])", b"***", data)
     return data
 
 
 async def _connect(
-    address: Address, timeouts: Timeouts
+    settings: ControllerSettings, timeouts: Timeouts
 ) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
     start = "Start LinuxCNC with DISPLAY = linuxcncrsh --port N, or correct controller.host and .port"
     try:
         async with asyncio.timeout(timeouts.connect):
-            return await asyncio.open_connection(address.host, address.port)
+            return await asyncio.open_connection(settings.host, settings.port)
     except TimeoutError:
         problem = f"cannot be reached within {timeouts.connect:g} s"
-        raise ConnectionLost(problem, subject=address.name, action=start) from None
+        raise ConnectionLost(problem, subject=subject_of(settings), action=start) from None
     except OSError as error:
         number = error.errno or 0  # negative from getaddrinfo, which has its own text
         reason = os.strerror(number) if number > 0 else error.strerror
         problem = f"cannot be reached: {reason or error}"
-        raise ConnectionLost(problem, subject=address.name, action=start) from error
+        raise ConnectionLost(problem, subject=subject_of(settings), action=start) from error

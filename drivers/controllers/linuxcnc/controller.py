@@ -10,12 +10,12 @@ from pathlib import PurePath
 from drivers.controllers.linuxcnc import startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.protocol import (
-    Address,
     Timeouts,
     loop_time,
     parse_pose_refusal,
     pose_difference,
     restoring_block,
+    subject_of,
     timed_move,
 )
 from drivers.controllers.linuxcnc.session import Session
@@ -58,11 +58,10 @@ class LinuxcncrshController:
         trace: TraceRecorder | None = None,
         timeouts: Timeouts = _TIMEOUTS,
     ) -> None:
-        address = Address.of(settings)
-        self._name = address.name
+        self._name = subject_of(settings)
         self._settings = settings
         self._timeouts = timeouts
-        self._session = Session(address, timeouts, trace)
+        self._session = Session(settings, timeouts, trace)
         self._order = asyncio.Lock()
         self._joints_before_reload: tuple[float, ...] | None = None
         self._restoring = restoring_block("")

@@ -1,4 +1,4 @@
-"""The linuxcncrsh protocol: addresses, time-outs, commands and responses, without a connection.
+"""The linuxcncrsh protocol: time-outs, commands and responses, without a connection.
 
 A client sends ``get <what>`` or ``set <what> <value>``, one line each. ``get`` answers
 ``<WHAT> <words>``, ``set`` answers ``SET <WHAT> ACK`` once verbose is on, and both answer ``NAK``
@@ -12,8 +12,7 @@ from __future__ import annotations
 import asyncio
 import math
 import re
-from dataclasses import dataclass, field
-from typing import Self
+from dataclasses import dataclass
 
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import UsageError
@@ -36,33 +35,11 @@ _UNREACHABLE = re.compile(
 _SECONDS_A_MINUTE = 60.0
 
 
-@dataclass(frozen=True, slots=True)
-class Address:
-    """A server and the passwords it was started with; they are sent in clear text.
-
-    ``unit_mm`` is one unit of the positions that it reports, ``joint_unit_mm`` one of the joint variables.
-    """
-
-    host: str
-    port: int
-    connect_password: str = field(repr=False)
-    enable_password: str = field(repr=False)
-    unit_mm: float = 1.0
-    joint_unit_mm: float = 1.0
-
-    @classmethod
-    def of(cls, settings: ControllerSettings) -> Self:
-        """The address in a cell file; raises ``UsageError`` if it names no port."""
-        if settings.port is None:
-            raise UsageError("the cell file names no controller port", action="Set controller.port")
-        connect, enable = settings.connect_password, settings.enable_password
-        passwords = connect.get_secret_value(), enable.get_secret_value()
-        return cls(settings.host, settings.port, *passwords, settings.unit_mm, settings.joint_unit_mm)
-
-    @property
-    def name(self) -> str:
-        """The subject of error messages."""
-        return f"controller {self.host}:{self.port}"
+def subject_of(settings: ControllerSettings) -> str:
+    """The subject of error messages; raises ``UsageError`` if the cell file names no port."""
+    if settings.port is None:
+        raise UsageError("the cell file names no controller port", action="Set controller.port")
+    return f"controller {settings.host}:{settings.port}"
 
 
 @dataclass(frozen=True, slots=True)

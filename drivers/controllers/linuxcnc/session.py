@@ -29,10 +29,11 @@ from enum import Enum, auto
 from drivers.controllers.linuxcnc import startup
 from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands, ErrorMessages
 from drivers.controllers.linuxcnc.connection import Connection, SendArbiter
-from drivers.controllers.linuxcnc.protocol import Address, Timeouts, loop_time
+from drivers.controllers.linuxcnc.protocol import Timeouts, loop_time, subject_of
 from drivers.errors import ConnectionLost
 from drivers.interfaces import ControllerStatus
 from drivers.wire_trace import TraceRecorder
+from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
 
 _log = logging.getLogger("drivers.controllers.linuxcnc")
@@ -64,10 +65,12 @@ class Session:
         was_enabled: the machine was seen enabled: what disables it from now on is an error.
     """
 
-    def __init__(self, address: Address, timeouts: Timeouts, trace: TraceRecorder | None) -> None:
+    def __init__(
+        self, settings: ControllerSettings, timeouts: Timeouts, trace: TraceRecorder | None
+    ) -> None:
         self.stop_count = 0
         self.was_enabled = False
-        self._address = address
+        self._settings, self._subject = settings, subject_of(settings)
         self._timeouts = timeouts
         self._trace = trace
         self._state = SessionState.CLOSED
@@ -170,9 +173,9 @@ class Session:
             DeviceError: The machine cannot be reached, or still moves after ``timeouts.stop``.
         """
         self.stop_count += 1
-        name, limit_s, action = self._address.name, self._timeouts.stop, "Press the emergency stop"
+        name, limit_s, action = self._subject, self._timeouts.stop, "Press the emergency stop"
         _log.info("%s: stop", name)
-        async with self._arbiter.stopping():
+        async with self._arbiter.stop:
             try:
                 ready = await self._released_status_connection()
                 async with asyncio.timeout(limit_s):
@@ -194,8 +197,8 @@ class Session:
         await self._channel.close()
 
     async def _connect(self) -> ControllerCommands:
-        async with self._arbiter.exclusive():
-            connection = await Connection.open(self._address, self._timeouts, self._trace)
+        async with self._arbiter.line:
+            connection = await Connection.open(self._settings, self._timeouts, self._trace)
         connection.send_turn = self._arbiter.command_turn
         commands = ControllerCommands(connection, self._messages)
         try:
@@ -208,8 +211,9 @@ class Session:
 
     async def _connect_for_status(self) -> ControllerCommands:
         """A connection without control, which queries do not need."""
-        async with self._arbiter.exclusive():
-            connection = await Connection.open(self._address, self._timeouts, self._trace, commanding=False)
+        async with self._arbiter.line:
+            to = self._settings, self._timeouts, self._trace
+            connection = await Connection.open(*to, commanding=False)
         connection.send_turn = self._arbiter.query_turn
         return ControllerCommands(connection, self._messages)
 
@@ -260,7 +264,7 @@ class Session:
         timeouts = replace(self._timeouts, answer=answer_s)
         for attempt in range(1, _STOP_ATTEMPTS + 1):
             try:
-                connection = await Connection.open(self._address, timeouts, self._trace)
+                connection = await Connection.open(self._settings, timeouts, self._trace)
                 try:
                     # Refused while the machine is off, which is fine, or after another client took
                     # control. Repeated, as the first one may precede the motion.
@@ -293,4 +297,4 @@ class Session:
 
     def _require_open(self) -> None:
         if self._state is SessionState.CLOSED:
-            raise DeviceError("is not connected", subject=self._address.name, action="Open it first")
+            raise DeviceError("is not connected", subject=self._subject, action="Open it first")

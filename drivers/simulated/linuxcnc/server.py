@@ -219,10 +219,7 @@ def _position(client: _Client, values: tuple[float, ...]) -> str:
 
 
 _GET: dict[str, Callable[[_Client], str]] = {
-    "ECHO": lambda client: _switch(client.echo),
-    "VERBOSE": lambda client: _switch(client.verbose),
     "ENABLE": lambda client: _switch(client.has_control),
-    "SET_WAIT": lambda client: client.state.wait_mode.value,
     "ESTOP": lambda client: _switch(client.state.estop),
     "MACHINE": lambda client: _switch(client.state.enabled),
     "MODE": lambda client: client.state.mode.value,
@@ -234,10 +231,8 @@ _GET: dict[str, Callable[[_Client], str]] = {
     "POS_OFFSET": lambda client: _position(client, client.state.modes.offsets),
     "PROGRAM_CODES": lambda client: client.state.modes.codes,
     "FEED_OVERRIDE": lambda client: f"{client.state.feed_override_percent:g}",
-    "PROGRAM_UNITS": lambda _client: "MM",
     "USER_LINEAR_UNITS": lambda client: UNITS.get(client.settings.unit_mm, "CUSTOM"),
     "INIFILE": lambda client: Path(client.settings.config).name,
-    "PLAT": lambda _client: "Linux",
 }
 
 SettingT = TypeVar("SettingT")

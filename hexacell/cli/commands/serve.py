@@ -7,12 +7,12 @@ import asyncio
 import signal
 import sys
 
-from drivers.listening_ports import is_loopback
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import OpcUaSettings
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
+from hexacell.services.preflight import is_loopback
 
 STOPS = (signal.SIGINT, signal.SIGTERM)
 

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.controllers.linuxcnc.connection import without_passwords
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
-from drivers.controllers.linuxcnc.protocol import Address, Timeouts
+from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.errors import ConnectionLost, ResponseTimeout
 from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import WireTrace
@@ -219,7 +219,7 @@ async def test_closing_during_opening_ends_the_opening(play):
     ],
 )
 def test_a_password_that_begins_with_the_other_is_masked_whole(shown, masked):
-    assert without_passwords(shown, Address("controller", 5007, "EMC", "EMCTOO")) == masked
+    assert without_passwords(shown, ControllerSettings(config="robot.toml")) == masked
 
 
 async def test_passwords_stay_out_of_the_trace(play):
@@ -247,5 +247,5 @@ async def test_passwords_stay_out_of_the_trace(play):
     ("made", "joint_unit_mm"), [(ControllerSettings, 25.4), (RotaryControllerSettings, 1.0)]
 )
 def test_an_inch_machine_tells_angles_in_degrees(made: type[ControllerSettings], joint_unit_mm: float):
-    address = Address.of(made(config="robot.toml", port=5007, unit_mm=25.4))
-    assert (address.unit_mm, address.joint_unit_mm) == (25.4, joint_unit_mm)
+    settings = made(config="robot.toml", port=5007, unit_mm=25.4)
+    assert (settings.unit_mm, settings.joint_unit_mm) == (25.4, joint_unit_mm)

@@ -239,7 +239,7 @@ async def test_queries_wait_until_an_exclusive_turn_ends() -> None:
     said: list[str] = []
 
     async def opening() -> None:
-        async with arbiter.exclusive():
+        async with arbiter.line:
             await asyncio.sleep(3 * PARSED_S)
             said.append("opened")
 

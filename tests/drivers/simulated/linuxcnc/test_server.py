@@ -14,7 +14,6 @@ NEW_CLIENT = [
     ("get enable", b"get enable\r\nENABLE OFF\r\n"),
     ("set enable EMCTOO", b"set enable EMCTOO\r\n"),
     ("set echo off", b"set echo off\r\n"),
-    ("get echo", b"ECHO OFF\r\n"),
     ("set verbose on", b"SET VERBOSE ACK\n\r"),
     ("get enable", b"ENABLE ON\r\n"),
 ]
@@ -30,9 +29,7 @@ GREETED = [
     ("set machine on", b"SET MACHINE ACK\n\r"),
     ("get machine", b"MACHINE OFF\r\n"),
     ("get error", b"ERROR OK\r\n"),
-    ("get set_wait", b"SET_WAIT RECEIVED\r\n"),
     ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
-    ("get set_wait", b"SET_WAIT DONE\r\n"),
     ("set wait_mode done", b"SET WAIT_MODE NAK\n\r"),
     ("set mode mdi", b"SET MODE NAK\n\r"),
     ("set home -1", b"SET HOME NAK\n\r"),
@@ -85,7 +82,6 @@ READY = [
     ("set home -1", b"SET HOME ACK\n\r"),
     ("get error", b"ERROR OK\r\n"),
     ("get pos_offset", b"POS_OFFSET 0.000000 0.000000 0.000000 0.000000 0.000000 0.000000\r\n"),
-    ("get program_units", b"PROGRAM_UNITS MM\r\n"),
     ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n"),
 ]
 

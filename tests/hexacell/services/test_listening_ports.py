@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.listening_ports import accepts_from_network, is_loopback
+from hexacell.services.preflight import accepts_from_network, is_loopback
 
 needs_tables = pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="no tables of this kernel")
 

@@ -22,31 +22,55 @@ SUBJECT = "stop line"
 _OUTPUTS = {"dsr": "DTR", "cts": "RTS"}
 
 
-class StopContact:
-    """Forbids motion while a contact on a serial port is open; ``line`` is dsr or cts."""
+class CombinedStopInput:
+    """A :class:`drivers.interfaces.StopInput`: a file and a contact, each of which forbids motion.
 
-    def __init__(self, url: str, line: str) -> None:
-        self.device = f"{line.upper()} of {url}"
-        self._url = url
-        self._line = line
+    Args:
+        file: forbids motion while it exists.
+        url: the serial port of the contact.
+        line: its input that the contact closes: dsr or cts.
+    """
+
+    def __init__(self, file: Path | None = None, url: str | None = None, line: str = "dsr") -> None:
+        self._file, self._url, self._line = file, url, line
         self._port: serial.Serial | None = None
 
-    def open(self) -> None:
-        """Open the port and set its outputs; :meth:`close` it even if this fails.
+    async def open(self) -> DeviceIdentity | None:
+        """Connect the contact, open or not; the identity names the port and line it is wired to.
 
         Raises:
             DeviceError: The port is absent, in use, or has no such lines.
             FileError: pyserial does not accept the URL.
         """
-        self.close()
-        with opening_errors(SUBJECT, self._url):
-            self._port = serial.serial_for_url(self._url, do_not_open=True)
-            self._port.dtr = self._port.rts = True
-            self._port.open()
-            getattr(self._port, self._line)
+        await self.close()
+        if self._url is None:
+            return None
+        try:
+            with opening_errors(SUBJECT, self._url):
+                self._port = serial.serial_for_url(self._url, do_not_open=True)
+                self._port.dtr = self._port.rts = True
+                self._port.open()
+                getattr(self._port, self._line)
+        except HexacellError:
+            await self.close()
+            raise
+        return DeviceIdentity(SUBJECT, "contact", f"{self._line.upper()} of {self._url}")
 
-    def active_reason(self) -> str | None:
+    async def active_reason(self) -> str | None:
+        """Why motion is forbidden now, or nothing."""
+        of_file = None if self._file is None else _file_reason(self._file)
+        return "; ".join(filter(None, (of_file, self._contact_reason()))) or None
+
+    async def close(self) -> None:
+        """Release the contact; closing twice is harmless."""
+        port, self._port = self._port, None
+        if port is not None:
+            close_port(port)
+
+    def _contact_reason(self) -> str | None:
         """The reason, if the contact is open or the port was lost. It takes one system call."""
+        if self._url is None:
+            return None
         if self._port is None:
             return f"its port {self._url} is not open"
         try:
@@ -55,42 +79,6 @@ class StopContact:
             return f"its port {self._url} was lost ({error})"
         wire = f"{_OUTPUTS[self._line]} and {self._line.upper()}"
         return None if closed else f"the contact between {wire} of {self._url} is open"
-
-    def close(self) -> None:
-        """Close the port; closing twice is harmless."""
-        port, self._port = self._port, None
-        if port is not None:
-            close_port(port)
-
-
-class CombinedStopInput:
-    """A :class:`drivers.interfaces.StopInput`: a file and a contact, each of which forbids motion."""
-
-    def __init__(self, file: Path | None = None, contact: StopContact | None = None) -> None:
-        self._file = file
-        self._contact = contact
-
-    async def open(self) -> DeviceIdentity | None:
-        """Connect the contact, open or not; the identity names the port and line it is wired to."""
-        if self._contact is None:
-            return None
-        try:
-            self._contact.open()
-        except HexacellError:
-            self._contact.close()
-            raise
-        return DeviceIdentity(SUBJECT, "contact", self._contact.device)
-
-    async def active_reason(self) -> str | None:
-        """Why motion is forbidden now, or nothing."""
-        of_file = None if self._file is None else _file_reason(self._file)
-        of_contact = None if self._contact is None else self._contact.active_reason()
-        return "; ".join(filter(None, (of_file, of_contact))) or None
-
-    async def close(self) -> None:
-        """Release the contact; closing twice is harmless."""
-        if self._contact is not None:
-            self._contact.close()
 
 
 def _file_reason(path: Path) -> str | None:
@@ -107,5 +95,4 @@ def _file_reason(path: Path) -> str | None:
 def stop_input_of(settings: GuardSettings, folder: Path) -> CombinedStopInput:
     """The stop input of a cell file in ``folder``, from its section [guards]."""
     file = None if settings.stop_file is None else folder / settings.stop_file
-    port = settings.stop_port
-    return CombinedStopInput(file, None if port is None else StopContact(port, settings.stop_contact))
+    return CombinedStopInput(file, settings.stop_port, settings.stop_contact)

@@ -7,8 +7,8 @@ are counted before anything is set.
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Mapping
+from contextlib import closing
 from typing import Any
 
 from canopen.lss import CS_INQUIRE_VENDOR_ID, LssError, LssMaster
@@ -42,17 +42,20 @@ def set_node_id(bus: Mapping[str, Any], node: int) -> int | None:
         if len(before) > 1:
             nodes = ", ".join(map(str, before))
             raise DeviceError(f"has several nodes: {nodes}", subject=opened.name, action=ALONE)
-        with _in_configuration_state(opened) as master:
+        master = opened.network.lss
+        master.send_switch_state_global(master.CONFIGURATION_STATE)  # type: ignore[no-untyped-call]
+        try:
             _require_alone(opened, master)
-            try:
-                master.configure_node_id(node)  # type: ignore[no-untyped-call]
-                master.store_configuration()  # type: ignore[no-untyped-call]
-            except LssError as error:
-                raise DeviceError(
-                    f"has a device that refuses node id {node}: {error}",
-                    subject=opened.name,
-                    action="Set it with its vendor's tool",
-                ) from error
+            master.configure_node_id(node)  # type: ignore[no-untyped-call]
+            master.store_configuration()  # type: ignore[no-untyped-call]
+        except LssError as error:
+            raise DeviceError(
+                f"has a device that refuses node id {node}: {error}",
+                subject=opened.name,
+                action="Set it with its vendor's tool",
+            ) from error
+        finally:
+            master.send_switch_state_global(master.WAITING_STATE)  # type: ignore[no-untyped-call]
         opened.network.send_message(_NMT, _RESET_COMMUNICATION)
         opened.network.scanner.reset()  # type: ignore[no-untyped-call]
         if node not in responding_nodes(opened):
@@ -62,16 +65,6 @@ def set_node_id(bus: Mapping[str, Any], node: int) -> int | None:
                 action="Switch the device off and on, and look: hexacell devices --can",
             )
         return before[0] if before else None
-
-
-@contextmanager
-def _in_configuration_state(bus: EncoderBus) -> Iterator[LssMaster]:
-    master = bus.network.lss
-    master.send_switch_state_global(master.CONFIGURATION_STATE)  # type: ignore[no-untyped-call]
-    try:
-        yield master
-    finally:
-        master.send_switch_state_global(master.WAITING_STATE)  # type: ignore[no-untyped-call]
 
 
 def _require_alone(bus: EncoderBus, master: LssMaster) -> None:

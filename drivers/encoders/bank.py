@@ -139,10 +139,10 @@ class ThreadedBank(ABC, Generic[Session]):
 
     async def read(self) -> EncoderSample:
         """One complete sample of all six."""
-        if self._worker is None:
-            raise _not_open()
+        if self._worker is None or self._session is None:
+            raise DeviceError("are not open", subject="encoders", action="Open them first")
         try:
-            return await self._worker.run(self._read)
+            return await self._worker.run(self._session.read)
         except DeviceError as error:
             _log.warning("no sample: %s", error)
             raise
@@ -158,16 +158,7 @@ class ThreadedBank(ABC, Generic[Session]):
         self._session.start()
         return self._session.identities
 
-    def _read(self) -> EncoderSample:
-        if self._session is None:
-            raise _not_open()
-        return self._session.read()
-
     def _close(self) -> None:
         session, self._session = self._session, None
         if session is not None:
             session.close()
-
-
-def _not_open() -> DeviceError:
-    return DeviceError("are not open", subject="encoders", action="Open them first")

@@ -92,7 +92,13 @@ class EncoderBus:
         """End the receiving thread and close the bus, even if it has failed."""
         self._closing.set()
         self._receiver.join(JOIN_TIMEOUT_S)
-        _shut_down(self._bus)
+        # After an error, python-can's slcan does not close its port, nor pyserial's socket:// its socket.
+        port = getattr(self._bus, "serialPortOrig", None)
+        connection = getattr(port, "_socket", None)
+        for part in (self._bus.shutdown, getattr(port, "close", None), getattr(connection, "close", None)):
+            if part is not None:
+                with suppress(Exception):
+                    part()
         self._receiver.join(JOIN_TIMEOUT_S)
 
     def _connect(self, settings: Mapping[str, Any]) -> can.BusABC:
@@ -177,13 +183,3 @@ def _text(error: Exception) -> str:
     """The message, and that of its cause: python-can wraps the errors of the libraries it uses."""
     cause = "" if error.__cause__ is None else str(error.__cause__)
     return str(error) if cause in str(error) else f"{error} ({cause})"
-
-
-def _shut_down(bus: can.BusABC) -> None:
-    # After an error, python-can's slcan does not close its port, nor pyserial's socket:// its socket.
-    port = getattr(bus, "serialPortOrig", None)
-    connection = getattr(port, "_socket", None)
-    for part in (bus.shutdown, getattr(port, "close", None), getattr(connection, "close", None)):
-        if part is not None:
-            with suppress(Exception):
-                part()

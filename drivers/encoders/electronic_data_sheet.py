@@ -75,7 +75,11 @@ def read_data_sheet(path: Path) -> DataSheet:
     """
     try:
         text = path.read_text(encoding="utf-8", errors="replace")  # names may be in any encoding
-        dictionary = _dictionary_in(text)
+        parser = RawConfigParser(inline_comment_prefixes=(";",))
+        parser.read_string(text)
+        if not parser.has_section(ABOUT):  # canopen would only warn
+            raise _no_data_sheet(path, f"it has no section [{ABOUT}]")
+        dictionary: ObjectDictionary = import_eds(StringIO(text), None)  # type: ignore[no-untyped-call]
     except OSError as error:
         raise FileError(
             f"cannot be read: {error.strerror}", subject=path, action="Correct eds under [encoders]"
@@ -87,15 +91,6 @@ def read_data_sheet(path: Path) -> DataSheet:
     if od.DEVICE_TYPE not in values:
         raise _no_data_sheet(path, f"it has no {od.DEVICE_TYPE}")
     return DataSheet(path, values)
-
-
-def _dictionary_in(text: str) -> ObjectDictionary:
-    parser = RawConfigParser(inline_comment_prefixes=(";",))
-    parser.read_string(text)
-    if not parser.has_section(ABOUT):  # canopen would only warn
-        raise ValueError(f"it has no section [{ABOUT}]")
-    dictionary: ObjectDictionary = import_eds(StringIO(text), None)  # type: ignore[no-untyped-call]
-    return dictionary
 
 
 def _no_data_sheet(path: Path, reason: str) -> FileError:

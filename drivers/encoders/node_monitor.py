@@ -11,7 +11,7 @@ from canopen.emcy import EmcyError
 
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, silent_nodes, subject_of
-from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, WARNINGS, ObjectEntry
+from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, WARNINGS
 from drivers.errors import InvalidSampleError, RestartedNodeError
 
 HEARTBEAT = 0x700
@@ -188,16 +188,14 @@ class AlarmPoll:
         self._polls += 1
         self._emergencies_seen = -1  # due again at once, should one be found
         for node, entry in self._entries:
-            if entry is not WARNINGS or self._polls % timing.warnings_every == 0:
-                self._check_entry(node, entry)
+            if entry is WARNINGS and self._polls % timing.warnings_every != 0:
+                continue
+            value = node.read(entry)
+            if entry is ERROR_REGISTER:
+                value &= ~_COMMUNICATION
+            if value & ~self._known.get((node, entry), 0):
+                word = "a warning" if entry is WARNINGS else "an alarm"
+                raise invalid_sample(f"has {word} ({entry} is {value:#06x})", node.leg.subject)
         self._emergencies_seen = emergencies
         self._polled_s, self._sampling_s = time.monotonic(), 0.0
         self._cost_s = self._polled_s - now_s
-
-    def _check_entry(self, node: EncoderNode, entry: ObjectEntry) -> None:
-        value = node.read(entry)
-        if entry is ERROR_REGISTER:
-            value &= ~_COMMUNICATION
-        if value & ~self._known.get((node, entry), 0):
-            word = "a warning" if entry is WARNINGS else "an alarm"
-            raise invalid_sample(f"has {word} ({entry} is {value:#06x})", node.leg.subject)

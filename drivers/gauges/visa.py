@@ -10,8 +10,7 @@ from __future__ import annotations
 import re
 import termios
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import cached_property, partial
 from typing import Any
 
@@ -83,7 +82,7 @@ class VisaPort(RequestPort):
         self.require_not_closed()
         if self._resource is None:
             raise lost_port(self.subject, self.url, "it is not open", "Connect it")
-        with self._visa_errors():
+        try:
             if self._must_clear:
                 self._clear()
             elif self._is_stream:
@@ -92,6 +91,9 @@ class VisaPort(RequestPort):
             self._resource.timeout = MS * timeout_s  # of writing too
             self._resource.write_raw(request)
             return self._answer(terminator, timeout_s)
+        except (OSError, termios.error, self._visa.errors.Error) as error:
+            self.close()
+            raise lost_port(self.subject, self.url, str(error), "Connect it") from error
 
     def close(self) -> None:
         """Close the resource; closing twice is harmless."""
@@ -174,14 +176,6 @@ class VisaPort(RequestPort):
         if received and self._gap_s < FRAME_GAP_S:
             self.surplus_count += 1
             self._gap_s = FRAME_GAP_S
-
-    @contextmanager
-    def _visa_errors(self) -> Iterator[None]:
-        try:
-            yield
-        except (OSError, termios.error, self._visa.errors.Error) as error:
-            self.close()
-            raise lost_port(self.subject, self.url, str(error), "Connect it") from error
 
 
 class VisaGauge(SerialGauge):

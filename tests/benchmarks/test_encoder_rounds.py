@@ -73,11 +73,12 @@ class Taken:
 
 
 def _rounds_by_thread(bank: Cia406Bank, bus: PacedBus) -> Taken:
+    assert bank._session is not None
     for _ in range(WARM_UP):
-        bank._read()
+        bank._session.read()
     before = Taken.until_now(bus)
     for _ in range(ROUNDS):
-        assert bank._read().counts == COUNTS
+        assert bank._session.read().counts == COUNTS
     return Taken.until_now(bus) - before
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import serial
 
-from drivers.stop_input import CombinedStopInput, StopContact, stop_input_of
+from drivers.stop_input import CombinedStopInput, stop_input_of
 from hexacell.cell.measuring import GuardSettings
 from hexacell.errors import DeviceError, FileError
 
@@ -106,11 +106,11 @@ async def test_an_unplugged_adapter_forbids_motion(port: Port) -> None:
 
 
 async def test_a_contact_that_is_not_opened_forbids_motion(port: Port) -> None:
-    contact = StopContact("/dev/ttyS9", "dsr")
-    assert "is not open" in (contact.active_reason() or "")
-    contact.open()
-    contact.close()
-    assert "is not open" in (contact.active_reason() or "")
+    line = CombinedStopInput(None, "/dev/ttyS9")
+    assert "is not open" in (await line.active_reason() or "")
+    await line.open()
+    await line.close()
+    assert "is not open" in (await line.active_reason() or "")
 
 
 async def test_a_port_that_is_absent_is_refused(tmp_path: Path) -> None:
@@ -130,7 +130,7 @@ async def test_a_port_without_modem_lines_is_refused_or_forbids() -> None:
     import os
 
     near, far = os.openpty()
-    line = CombinedStopInput(contact=StopContact(os.ttyname(far), "dsr"))
+    line = CombinedStopInput(None, os.ttyname(far), "dsr")
     try:
         try:
             await line.open()

@@ -128,12 +128,9 @@ def refused(pose: Pose, message: str) -> PoseRefused:
     """What the real driver makes of a message."""
     reason = parse_pose_refusal(message)
     assert reason is not None
+    axis, is_highest = reason
     return PoseRefused(
-        f"to move to {pose}",
-        message,
-        subject="controller",
-        axis=reason.axis,
-        is_highest=reason.is_highest,
+        f"to move to {pose}", message, subject="controller", axis=axis, is_highest=is_highest
     )
 
 

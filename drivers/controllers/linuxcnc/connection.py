@@ -24,7 +24,7 @@ from drivers.controllers.linuxcnc.protocol import (
 from drivers.errors import ConnectionLost, ResponseTimeout
 from drivers.wire_trace import LineRecord, TraceRecorder, TrafficDirection
 from hexacell.cell.robot import ControllerSettings
-from hexacell.errors import DeviceError, UsageError
+from hexacell.errors import DeviceError
 
 _log = logging.getLogger("drivers.controllers.linuxcnc")
 
@@ -155,7 +155,7 @@ class Connection:
             ResponseTimeout: No response within ``timeout_s``.
             ConnectionLost: The connection broke.
         """
-        line = self._encoded(command)
+        line = encode_command(command, self.subject)
         async with self.send_turn():
             self._outstanding = command
             await self._write(line)
@@ -195,7 +195,7 @@ class Connection:
 
     async def _greet(self) -> None:
         password = self.settings.connect_password.get_secret_value()
-        await self._write(self._encoded(f"hello {password} {_CLIENT}"))
+        await self._write(encode_command(f"hello {password} {_CLIENT}", self.subject))
         deadline = loop_time() + self._timeouts.answer
         try:
             while (line := await self._line(deadline)).lower().startswith("warning:"):
@@ -219,7 +219,7 @@ class Connection:
                 )
             case _:
                 raise self._not_linuxcncrsh(line)
-        await self._write(self._encoded("set echo off"))
+        await self._write(encode_command("set echo off", self.subject))
         with suppress(TimeoutError):  # the only response, if any, is the echo
             await self._line(loop_time() + self._timeouts.explanation)
         await self.request("set verbose on")
@@ -230,12 +230,6 @@ class Connection:
             subject=self.subject,
             action="Check controller.host and controller.port",
         )
-
-    def _encoded(self, command: str) -> bytes:
-        try:
-            return encode_command(command)
-        except ValueError as error:
-            raise UsageError(str(error), subject=self.subject) from error
 
     async def _write(self, line: bytes) -> None:
         self._record(TrafficDirection.SENT, line)

@@ -278,8 +278,8 @@ class LinuxcncrshController:
         move = f"to move to {pose}"
         if (found := parse_pose_refusal(reason)) is None:
             return MoveRefused(move, reason, subject=self._name, action=action)
-        side = found.is_highest
-        return PoseRefused(move, reason, subject=self._name, axis=found.axis, is_highest=side)
+        axis, is_highest = found
+        return PoseRefused(move, reason, subject=self._name, axis=axis, is_highest=is_highest)
 
     def _stopped_before_moving(self) -> MotionInterrupted:
         return MotionInterrupted("was stopped before it moved", subject=self._name)

@@ -83,14 +83,6 @@ class Response:
     explanations: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class RefusalReason:
-    """Why LinuxCNC refuses a pose: the limit of ``axis``, one of ``xyzabc``, or another reason if None."""
-
-    axis: str | None = None
-    is_highest: bool = True
-
-
 class LineBuffer:
     """Splits received bytes into lines at any mixture of CR and LF; drops blank lines."""
 
@@ -108,17 +100,18 @@ class LineBuffer:
         return self._rest.decode("utf-8", "replace").strip()
 
 
-def encode_command(command: str) -> bytes:
+def encode_command(command: str, subject: str) -> bytes:
     """The bytes of one command line.
 
     Raises:
-        ValueError: It is longer than the server's buffer, or is more than one line.
+        UsageError: It is longer than the server's buffer, or is more than one line.
     """
     line = command.encode() + b"\r\n"
     if len(line) > MAX_LINE_BYTES:
-        raise ValueError(f"a command of {len(line)} bytes is longer than the {MAX_LINE_BYTES} it can take")
+        problem = f"a command of {len(line)} bytes is longer than the {MAX_LINE_BYTES} it can take"
+        raise UsageError(problem, subject=subject)
     if b"\r" in line[:-2] or b"\n" in line[:-2]:
-        raise ValueError("a command must be a single line")
+        raise UsageError("a command must be a single line", subject=subject)
     return line
 
 
@@ -191,15 +184,18 @@ def parse_positions(text: str) -> tuple[float, float, float, float, float, float
     return x, y, z, a, b, c
 
 
-def parse_pose_refusal(reason: str) -> RefusalReason | None:
+def parse_pose_refusal(reason: str) -> tuple[str | None, bool] | None:
     """Why a pose is refused; None if the messages say that something else prevents the move.
+
+    It is the axis beyond whose limit it is, one of ``xyzabc`` or None for another reason, and whether that
+    limit is its highest value.
 
     The messages are those of LinuxCNC's motion module (``command.c``): ``would exceed C's positive limit``,
     ``would exceed joint 3's negative limit``, ``fails kinematicsInverse``.
     """
     if found := _AXIS_LIMIT.search(reason):
-        return RefusalReason(found["axis"].lower(), found["side"].lower() == "positive")
-    return RefusalReason() if _UNREACHABLE.search(reason) else None
+        return found["axis"].lower(), found["side"].lower() == "positive"
+    return (None, True) if _UNREACHABLE.search(reason) else None
 
 
 def parse_number(text: str) -> float:

@@ -17,6 +17,7 @@ from drivers.controllers.linuxcnc.protocol import (
     restoring_block,
     timed_move,
 )
+from hexacell.errors import UsageError
 from hexacell.kinematics.pose import Pose
 
 WORDS = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1)
@@ -49,8 +50,8 @@ def test_bytes_that_are_not_text_are_replaced():
 @given(st.text())
 def test_an_encoded_command_fits_the_server_and_is_one_line(command):
     try:
-        line = encode_command(command)
-    except ValueError:
+        line = encode_command(command, "controller")
+    except UsageError:
         assert len(command.encode()) > 253 or "\r" in command or "\n" in command
     else:
         assert len(line) <= 255
@@ -59,9 +60,9 @@ def test_an_encoded_command_fits_the_server_and_is_one_line(command):
 
 
 def test_a_command_longer_than_the_limit_is_refused():
-    assert len(encode_command("x" * 253)) == 255
-    with pytest.raises(ValueError, match="256 bytes is longer than the 255"):
-        encode_command("x" * 254)
+    assert len(encode_command("x" * 253, "controller")) == 255
+    with pytest.raises(UsageError, match="256 bytes is longer than the 255"):
+        encode_command("x" * 254, "controller")
 
 
 def test_a_timed_move_is_formatted_exactly():
@@ -79,7 +80,7 @@ def test_a_timed_move_keeps_pose_and_duration_and_fits_a_line(pose, duration_s):
     assert "".join(letters) == "GGGGXYZABCF"
     assert values[4:10] == pytest.approx(pose.as_tuple(), abs=1e-7)
     assert 60.0 / values[10] == pytest.approx(duration_s, rel=1e-4)
-    encode_command(f"set mdi {timed_move(pose, duration_s)}")
+    encode_command(f"set mdi {timed_move(pose, duration_s)}", "controller")
 
 
 @pytest.mark.parametrize(

@@ -84,11 +84,9 @@ def is_plain_terminal() -> bool:
 
 def _may_ask(event: events.Event) -> bool:
     """Whether a person may be asked something until the next event."""
-    match event:
-        case events.StepBegun(step=Place() | Commit()):
-            return True
-        case _:
-            return isinstance(event, events.Paused | events.Interrupted)
+    if isinstance(event, events.StepBegun):
+        return isinstance(event.step, Place | Commit)
+    return isinstance(event, events.Paused | events.Interrupted)
 
 
 def _bar() -> Progress:

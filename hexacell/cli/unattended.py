@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable
 
 from hexacell.cell.loader import Cell
 from hexacell.cli.console import Console
@@ -40,35 +38,27 @@ def begun_in_window(
         except HexacellError as error:
             if request.folder.journal.is_file():
                 raise  # it had begun: its journal says the rest
-            refused = refused_start(request, error, began, local_now())
-            if refused.wait_s is None:
+            wait_s = refused_start(request, error, began, local_now())
+            if wait_s is None:
                 raise
-            console.warn(next_try_text(error, refused.wait_s))
-            SignalCommands(console).run(asyncio.sleep(refused.wait_s))
+            console.warn(next_try_text(error, wait_s))
+            SignalCommands(console).run(asyncio.sleep(wait_s))
 
 
-@dataclass
-class RunNews:
-    """What people are notified of: the end of the last run, if there was one."""
-
-    end: RunEnd | None = None
-
-
-@contextmanager
-def notified_afterwards(request: RunRequest, console: Console) -> Iterator[RunNews]:
-    """After an unattended run, notify people of its ``end``, or of the error that ended it.
+def notified_afterwards(request: RunRequest, console: Console, run: Callable[[], RunEnd]) -> RunEnd:
+    """Carry out an unattended run, then notify people of its end, or of the error that ended it.
 
     The outcome of the run stays what it is, whatever goes wrong here.
     """
-    news = RunNews()
     try:
-        yield news
+        end = run()
     except Exception as error:
-        _notify(request, console, news, error)
+        _notify(request, console, error)
         _publish(request.cell, console)
         raise
-    _notify(request, console, news, None)
+    _notify(request, console, end)
     _publish(request.cell, console)
+    return end
 
 
 def _publish(cell: Cell, console: Console) -> None:
@@ -83,16 +73,11 @@ def _publish(cell: Cell, console: Console) -> None:
         console.warn(f"the shared archive is as it was before this run ({type(fault).__name__})")
 
 
-def _notify(request: RunRequest, console: Console, news: RunNews, error: Exception | None) -> None:
+def _notify(request: RunRequest, console: Console, end: RunEnd | Exception) -> None:
     if not request.unattended or not request.cell.settings.notifications:
         return
     try:
-        if error is not None:
-            notice = notice_of_failure(request, error)
-        elif news.end is not None:
-            notice = notice_of_end(news.end)
-        else:
-            return
+        notice = notice_of_end(end) if isinstance(end, RunEnd) else notice_of_failure(request, end)
         line = notify_line(notify_all(request.cell, notice))
     except KeyboardInterrupt:
         line = f"not notified: interrupted ({NEXT_TIME})"

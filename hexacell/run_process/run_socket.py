@@ -20,7 +20,7 @@ from pathlib import Path
 
 from hexacell.cell.loader import Cell
 from hexacell.errors import CellBusy, FileError
-from hexacell.storage.atomic_files import os_error_to_file_error
+from hexacell.storage.atomic_files import os_errors
 
 LONGEST_SOCKET_PATH = 107
 """Bytes: what Linux takes."""
@@ -83,13 +83,11 @@ def peer_of(connection: socket.socket) -> tuple[int, int]:
 def _bind(listener: socket.socket, path: Path) -> None:
     if is_served(path):
         raise CellBusy("another process runs this cell", subject=path, action="See it with `hexacell tui`")
-    try:
+    with os_errors("the socket of the run cannot be made", path):
         path.unlink(missing_ok=True)  # of a process that was killed
         os.fchmod(listener.fileno(), 0o600)
         listener.bind(str(path))
         listener.listen()
-    except OSError as error:
-        raise os_error_to_file_error("the socket of the run cannot be made", path, error) from error
 
 
 def _runtime_folder() -> Path:
@@ -101,12 +99,10 @@ def _runtime_folder() -> Path:
 
 def _require_private(folder: Path) -> None:
     """Make the folder; refuse one that others could have made or can look into."""
-    try:
+    with os_errors("the folder for the socket cannot be made", folder):
         with suppress(FileExistsError):
             folder.mkdir(mode=0o700)
         found = folder.lstat()
-    except OSError as error:
-        raise os_error_to_file_error("the folder for the socket cannot be made", folder, error) from error
     is_ours = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
     if not is_ours or stat.S_IMODE(found.st_mode) & 0o077:
         raise FileError(

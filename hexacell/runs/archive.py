@@ -175,8 +175,10 @@ class Archive:
             raise self._unavailable(error) from error
 
     def _act(self, act: Callable[[Connection], Found]) -> Found:
-        if not self._is_ready:
-            _make_file(self._file)
+        if self._file is not None and not self._is_ready and not self._file.exists():
+            # SQLite would make a file as the umask has it; where it cannot, it says why.
+            with suppress(OSError):
+                os.close(os.open(self._file, os.O_CREAT | os.O_WRONLY, 0o666 & ~NOT_FOR_OTHERS))
         with self._engine.begin() as connection:
             if not self._is_ready:
                 if not inspect(connection).has_table(ARCHIVE_TABLE.name):
@@ -202,13 +204,6 @@ def open_engine(url: URL) -> Engine:
         return create_engine(url, poolclass=NullPool, connect_args={"timeout": PATIENCE_S})
     with_driver = url.set(drivername="postgresql+psycopg")
     return create_engine(with_driver, poolclass=NullPool, connect_args={"connect_timeout": PATIENCE_S})
-
-
-def _make_file(path: Path | None) -> None:
-    """SQLite would make a file as the umask has it; where it cannot, it says why."""
-    if path is not None and not path.exists():
-        with suppress(OSError):
-            os.close(os.open(path, os.O_CREAT | os.O_WRONLY, 0o666 & ~NOT_FOR_OTHERS))
 
 
 def _is_damaged(error: DBAPIError) -> bool:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 from hexacell.errors import FileError
 from hexacell.runs.run_folder import JOURNAL
-from hexacell.storage.atomic_files import os_error_to_file_error
+from hexacell.storage.atomic_files import os_errors
 
 
 class DocumentKind(StrEnum):
@@ -44,22 +45,15 @@ def folder_stamps(folder: Path) -> dict[str, str]:
     Raises:
         FileError: the folder cannot be read.
     """
-    try:
-        with os.scandir(folder) as found:
-            return {one.name: _stamp(one) for one in found if one.is_dir() and not one.name.startswith(".")}
-    except FileNotFoundError:
-        return {}
-    except OSError as error:
-        raise os_error_to_file_error("cannot be read", folder, error) from error
-
-
-def _stamp(entry: os.DirEntry[str]) -> str:
-    return f"{_times(entry.path)} {_times(os.path.join(entry.path, JOURNAL))}"  # noqa: PTH118 - half the time
+    with os_errors("cannot be read", folder), suppress(FileNotFoundError), os.scandir(folder) as found:
+        runs = [one for one in found if one.is_dir() and not one.name.startswith(".")]
+        return {one.name: f"{_times(one.path)} {_times(f'{one.path}/{JOURNAL}')}" for one in runs}
+    return {}
 
 
 def _times(path: str) -> str:
     try:
-        status = os.stat(path)  # noqa: PTH116 - likewise
+        status = os.stat(path)  # noqa: PTH116 - half the time
     except OSError as error:
         return f"error {error.errno}"
     return f"{status.st_ino}:{status.st_size}:{status.st_mtime_ns}:{status.st_ctime_ns}"

@@ -56,21 +56,18 @@ def sha256(data: bytes) -> str:
 
 def read_bytes(path: Path) -> bytes:
     """The content of a regular file; a pipe or a device is refused, as reading it could block."""
-    try:
+    with os_errors("cannot be read", path):
         _require_regular(path, path.stat())
         return path.read_bytes()
-    except OSError as error:
-        raise os_error_to_file_error("cannot be read", path, error) from error
 
 
 def read_if_present(path: Path) -> bytes | None:
     """The content of a regular file, None if there is no such file."""
-    try:
-        path.lstat()
-    except FileNotFoundError:
-        return None
-    except OSError as error:
-        raise os_error_to_file_error("cannot be read", path, error) from error
+    with os_errors("cannot be read", path):
+        try:
+            path.lstat()
+        except FileNotFoundError:
+            return None
     return read_bytes(path)
 
 
@@ -117,7 +114,7 @@ def write_atomically(
         FileError: the file is unchanged, and no temporary file is left. Only if the message says that the
             file was replaced, it holds the new content, but a power cut may undo that.
     """
-    try:
+    with os_errors("cannot be written and is unchanged", path):
         target = _resolved(path)
         with _temporary_beside(target) as temporary:
             mode = 0o666 if like is None else stat.S_IMODE(like.stat().st_mode)
@@ -130,37 +127,29 @@ def write_atomically(
                     action="Run again",
                 )
             os.replace(temporary, target)  # noqa: PTH105 - named as the system call it is
-    except OSError as error:
-        raise os_error_to_file_error("cannot be written and is unchanged", path, error) from error
-    try:
+    with os_errors("was replaced, but a power cut may undo that", path):
         sync_folder(target.parent)
-    except OSError as error:
-        raise os_error_to_file_error("was replaced, but a power cut may undo that", path, error) from error
 
 
 def require_replaceable(path: Path) -> None:
     """Raise ``FileError`` if :func:`write_atomically` is known to refuse the file."""
-    try:
+    with os_errors("cannot be written and is unchanged", path):
         target = _resolved(path)
         if _status(target) is None:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
         if not os.access(target.parent, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-    except OSError as error:
-        raise os_error_to_file_error("cannot be written and is unchanged", path, error) from error
 
 
 def require_creatable(path: Path) -> None:
     """Raise ``FileError`` if a new file at ``path`` is known to be refused."""
-    try:
+    with os_errors("no file can be made there", path):
         folder = _resolved(path).parent
         if not stat.S_ISDIR(folder.stat().st_mode):
             raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
         descriptor, name = tempfile.mkstemp(prefix=".hexacell-", suffix=".tmp", dir=folder)
         os.close(descriptor)
         os.unlink(name)  # noqa: PTH108 - the name as mkstemp gives it
-    except OSError as error:
-        raise os_error_to_file_error("no file can be made there", path, error) from error
 
 
 def sync_folder(folder: Path) -> None:
@@ -178,21 +167,28 @@ def sync_folder(folder: Path) -> None:
 
 def create_folder_durably(folder: Path) -> None:
     """Create ``folder`` and its missing parents, synced to the disk."""
-    try:
+    with os_errors("the folder cannot be made", folder):
         absent = [parent for parent in (folder, *folder.parents) if not parent.exists()]
         for parent in absent[::-1] or [folder]:
             parent.mkdir(mode=0o777 & ~NOT_FOR_OTHERS, exist_ok=True)
         # Each folder is a name in its parent: if one name is lost, all below it is lost too.
         for created in absent or [folder]:
             sync_folder(created.parent)
-    except OSError as error:
-        raise os_error_to_file_error("the folder cannot be made", folder, error) from error
 
 
 def os_error_to_file_error(what: str, path: Path, error: OSError) -> FileError:
     """``error`` in plain words: what failed, with which file, why, and what to do."""
     why, action = _REASONS.get(error.errno or 0, (error.strerror or str(error), "Try again"))
     return FileError(f"{what}: {why}", subject=path, action=action)
+
+
+@contextmanager
+def os_errors(what: str, path: Path) -> Iterator[None]:
+    """Make a ``FileError`` of every ``OSError`` within this context: ``what`` failed with ``path``."""
+    try:
+        yield
+    except OSError as error:
+        raise os_error_to_file_error(what, path, error) from error
 
 
 def _resolved(path: Path) -> Path:

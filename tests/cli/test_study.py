@@ -90,4 +90,4 @@ def test_a_number_of_draws_is_above_zero(typed_here, number: str) -> None:
 
 
 def test_the_command_has_every_study_and_no_other() -> None:
-    assert [row.name for row in studies.STUDIES] == list(STUDIES)
+    assert [row[0] for row in studies.STUDIES] == list(STUDIES)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from hexacell.cli.arguments.commands import (
     add_cell,
@@ -171,53 +171,32 @@ def _replay(commands: Any) -> None:  # noqa: ANN401
     add_json(parser)
 
 
-class _StudyArguments(NamedTuple):
-    name: str
-    summary: str
-    draws: int
-    drawn: str
-
-
+_EACH_CASE = "of orientations and noise, for each case"
 STUDIES = (
-    _StudyArguments(
-        "paper",
-        "figures 4 and 5 and table 2 of Abtahi et al. (2010)",
-        20,
-        "of orientations and noise, for each case",
-    ),
-    _StudyArguments(
-        "experiment",
-        "its experiment, figures 8 and 9, by the robot's repeatability",
-        20,
-        "of orientations and noise, for each case",
-    ),
-    _StudyArguments(
+    ("paper", "figures 4 and 5 and table 2 of Abtahi et al. (2010)", _EACH_CASE),
+    ("experiment", "its experiment, figures 8 and 9, by the robot's repeatability", _EACH_CASE),
+    (
         "design",
         "accuracy by records, choice of orientations, travel, tilt, noise and points",
-        20,
         "robots, each measured in every way",
     ),
 )
-"""Each a row of ``hexacell.text.studies``, which would take long to import here."""
+"""Name, summary, and what is drawn; each a row of ``hexacell.text.studies``, which takes long to import."""
 
 
 def add_study_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
     """Add the studies to the commands of a parser."""
     parser = add_parser(commands, "study", "repeat what was published of the method, on simulated robots")
     studies = parser.add_subparsers(title="studies", metavar="STUDY", required=True)
-    for study in STUDIES:
-        _add_study(studies, study)
+    for name, summary, drawn in STUDIES:
+        _add_study(studies, name, summary, drawn)
 
 
-def _add_study(studies: Any, study: _StudyArguments) -> None:  # noqa: ANN401
-    parser = add_command(studies, study.name, study.summary, target="study.main")
-    parser.set_defaults(study=study.name)
+def _add_study(studies: Any, name: str, summary: str, drawn: str) -> None:  # noqa: ANN401
+    parser = add_command(studies, name, summary, target="study.main")
+    parser.set_defaults(study=name)
     parser.add_argument(
-        "--draws",
-        type=positive,
-        default=study.draws,
-        metavar="N",
-        help=f"{study.drawn} (default: %(default)s)",
+        "--draws", type=positive, default=20, metavar="N", help=f"{drawn} (default: %(default)s)"
     )
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument(

@@ -112,8 +112,7 @@ def _run_to_end(request: RunRequest, console: Console, stream: EventStream | Non
         console.print(clock_notice(factor))
     if excluded := exclusions_text(request.cell.settings):
         console.print(wrapped(excluded))
-    with notified_afterwards(request, console) as news:
-        news.end = end = _run_and_repeat(request, console, stream)
+    end = notified_afterwards(request, console, lambda: _run_and_repeat(request, console, stream))
     console.document(run_document(end.request, end.ended, end.state))
     for line in closing_lines(end.request, end.ended):
         console.print(line)

@@ -105,7 +105,7 @@ def _sign(given: str) -> int:
 
 
 def _put_tolerance(document: Document, given: str) -> None:
-    document["tolerances"] = {key: _number(given) for key in ("S_mm", "B_mm", "l_mm")}
+    document["tolerances"] = dict.fromkeys(("S_mm", "B_mm", "l_mm"), _number(given))
 
 
 def _put_sliders(document: Document, given: str) -> None:

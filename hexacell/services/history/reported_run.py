@@ -92,6 +92,8 @@ def reported_run(run: Path) -> ReportedRun:
     entries, state = read_sound(folder, settings)
     if state.started is None:
         raise UsageError("nothing happened in this run", subject=run, action="Name another")
+    further = (path.name for name in (BEFORE, AFTER) for path in sorted(run.glob(f"{name}-*")))
+    contents = {name: atomic_files.read_if_present(run / name) for name in (*FINGERPRINTED, *further)}
     return ReportedRun(
         folder=folder,
         settings=settings,
@@ -99,7 +101,9 @@ def reported_run(run: Path) -> ReportedRun:
         began=entries[0].at,
         ended=entries[-1].at,
         document=_document(folder.result),
-        fingerprints=_fingerprints(run),
+        fingerprints={
+            name: atomic_files.sha256(data) for name, data in contents.items() if data is not None
+        },
     )
 
 
@@ -116,9 +120,3 @@ def _document(path: Path) -> Mapping[str, Any]:
     if not isinstance(found, dict):
         raise FileError("is no result of an identification", subject=path)
     return found
-
-
-def _fingerprints(run: Path) -> dict[str, str]:
-    further = (path.name for name in (BEFORE, AFTER) for path in sorted(run.glob(f"{name}-*")))
-    contents = {name: atomic_files.read_if_present(run / name) for name in (*FINGERPRINTED, *further)}
-    return {name: atomic_files.sha256(data) for name, data in contents.items() if data is not None}

@@ -20,7 +20,7 @@ from hexacell.runs.run_folder import runs_folder
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.history.run_index import PastRun, RunIndex
 from hexacell.services.history.run_summary import is_applied_later
-from hexacell.storage.atomic_files import os_error_to_file_error
+from hexacell.storage.atomic_files import os_errors
 
 LEAVING = ".leaving-"
 """Begins the name of a folder that is being deleted; what a power cut leaves of it is deleted next time."""
@@ -94,15 +94,11 @@ def delete_runs(cell: Cell, runs: Sequence[PastRun]) -> None:
 def _delete(path: Path) -> None:
     """Delete a folder in one step for all who list runs: half deleted it would be a damaged run."""
     leaving = path.with_name(f"{LEAVING}{path.name}")
-    try:
+    with os_errors("cannot be deleted", path):
         path.rename(leaving)
-    except OSError as error:
-        raise os_error_to_file_error("cannot be deleted", path, error) from error
     _remove(leaving)
 
 
 def _remove(path: Path) -> None:
-    try:
+    with os_errors("cannot be deleted", path):
         shutil.rmtree(path)
-    except OSError as error:
-        raise os_error_to_file_error("cannot be deleted", path, error) from error

@@ -101,7 +101,7 @@ def notice_of_end(end: RunEnd) -> Notice:
         host=socket.gethostname(),
         run=name,
         mode=end.request.mode.value,
-        at=_now(),
+        at=datetime.now(UTC),
         occasions=occasions,
         exit_code=end.ended.exit_code,
         line=f"{cell.settings.name}: {end.ended.line}",
@@ -116,10 +116,13 @@ def notice_of_end(end: RunEnd) -> Notice:
 
 def notice_of_failure(request: RunRequest, error: Exception) -> Notice:
     """The notice of a run that did not begin, or did not come to its end."""
-    text, code = _failure(error)
+    if isinstance(error, HexacellError):
+        text, code = " ".join(str(error).split()), error.exit_code
+    else:  # the text of a fault is for its report alone
+        text, code = f"a fault of the program: {type(error).__name__}", ExitCode.FAULT
     name, cell = request.folder.path.name, request.cell.settings.name
     occasion = Occasion.ANSWER_NEEDED if isinstance(error, AnswerNeeded) else Occasion.FAILURE
-    at = _now()
+    at = datetime.now(UTC)
     return Notice(
         id=notice_id(cell, occasion, text, at.date().isoformat()),  # tried again, it is the same failure
         cell=cell,
@@ -135,7 +138,7 @@ def notice_of_failure(request: RunRequest, error: Exception) -> Notice:
 
 def notice_of_test(cell: Cell) -> Notice:
     """The notice that shows whether everybody can be notified."""
-    name, at = cell.settings.name, _now()
+    name, at = cell.settings.name, datetime.now(UTC)
     return Notice(
         id=notice_id(name, Occasion.TEST, at.isoformat()),
         cell=name,
@@ -147,13 +150,6 @@ def notice_of_test(cell: Cell) -> Notice:
         exit_code=0,
         line=f"{name}: {TEST_LINE}",
     )
-
-
-def _failure(error: Exception) -> tuple[str, ExitCode]:
-    """The error in one line, and the exit code; the text of a fault is for its report alone."""
-    if isinstance(error, HexacellError):
-        return " ".join(str(error).split()), error.exit_code
-    return f"a fault of the program: {type(error).__name__}", ExitCode.FAULT
 
 
 def _occasions(end: RunEnd) -> tuple[Occasion, ...]:
@@ -177,7 +173,3 @@ def _due_at(cell: Cell) -> datetime | None:
     except HexacellError:
         return None
     return next_calibration_due(cell, in_force)
-
-
-def _now() -> datetime:
-    return datetime.now(UTC)

@@ -57,13 +57,9 @@ class NoticeOutbox:
             FileError: it cannot be removed; it will be sent once more.
         """
         path = self._file(pending)
-        try:
-            path.unlink(missing_ok=True)
+        with atomic_files.os_errors("cannot be removed", path), suppress(FileNotFoundError):
+            path.unlink()
             atomic_files.sync_folder(self._folder)
-        except FileNotFoundError:
-            return
-        except OSError as error:
-            raise atomic_files.os_error_to_file_error("cannot be removed", path, error) from error
 
     def pending(self) -> tuple[PendingNotice, ...]:
         """The notices not delivered yet, the oldest first; unreadable files are left out.
@@ -71,10 +67,8 @@ class NoticeOutbox:
         Raises:
             FileError: the folder cannot be read.
         """
-        try:
+        with atomic_files.os_errors("cannot be read", self._folder):
             paths = sorted(self._folder.glob("*.json"))
-        except OSError as error:
-            raise atomic_files.os_error_to_file_error("cannot be read", self._folder, error) from error
         found = [one for path in paths if (one := _read(path)) is not None]
         return tuple(sorted(found, key=lambda one: (one.notice.at, one.notice.id, one.to)))
 

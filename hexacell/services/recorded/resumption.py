@@ -106,8 +106,9 @@ def _require_own_geometry(
     """The journal must state the geometry of the config that the run began with."""
     count = len(cell.config_paths)
     kept = (kept_paths(one, BEFORE, count) for one in (folder.path, folder.path / PROVISIONAL_FOLDER))
-    candidates = (cell.config_paths, *kept)
-    paths = next((one for one in candidates if _have_fingerprint(one, started.config_sha256)), None)
+    contents = {one: read_contents_if_present(one) for one in (cell.config_paths, *kept)}
+    sums = {one: fingerprint_of(held) for one, held in contents.items() if held is not None}
+    paths = next((one for one, sha256 in sums.items() if sha256 == started.config_sha256), None)
     if paths is None:
         if state.committed or state.provisional or state.rolling_back or state.config_write_pending:
             raise FileError(
@@ -128,11 +129,6 @@ def _require_own_geometry(
 def _differs(folder: RunFolder, what: str) -> FileError:
     problem = f"states {what}, with which the run began"
     return FileError(problem, subject=folder.journal, line=1, action=RESTORE)
-
-
-def _have_fingerprint(paths: tuple[Path, ...], sha256: str) -> bool:
-    contents = read_contents_if_present(paths)
-    return contents is not None and fingerprint_of(contents) == sha256
 
 
 def _require_own_poses(cell: Cell, folder: RunFolder, state: RunState, started: events.RunStarted) -> None:

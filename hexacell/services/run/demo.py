@@ -19,7 +19,7 @@ from hexacell.runs.cell_lock import cell_lock, lock_path
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.devices.device_setup import device_addresses
 from hexacell.services.run.calibration_run import RunRequest
-from hexacell.storage.atomic_files import create_folder_durably, os_error_to_file_error, write_atomically
+from hexacell.storage.atomic_files import create_folder_durably, os_errors, write_atomically
 from procedures.calibration.calibration import Mode
 from procedures.engine.commands import UnattendedOperator
 
@@ -136,8 +136,6 @@ def _clear(folder: Path) -> None:
     with ExitStack() as locks:
         for config in configs:
             locks.enter_context(cell_lock(config))
-        try:
+        with os_errors("the earlier demo cannot be removed", folder):
             for item in set(folder.iterdir()) - kept:
                 shutil.rmtree(item) if item.is_dir() and not item.is_symlink() else item.unlink()
-        except OSError as error:
-            raise os_error_to_file_error("the earlier demo cannot be removed", folder, error) from error

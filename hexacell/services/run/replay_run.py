@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -37,28 +38,19 @@ async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERAN
     Raises:
         FileError: the journal, or the cell file in it, cannot be read.
     """
-    folder, journal = _found(run)
+    is_folder = await asyncio.to_thread(run.is_dir)
+    folder = RunFolder(run if is_folder else run.parent)
+    journal = folder.journal if is_folder else run
     entries = read_entries(journal)
-    started = _started(journal, entries)
+    started = entries[0].event if entries else None
+    if not isinstance(started, RunStarted):
+        raise FileError("the journal has no start", subject=journal, action="Copy the whole run folder")
     report = ReplayReport(journal, started.software, len(entries))
     with TemporaryDirectory(prefix="hexacell-replay-") as name:
         executor, started = _set_up(Path(name), folder, started, entries)
         replayer = Replayer(executor, report, scope, tolerance)
         await replayer.replay([replace(entries[0], event=started), *entries[1:]])
     return report
-
-
-def _found(run: Path) -> tuple[RunFolder, Path]:
-    if run.is_dir():
-        return RunFolder(run), RunFolder(run).journal
-    return RunFolder(run.parent), run
-
-
-def _started(journal: Path, entries: Sequence[Entry]) -> RunStarted:
-    first = entries[0].event if entries else None
-    if not isinstance(first, RunStarted):
-        raise FileError("the journal has no start", subject=journal, action="Copy the whole run folder")
-    return first
 
 
 def _set_up(

@@ -151,10 +151,8 @@ def _units_of(cell: Path, place: Path) -> tuple[Path, ...]:
 def _remove_units(files: Sequence[Path]) -> None:
     enabled = [path.parent / "timers.target.wants" / path.name for path in files]
     for path in (*enabled, *files):
-        try:
+        with atomic_files.os_errors("cannot be removed", path):
             path.unlink(missing_ok=True)
-        except OSError as error:
-            raise atomic_files.os_error_to_file_error("cannot be removed", path, error) from error
 
 
 def _require_possible(cell: Cell, request: ScheduleRequest) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -14,8 +14,8 @@ from hexacell.cell.operation import UnattendedSettings
 from hexacell.checks.change_alarm import ChangeAlarm
 from hexacell.errors import ExitCode, HexacellError, OutOfTime
 from hexacell.runs.run_folder import (
+    RunFolder,
     StartAttempt,
-    StartAttempts,
     new_run,
     new_run_in,
     note_attempt,
@@ -29,19 +29,6 @@ from procedures.run.state import RunState
 
 MAY_PASS = frozenset({ExitCode.HARDWARE, ExitCode.BUSY, ExitCode.OUT_OF_TIME})
 """Exit codes of refusals that may pass: device, stop line, full disk; the lock; quiet hours."""
-
-
-@dataclass(frozen=True, slots=True)
-class RefusedStart:
-    """A run that could not begin.
-
-    Attributes:
-        attempts: all tries so far; None where they could not be written.
-        wait_s: seconds until the next try; None where there is no further one.
-    """
-
-    attempts: StartAttempts | None
-    wait_s: float | None
 
 
 def local_now() -> datetime:
@@ -63,17 +50,25 @@ def refuse_quiet_hours(settings: CellSettings, at: datetime) -> None:
         )
 
 
-def refused_start(request: RunRequest, error: HexacellError, began: datetime, at: datetime) -> RefusedStart:
-    """Note that a run could not begin, where the history finds it; and when it is tried again, if it is.
+def refused_start(request: RunRequest, error: HexacellError, began: datetime, at: datetime) -> float | None:
+    """Note that a run could not begin, where the history finds it.
 
-    ``began`` is when it was tried first. A disk that takes no note does not change what is reported.
+    A disk that takes no note does not change what is reported.
+
+    Args:
+        request: the run.
+        error: why it could not begin.
+        began: when it was tried first.
+        at: when it was refused.
+
+    Returns:
+        Seconds until the next try; None where there is no further one.
     """
-    attempt = StartAttempt(at=at.astimezone(UTC), reason=str(error), exit_code=int(error.exit_code))
-    try:
-        attempts = note_attempt(request.folder, request.mode.value, attempt)
-    except HexacellError:
-        attempts = None
-    return RefusedStart(attempts, _wait_s(request.cell.settings, error, began, at))
+    _note_refusal(request.folder, request.mode.value, error, at)
+    wanted = request.cell.settings.unattended
+    again = at + timedelta(minutes=wanted.retry_minutes)
+    is_open = again <= began + timedelta(minutes=wanted.window_minutes)
+    return 60.0 * wanted.retry_minutes if is_open and error.exit_code in MAY_PASS else None
 
 
 def note_unreadable_cell(path: Path, mode: str, error: HexacellError) -> None:
@@ -83,16 +78,13 @@ def note_unreadable_cell(path: Path, mode: str, error: HexacellError) -> None:
     """
     folder = runs_folder_of_unreadable(path)
     if folder is not None:
-        attempt = StartAttempt(at=datetime.now(UTC), reason=str(error), exit_code=int(error.exit_code))
-        with suppress(HexacellError):
-            note_attempt(new_run_in(folder), mode, attempt)
+        _note_refusal(new_run_in(folder), mode, error, datetime.now(UTC))
 
 
-def _wait_s(settings: CellSettings, error: HexacellError, began: datetime, at: datetime) -> float | None:
-    wanted = settings.unattended
-    again = at + timedelta(minutes=wanted.retry_minutes)
-    is_open = again <= began + timedelta(minutes=wanted.window_minutes)
-    return 60.0 * wanted.retry_minutes if is_open and error.exit_code in MAY_PASS else None
+def _note_refusal(folder: RunFolder, mode: str, error: HexacellError, at: datetime) -> None:
+    attempt = StartAttempt(at=at.astimezone(UTC), reason=str(error), exit_code=int(error.exit_code))
+    with suppress(HexacellError):
+        note_attempt(folder, mode, attempt)
 
 
 def time_limit(settings: CellSettings, at: datetime) -> tuple[float, str] | None:

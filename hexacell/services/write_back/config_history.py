@@ -84,8 +84,11 @@ def config_history(cell: Cell) -> ConfigHistory:
             runs[run.name] = run
     found: list[ConfigWrite] = []
     for name in sorted({*runs, *(record.run for record in records)}):
-        own = [record for record in records if record.run == name]
-        found += _writes_of(runs.get(name) or _Run(name), own)
+        run, own = runs.get(name) or _Run(name), [record for record in records if record.run == name]
+        every = [*((one, True) for one in own), *((one, False) for one in _unrecorded(run.noted, own))]
+        for record, is_recorded in every:
+            verdict = (run.verdict, run.line) if record.kind in _OF_THE_RESULT else (None, "")
+            found.append(ConfigWrite(record, is_recorded, *verdict))
     # Reversed only when sorted: of two in the same millisecond the later one stays the newer.
     oldest_first = sorted(found, key=lambda one: _in_milliseconds(one.record.at))
     return ConfigHistory(tuple(reversed(oldest_first)), folder / RECORDS, damaged)
@@ -99,13 +102,6 @@ class _Run:
     noted: tuple[WriteRecord, ...] = ()
     verdict: Verdict | None = None
     line: str = ""
-
-
-def _writes_of(run: _Run, records: Sequence[WriteRecord]) -> Iterator[ConfigWrite]:
-    every = [*((one, True) for one in records), *((one, False) for one in _unrecorded(run.noted, records))]
-    for record, is_recorded in every:
-        verdict = (run.verdict, run.line) if record.kind in _OF_THE_RESULT else (None, "")
-        yield ConfigWrite(record, is_recorded, *verdict)
 
 
 def _unrecorded(noted: Sequence[WriteRecord], records: Sequence[WriteRecord]) -> list[WriteRecord]:

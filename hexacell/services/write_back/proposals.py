@@ -136,7 +136,9 @@ async def apply_proposal(
         by = await _approval(proposal, operator, typed_by)
         approval = LaterApproval(by=by, at=now()[0], sha256_after=change.sha256_after)
         approval.save(_approval_path(proposal.folder), like=change.path)
-        cause = WriteCause(WriteKind.APPLIED, by, proposal.folder.name, _outcome(proposal.state), reason)
+        judged = proposal.state.judged
+        outcome = "not verified by its run" if judged is None else judged.line
+        cause = WriteCause(WriteKind.APPLIED, by, proposal.folder.name, outcome, reason)
         folder, layout = proposal.folder.siblings, proposal.layout
         try:
             with recorded_write(folder, change.paths, layout, cause) as recording:
@@ -166,10 +168,6 @@ async def _approval(proposal: Proposal, operator: Operator, typed_by: str) -> st
     if (name := await operator.ask(approval_question(proposal))) is None:
         raise LimitError("the new geometry was declined; nothing was applied")
     return name
-
-
-def _outcome(state: RunState) -> str:
-    return "not verified by its run" if state.judged is None else state.judged.line
 
 
 def _verification_gate(state: RunState) -> AcceptanceGate:

@@ -12,7 +12,7 @@ from collections import defaultdict, deque
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import can
 
@@ -72,7 +72,10 @@ def traffic(entries: Iterable[TraceEntry], line: str) -> tuple[Answers, list[Rec
 
 
 class _Served(ABC):
-    """A thread that answers until it is stopped, or until the driver asks something else."""
+    """A thread that answers as long as the context lasts, or until the driver asks something else.
+
+    At the end that is raised: it is the cause of whatever was raised before.
+    """
 
     def __init__(self, unasked: Answers) -> None:
         self._failure: Exception | None = None
@@ -81,21 +84,16 @@ class _Served(ABC):
         self._unasked = unasked
         self._thread = threading.Thread(target=self._run, name="recorded line", daemon=True)
 
-    @contextmanager
-    def serving(self) -> Iterator[None]:
-        """Answer as long as the context lasts.
-
-        At the end it raises where the driver asked something else: the cause of whatever that raised.
-        """
+    def __enter__(self) -> Self:
         self._thread.start()
-        try:
-            yield
-        finally:
-            self._stopping.set()
-            self._thread.join()
-            self._close()
-            if self._failure is not None:
-                raise self._failure
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        self._thread.join()
+        self._close()
+        if self._failure is not None:
+            raise self._failure
 
     @abstractmethod
     def _serve_once(self) -> None:
@@ -107,8 +105,7 @@ class _Served(ABC):
     @abstractmethod
     def _close(self) -> None: ...
 
-    @abstractmethod
-    def _break(self) -> None:
+    def _break(self) -> None:  # noqa: B027 - where it cannot be broken, the driver waits for its time-out
         """Break the line, so that the driver need not wait for its time-out."""
 
     def _run(self) -> None:
@@ -126,12 +123,6 @@ class _Served(ABC):
         now_s = time.monotonic()
         self._due = deque((now_s, data) for _, data in self._due)
         self._due += [(now_s + delay_s, data) for delay_s, data in answers]
-
-    def _begin(self) -> None:
-        """The line is open: what nobody asked for comes."""
-        if self._unasked:
-            answers, self._unasked = self._unasked, ()
-            self._schedule(answers)
 
     def _wait_s(self) -> float:
         left_s = self._due[0][0] - time.monotonic() if self._due else SLICE_S
@@ -153,7 +144,8 @@ class RecordedLine(_Served):
         ready, _, _ = select.select(self._line.descriptors(), [], [], self._wait_s())
         if not ready:
             return
-        self._begin()
+        self._schedule(self._unasked)  # the line is open now
+        self._unasked = ()
         self._received += self._line.receive(ready)
         while self._received:
             expected = self._left[0].request if self._left else b""
@@ -197,7 +189,8 @@ class RecordedBus(_Served):
         message = self._bus.recv(self._wait_s())
         if message is None:
             return
-        self._begin()
+        self._schedule(self._unasked)  # the line is open now
+        self._unasked = ()
         request = f"{message.arbitration_id:03X}#{bytes(message.data).hex().upper()}".encode()
         if request not in self._left:
             raise DialogueDiffers(f"asks {request!r}, which the trace has nowhere")
@@ -210,8 +203,6 @@ class RecordedBus(_Served):
             raise ValueError(f"{data!r} is no frame of a trace")
         number, content = int(match["id"], 16), bytes.fromhex(match["data"])
         self._bus.send(can.Message(arbitration_id=number, data=content, is_extended_id=False))
-
-    def _break(self) -> None: ...  # its driver waits for no longer than its time-out
 
     def _close(self) -> None:
         self._bus.shutdown()
@@ -229,8 +220,7 @@ def recorded_line(entries: Iterable[TraceEntry], line: str) -> Iterator[str]:
         DialogueDiffers: at the end, whatever else was raised, if the driver asked something else. The line
             is broken from there on.
     """
-    served = RecordedLine(entries, line)
-    with served.serving():
+    with RecordedLine(entries, line) as served:
         yield served.url
 
 
@@ -244,6 +234,5 @@ def recorded_bus(entries: Iterable[TraceEntry], line: str) -> Iterator[Mapping[s
         ValueError: the trace has no such line.
         DialogueDiffers: at the end, if the driver asked something else.
     """
-    served = RecordedBus(entries, line)
-    with served.serving():
+    with RecordedBus(entries, line) as served:
         yield served.settings

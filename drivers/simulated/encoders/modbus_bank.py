@@ -22,10 +22,22 @@ from hexacell.clock import CellClock
 Counts = Callable[[], Sequence[int]]
 
 
+@dataclass
+class _Scale:
+    """What is wrong with one encoder; ``frozen`` is the count at which it stands."""
+
+    is_silent: bool = False
+    is_reversed: bool = False
+    is_invalid: bool = False
+    shift: float = 0.0
+    frozen: int | None = None
+
+
 class ModbusScales(Instrument):
     """The devices of six encoders: answers requests for any registers from the first to the last position.
 
-    ``counts`` gives those of legs 1 to 6. ``has_gaps``: registers between positions are there too.
+    ``counts`` gives those of legs 1 to 6, ``scales`` what is wrong with them. ``has_gaps``: registers between
+    positions are there too.
     """
 
     baudrate: ClassVar[int] = 19200
@@ -35,7 +47,7 @@ class ModbusScales(Instrument):
         super().__init__({})
         self._described, self._counts, self._has_gaps = described, counts, has_gaps
         self._latched: Sequence[int] | None = None
-        self.silent_legs: set[int] = set()
+        self.scales = tuple(_Scale() for _ in range(6))
 
     def split(self, received: bytes) -> tuple[list[bytes], bytes]:
         return split_requests(received)
@@ -48,7 +60,8 @@ class ModbusScales(Instrument):
             if latch and (function, register, number) == (WRITE_REGISTER, latch.register_, latch.value):
                 self._latched = tuple(self._counts())
             return b""
-        if device not in devices or device in {devices[leg - 1] for leg in self.silent_legs}:
+        silent = [own for own, scale in zip(devices, self.scales, strict=True) if scale.is_silent]
+        if device not in devices or device in silent:
             return b""
         held = self._registers(device)
         wanted = [held.get(register + place) for place in range(number)]
@@ -73,16 +86,6 @@ class ModbusScales(Instrument):
         return held
 
 
-@dataclass
-class _Scale:
-    """What is wrong with one encoder; ``frozen`` is the count at which it stands."""
-
-    is_reversed: bool = False
-    is_invalid: bool = False
-    shift: float = 0.0
-    frozen: int | None = None
-
-
 class SimulatedModbusBank(Closeable):
     """Six encoders on a serial line; serves until it is closed.
 
@@ -102,10 +105,10 @@ class SimulatedModbusBank(Closeable):
         has_gaps: bool = True,
     ) -> None:
         self._settings, self._positions = settings, positions
-        self._faulty = tuple(_Scale() for _ in range(6))
-        self._scales = ModbusScales(described, self._counts, has_gaps=has_gaps)
+        scales = ModbusScales(described, self._counts, has_gaps=has_gaps)
+        self._faulty = scales.scales
         self._served = GaugeLineServer(
-            self._scales,
+            scales,
             line or PtyLine("encoders"),
             clock,
             latency_s=latency_s,
@@ -118,7 +121,7 @@ class SimulatedModbusBank(Closeable):
         scale = self._faulty[leg - 1]
         found: dict[FaultKind, Switch] = {
             "unplugged": self._served.set_unplugged,
-            "silent": partial(self._set_silent, leg),
+            "silent": setting(scale, "is_silent"),
             "reversed": setting(scale, "is_reversed"),
             "zeroed": partial(self._set_zeroed, leg),
             "frozen": partial(self._set_frozen, leg),
@@ -131,22 +134,16 @@ class SimulatedModbusBank(Closeable):
         self._served.close()
 
     def _counts(self) -> list[int]:
-        return [self._count(leg, shown) for leg, shown in enumerate(self._shown())]
-
-    def _count(self, place: int, shown: float) -> int:
-        scale = self._faulty[place]
-        if scale.is_invalid:
-            return self.described.invalid[0]
-        if scale.frozen is not None:
-            return scale.frozen
-        sign = -1 if scale.is_reversed else 1
-        return round(sign * (shown + scale.shift) / self._settings.step)
+        counts = []
+        for scale, shown in zip(self._faulty, self._shown(), strict=True):
+            sign = -1 if scale.is_reversed else 1
+            count = round(sign * (shown + scale.shift) / self._settings.step)
+            held = count if scale.frozen is None else scale.frozen
+            counts.append(self.described.invalid[0] if scale.is_invalid else held)
+        return counts
 
     def _shown(self) -> list[float]:
         return shown_positions(self._settings, self._positions)
-
-    def _set_silent(self, leg: int, *, on: bool) -> None:
-        (self._scales.silent_legs.add if on else self._scales.silent_legs.discard)(leg)
 
     def _set_zeroed(self, leg: int, *, on: bool) -> None:
         self._faulty[leg - 1].shift = -self._shown()[leg - 1] if on else 0.0

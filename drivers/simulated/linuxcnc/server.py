@@ -15,8 +15,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
 
-from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Machine, TaskMode, WaitMode
-from drivers.simulated.served_device import Closeable
+from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Machine, TaskMode
 from hexacell.cell.robot import ControllerSettings
 
 HOST = "127.0.0.1"
@@ -29,62 +28,60 @@ _CHUNK = 1600
 _POLL_S = 0.05
 
 
-class SimulatedController(Closeable):
+class SimulatedController(socketserver.ThreadingTCPServer):
     """Serves clients until it is closed, each in a thread of its own, as the real one does.
 
     Attributes:
         port: where it listens, on 127.0.0.1.
         state: the state that its clients share.
+        frozen_answers: by query, while the controller behind the server is frozen.
     """
+
+    daemon_threads = False
 
     def __init__(self, machine: Machine, settings: ControllerSettings) -> None:
         self.state = ControllerState(machine)
-        self._server = _Server(self.state, settings)
-        self.port = self._server.server_address[1]
+        self.settings = settings
+        self.is_silent = self._is_unplugged = False
+        self.frozen_answers: Mapping[str, str] | None = None
+        self._connections: set[socket.socket] = set()
+        super().__init__((HOST, 0), _Handler)
+        self.port = self.server_address[1]
         self._thread = threading.Thread(
-            target=self._server.serve_forever, args=(_POLL_S,), name="simulated controller"
+            target=self.serve_forever, args=(_POLL_S,), name="simulated controller"
         )
         self._thread.start()
 
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def set_unplugged(self, *, on: bool) -> None:
         """Cut every connection and accept no other, or accept them again; the machine continues."""
-        self._server.unplugged = on
+        self._is_unplugged = on
         if on:
-            self._server.cut_all()
+            self._cut_all()
 
     def set_silent(self, *, on: bool) -> None:
         """Lose every line without a response, or no more."""
-        self._server.silent = on
+        self.is_silent = on
 
     def set_frozen(self, *, on: bool) -> None:
         """Answer every query as it would be answered now and carry out nothing, or work again.
 
         The machine continues. Of LinuxCNC, this is what a stopped milltask does.
         """
-        anybody = _Client(self._server, lambda _data: None)
-        self._server.frozen_answers = (
+        anybody = _Client(self, lambda _data: None)
+        self.frozen_answers = (
             {what: get(anybody) for what, get in _GET.items() if what not in _OF_SERVER} if on else None
         )
 
     def close(self) -> None:
-        self._server.shutdown()
+        """Stop serving, and the machine."""
+        self.shutdown()
         self.state.close()
-        self._server.cut_all()
-        self._server.server_close()
+        self._cut_all()
+        self.server_close()
         self._thread.join()
-
-
-class _Server(socketserver.ThreadingTCPServer):
-    daemon_threads = False
-
-    def __init__(self, state: ControllerState, settings: ControllerSettings) -> None:
-        self.state = state
-        self.settings = settings
-        self.unplugged = False
-        self.silent = False
-        self.frozen_answers: Mapping[str, str] | None = None
-        self._connections: set[socket.socket] = set()
-        super().__init__((HOST, 0), _Handler)
 
     def get_request(self) -> tuple[socket.socket, tuple[str, int]]:
         connection, address = super().get_request()
@@ -94,14 +91,14 @@ class _Server(socketserver.ThreadingTCPServer):
 
     def verify_request(self, request: object, client_address: object) -> bool:
         del request, client_address
-        return not self.unplugged
+        return not self._is_unplugged
 
     def shutdown_request(self, request: socket.socket | tuple[bytes, socket.socket]) -> None:
         assert isinstance(request, socket.socket)  # noqa: S101 - a TCP server has no datagrams
         self._connections.discard(request)
         super().shutdown_request(request)
 
-    def cut_all(self) -> None:
+    def _cut_all(self) -> None:
         """Cut all connections, which ends the wait of every handler."""
         for connection in tuple(self._connections):
             with suppress(OSError):
@@ -109,21 +106,21 @@ class _Server(socketserver.ThreadingTCPServer):
 
 
 class _Handler(socketserver.BaseRequestHandler):
-    server: _Server
+    server: SimulatedController
     request: socket.socket
 
     def handle(self) -> None:
         client = _Client(self.server, self.request.sendall)
         with suppress(OSError, ConnectionCut):
             while data := self.request.recv(_CHUNK):
-                if not self.server.silent:
+                if not self.server.is_silent:
                     client.receive(data)
 
 
 class _Client:
     """The settings, lines and responses of one connection; ``write`` sends bytes back over it."""
 
-    def __init__(self, server: _Server, write: Callable[[bytes], None]) -> None:
+    def __init__(self, server: SimulatedController, write: Callable[[bytes], None]) -> None:
         self.state = server.state
         self.settings = server.settings
         self.echo = True
@@ -266,14 +263,14 @@ def _abort(client: _Client, _argument: str) -> bool:
 
 
 _SWITCH = {"ON": True, "OFF": False}
+_WAIT = {"DONE": True, "RECEIVED": False}
 _TASK_MODES = {mode.value: mode for mode in TaskMode}
-_WAIT_MODES = {mode.value: mode for mode in WaitMode}
 
 _SET: dict[str, Callable[[_Client, str], bool]] = {
     "ECHO": _one_of(_SWITCH, lambda client, on: setattr(client, "echo", on)),
     "VERBOSE": _one_of(_SWITCH, lambda client, on: setattr(client, "verbose", on)),
     "ENABLE": _enable,
-    "SET_WAIT": _one_of(_WAIT_MODES, lambda client, mode: setattr(client.state, "wait_mode", mode)),
+    "SET_WAIT": _one_of(_WAIT, lambda client, waits: setattr(client.state, "waits", waits)),
     "ESTOP": _one_of(_SWITCH, lambda client, on: client.state.set_estop(on=on)),
     "MACHINE": _one_of(_SWITCH, lambda client, on: client.state.set_machine(on=on)),
     "MODE": _one_of(_TASK_MODES, lambda client, mode: client.state.set_mode(mode)),

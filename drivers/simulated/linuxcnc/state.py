@@ -32,13 +32,6 @@ class TaskMode(Enum):
     MDI = "MDI"
 
 
-class WaitMode(Enum):
-    """When a command is acknowledged."""
-
-    RECEIVED = "RECEIVED"
-    DONE = "DONE"
-
-
 class ConnectionCut(Exception):
     """The connection of the command must be cut."""
 
@@ -72,7 +65,10 @@ class Machine(Protocol):
 
 
 class ControllerState:
-    """The controller of one machine; a thread of its own executes motions one after another."""
+    """The controller of one machine; a thread of its own executes motions one after another.
+
+    ``waits``: MDI blocks are acknowledged when they are done, not when they are received.
+    """
 
     def __init__(self, machine: Machine) -> None:
         self.estop = True
@@ -80,7 +76,7 @@ class ControllerState:
         self.mode = TaskMode.MANUAL
         self.teleop = False
         self.homed = False
-        self.wait_mode = WaitMode.RECEIVED
+        self.waits = False
         self.modes = ModalState()
         self.feed_override_percent = 100.0
         self.commander: object | None = None
@@ -156,7 +152,7 @@ class ControllerState:
             self.machine.stop()
 
     def mdi(self, block: str) -> bool:
-        """Carry out one block; with ``WaitMode.DONE`` returns when it has ended.
+        """Carry out one block; returns when it has ended if commands are acknowledged then.
 
         Raises:
             ConnectionCut: The controller is being closed.
@@ -166,7 +162,7 @@ class ControllerState:
             self._require_mdi()
         except BlockError as error:
             self._errors.append(str(error))
-            return self.wait_mode is WaitMode.RECEIVED
+            return not self.waits
         self.modes = parsed.modes
         if (target := parsed.target) is None:
             return True
@@ -174,7 +170,7 @@ class ControllerState:
         if duration_s is not None:
             duration_s *= 100.0 / self.feed_override_percent
         job = self._start(lambda: self._travel(target, duration_s))
-        if self.wait_mode is WaitMode.RECEIVED:
+        if not self.waits:
             return True
         with suppress(CancelledError):
             return job.result()

@@ -21,7 +21,6 @@ from drivers.errors import (
 from drivers.interfaces import StartupAction
 from drivers.simulated.linuxcnc.mdi import ModalState
 from drivers.simulated.linuxcnc.server import SimulatedController
-from drivers.simulated.linuxcnc.state import WaitMode
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
@@ -202,7 +201,7 @@ async def test_stopping_while_homing(driver, machine):
 
 async def test_an_unreachable_pose_while_another_client_waits_for_no_completion(ready, simulated):
     """``set_wait received`` is global in 2.9: NAK becomes ACK, and only the position tells."""
-    simulated.state.wait_mode = WaitMode.RECEIVED
+    simulated.state.waits = False
     with pytest.raises(PoseRefused, match="fails kinematicsInverse"):
         await ready.move(Pose(0.0, 0.0, 5000.0), MOVE_S)
     await ready.prepare(ALL)

@@ -15,20 +15,6 @@ from tests.drivers.short_timeout import short_timeout
 from tests.waiting import until
 
 
-async def test_reading_a_closed_bank_is_an_error(bank):
-    with pytest.raises(DeviceError, match="not open"):
-        await bank.read()
-
-
-async def test_closing_twice_or_without_opening_is_harmless(bank):
-    await bank.close()
-    await bank.open()
-    await bank.close()
-    await bank.close()
-    with pytest.raises(DeviceError, match="not open"):
-        await bank.read()
-
-
 async def test_no_thread_outlives_close(raw, bank):
     before = set(threading.enumerate())
     await bank.open()
@@ -124,28 +110,6 @@ async def test_closing_ends_reads_in_progress(raw, settings):
     await bank.close()
     results = await asyncio.gather(*readings, return_exceptions=True)
     assert all(isinstance(result, DeviceError) for result in results)
-
-
-async def test_concurrent_reads_run_one_after_another(raw, bank):
-    await bank.open()
-    for node in raw.nodes.values():
-        node.answers_sync = lambda sync: [sync.to_bytes(4, "little")]
-    rounds = await asyncio.gather(*(bank.read() for _ in range(20)))
-    assert all(len(set(found.counts)) == 1 for found in rounds)
-    assert len({found.counts for found in rounds}) == 20
-
-
-async def test_a_slow_device_does_not_block_the_event_loop(raw, settings):
-    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 3600.0}))
-    await bank.open()
-    raw.nodes[1].answers_sync = lambda _: []
-    before = raw.syncs
-    reading = asyncio.ensure_future(bank.read())
-    await until(lambda: raw.syncs > before)
-    assert not reading.done()
-    await bank.close()
-    with pytest.raises(DeviceError):
-        await reading
 
 
 @pytest.mark.parametrize("where", ["recv", "send"])

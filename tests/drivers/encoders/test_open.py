@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import can
 import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
-from drivers.errors import BusError, InvalidSampleError, SilentNodeError
+from drivers.errors import BusError, SilentNodeError
 from hexacell.cell.devices import LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.parameters import JointUnit
@@ -73,10 +72,87 @@ async def test_the_identities_describe_the_nodes(bank):
     assert "absolute linear encoder, vendor 0x00000099" in identities[2].description
 
 
-async def test_missing_nodes_are_all_named(raw, short_timeout_bank):
+KEPT_ELSEWHERE = {(0x6005, 1): None, (0x6501, 0): "e8030000"}
+UNFIT = [
+    ({(0x1000, 0): "96010200"}, r"is no absolute .*0x00020196 .*an encoder, but of class 2"),
+    ({(0x1000, 0): "92010200"}, r"is no absolute .*0x00020192 .*profile 402"),
+    ({(0x6005, 1): "88130000"}, r"step of 5000 nm, the cell file says 1000 nm"),
+    (KEPT_ELSEWHERE | {(0x6501, 0): "64000000"}, "has a measuring step of 100 nm"),
+    ({(0x6005, 1): None}, "has no object 6501h:0"),
+    ({(0x1018, 4): None}, r"serial number \(none\), the cell file says 505"),
+    ({(0x1018, 4): "4d000000"}, "serial number 77, the cell file says 505"),
+    ({(0x1801, 1): None, (0x1800, 1): None}, "no transmit PDO"),
+    (
+        {(0x1A01, 0): "02", (0x1A01, 1): "04003060", (0x1A01, 2): "20000460"},
+        "position 4 bits into TPDO 2",
+    ),
+    ({(0x1001, 0): "21"}, "1001h:0"),
+]
+"""Objects of a node, in hexadecimal or not there, and why it is refused."""
+
+
+def change(node, objects) -> None:
+    for key, value in objects.items():
+        if value is None:
+            del node.objects[key]
+        else:
+            node.objects[key] = bytes.fromhex(value)
+
+
+@pytest.mark.parametrize(("objects", "error"), UNFIT)
+async def test_a_device_that_does_not_fit_is_refused_by_its_leg(raw, settings, objects, error):
+    change(raw.nodes[5], objects)
+    stated = tuple(500 + leg for leg in range(1, 7))
+    bank = Cia406Bank(settings.model_copy(update={"serial_numbers": stated}))
+    with pytest.raises(DeviceError, match=rf"leg 5 \(node 5\).*{error}"):
+        await bank.open()
+
+
+FIT = [
+    KEPT_ELSEWHERE,
+    {(0x6501, 0): "e8030000"},  # the same step twice
+    {(0x1001, 0): "10"},  # a communication error that is past
+    {(0x1019, 0): "f0"},  # a SYNC with a counter, which is switched off
+]
+
+
+@pytest.mark.parametrize("objects", FIT)
+async def test_a_device_that_fits_is_used(raw, bank, objects):
+    change(raw.nodes[5], objects)
+    await bank.open()
+    assert (await bank.read()).counts == (1000, 2000, 3000, 4000, 5000, 6000)
+    assert raw.nodes[5].objects.get((0x1019, 0), b"\0") == b"\0"
+
+
+@pytest.mark.parametrize(
+    ("fault", "error"),
+    [
+        ({"answers_sdo": 2}, "two devices share node id 4"),
+        ({"answers_sync": lambda _: [bytes(4), bytes(4)]}, "two devices share"),
+        ({"answer_sdo": lambda request: b"\x43\x00\x10\x07" + bytes(4)}, "does not respond"),
+        ({"refuses": {(0x1801, 2): 0x0601_0002}}, r"object 1801h:2 to 0x1.*read only"),
+        ({"forgets": {(0x1801, 2)}}, "acknowledges"),
+        ({"forgets": {(0x1801, 1)}}, "acknowledges"),
+        ({"refuses": {(0x1019, 0): 0x0800_0022}}, r"refuses to set object 1019h:0 to 0x0.*vendor's tool"),
+    ],
+)
+async def test_a_node_that_answers_wrongly_is_named(raw, bank, fault, error):
+    node = raw.nodes[4]
+    change(node, {(0x1801, 2): "fe", (0x1801, 1): "84020080", (0x1019, 0): "f0"})
+    for name, value in fault.items():
+        setattr(node, name, value)
+    with pytest.raises(DeviceError, match=rf"leg 4 \(node 4\).*{error}"):
+        await bank.open()
+
+
+async def test_legs_have_any_nodes_and_missing_ones_are_all_named(raw, settings):
+    bank = Cia406Bank(settings.model_copy(update={"nodes": (6, 5, 4, 3, 2, 1), "timeout_s": 1.0}))
+    identities = await bank.open()
+    assert identities[0].name == "encoder of leg 1 (node 6)"
+    assert (await bank.read()).counts == (6000, 5000, 4000, 3000, 2000, 1000)
     del raw.nodes[2], raw.nodes[5]
-    with pytest.raises(BusError, match=r"encoders of leg 2 \(node 2\), leg 5 \(node 5\): no device"):
-        await short_timeout_bank.open()
+    with pytest.raises(BusError, match=r"encoders of leg 2 \(node 5\), leg 5 \(node 2\): no device"):
+        await bank.open()
 
 
 async def test_a_node_that_belongs_to_no_leg_is_named(raw, short_timeout_bank):
@@ -84,59 +160,6 @@ async def test_a_node_that_belongs_to_no_leg_is_named(raw, short_timeout_bank):
     raw.nodes[127].node = 127
     with pytest.raises(BusError, match=r"leg 3 \(node 3\).*node 127 is on the bus but belongs to no leg"):
         await short_timeout_bank.open()
-
-
-async def test_nodes_need_not_be_numbered_like_legs(raw, settings):
-    bank = Cia406Bank(settings.model_copy(update={"nodes": (6, 5, 4, 3, 2, 1)}))
-    identities = await bank.open()
-    counts = (await bank.read()).counts
-    await bank.close()
-    assert identities[0].name == "encoder of leg 1 (node 6)"
-    assert counts == (6000, 5000, 4000, 3000, 2000, 1000)
-
-
-async def test_two_answers_to_one_request_are_two_devices(raw, bank):
-    raw.nodes[4].answers_sdo = 2
-    with pytest.raises(DeviceError, match=r"leg 4 \(node 4\).*two devices share node id 4"):
-        await bank.open()
-
-
-async def test_two_positions_for_the_first_sync_are_two_devices(raw, bank):
-    raw.nodes[4].answers_sync = lambda _: [bytes(4), bytes(4)]
-    with pytest.raises(DeviceError, match=r"leg 4 \(node 4\).*two devices share"):
-        await bank.open()
-
-
-@pytest.mark.parametrize(
-    ("value", "words"),
-    [
-        (0x0002_0196, "an encoder, but of class 2"),
-        (0x0002_0192, "profile 402"),
-        (0, "profile 0"),
-    ],
-)
-async def test_another_kind_of_device_is_refused_and_named(raw, bank, value, words):
-    raw.nodes[6].objects[0x1000, 0] = value.to_bytes(4, "little")
-    with pytest.raises(DeviceError, match=rf"leg 6.*0x{value:08X}.*{words}"):
-        await bank.open()
-
-
-async def test_another_measuring_step_is_refused(raw, bank):
-    raw.nodes[1].objects[0x6005, 1] = (5000).to_bytes(4, "little")
-    with pytest.raises(DeviceError, match=r"leg 1.*step of 5000 nm, the cell file says 1000 nm"):
-        await bank.open()
-
-
-@pytest.mark.parametrize(("step", "fits"), [(1000, True), (100, False)])
-async def test_the_step_may_be_kept_in_6501(raw, bank, step, fits):
-    for node in raw.nodes.values():
-        del node.objects[0x6005, 1]
-        node.objects[0x6501, 0] = step.to_bytes(4, "little")
-    if fits:
-        await bank.open()
-    else:
-        with pytest.raises(DeviceError, match="has a measuring step of 100 nm"):
-            await bank.open()
 
 
 async def test_two_steps_that_differ_are_refused_until_the_cell_file_names_one(raw, settings):
@@ -151,12 +174,6 @@ async def test_two_steps_that_differ_are_refused_until_the_cell_file_names_one(r
             with pytest.raises(DeviceError, match=error):
                 await bank.open()
         await bank.close()
-
-
-async def test_two_steps_that_are_the_same_need_no_choice(raw, bank):
-    for node in raw.nodes.values():
-        node.objects[0x6501, 0] = (1000).to_bytes(4, "little")
-    await bank.open()
 
 
 async def test_settings_that_shift_or_turn_counts_belong_to_the_identity(raw, bank):
@@ -182,41 +199,6 @@ async def test_a_warning_is_told_and_is_no_part_of_the_identity(raw, bank):
     await bank.read()
 
 
-async def test_a_sync_with_a_counter_is_switched_off(raw, bank):
-    raw.nodes[5].objects[0x1019, 0] = b"\xf0"
-    await bank.open()
-    assert raw.nodes[5].objects[0x1019, 0] == b"\0"
-
-
-async def test_a_node_that_insists_on_a_sync_with_a_counter_is_named(raw, bank):
-    raw.nodes[5].objects[0x1019, 0] = b"\xf0"
-    raw.nodes[5].refuses[0x1019, 0] = 0x0800_0022
-    with pytest.raises(DeviceError, match=r"leg 5.*refuses to set object 1019h:0 to 0x0.*vendor's tool"):
-        await bank.open()
-
-
-async def test_a_device_that_does_not_report_its_step_is_refused(raw, bank):
-    del raw.nodes[3].objects[0x6005, 1]
-    with pytest.raises(DeviceError, match=r"leg 3.*has no object 6501h:0"):
-        await bank.open()
-
-
-async def test_serial_numbers_are_compared_when_stated(raw, settings):
-    stated = tuple(500 + leg for leg in range(1, 7))
-    bank = Cia406Bank(settings.model_copy(update={"serial_numbers": stated}))
-    await bank.open()
-    raw.nodes[2].objects[0x1018, 4] = (77).to_bytes(4, "little")
-    with pytest.raises(DeviceError, match=r"leg 2.*serial number 77, the cell file says 502"):
-        await bank.open()
-
-
-async def test_a_serial_number_stated_but_not_there_is_refused(raw, settings):
-    del raw.nodes[2].objects[0x1018, 4]
-    bank = Cia406Bank(settings.model_copy(update={"serial_numbers": (501, 502, 503, 504, 505, 506)}))
-    with pytest.raises(DeviceError, match=r"leg 2.*serial number \(none\)"):
-        await bank.open()
-
-
 async def test_position_is_mapped_where_no_tpdo_has_it(raw, bank):
     for node in raw.nodes.values():
         node.objects[0x1A01, 0] = b"\0"
@@ -234,48 +216,6 @@ async def test_position_is_mapped_where_no_tpdo_has_it(raw, bank):
     assert raw.nodes[1].objects[0x1800, 1] == bytes.fromhex("81010000")
 
 
-async def test_a_write_refused_names_object_and_leg(raw, bank):
-    raw.nodes[5].refuses[0x1801, 2] = 0x0601_0002
-    with pytest.raises(DeviceError, match=r"leg 5.*object 1801h:2 to 0x1.*read only"):
-        await bank.open()
-
-
-@pytest.mark.parametrize("entry", [(0x1801, 2), (0x1801, 1)])
-async def test_a_device_that_acknowledges_writes_without_effect_is_refused(raw, bank, entry):
-    raw.nodes[5].objects[0x1801, 2] = b"\xfe"
-    raw.nodes[5].objects[0x1801, 1] = bytes.fromhex("85020080")
-    raw.nodes[5].forgets.add(entry)
-    with pytest.raises(DeviceError, match=r"leg 5.*acknowledges"):
-        await bank.open()
-
-
-async def test_a_device_without_tpdos_is_refused(raw, bank):
-    for key in [key for key in raw.nodes[5].objects if 0x1800 <= key[0] < 0x1C00]:
-        del raw.nodes[5].objects[key]
-    with pytest.raises(DeviceError, match=r"leg 5.*no transmit PDO"):
-        await bank.open()
-
-
-async def test_a_position_between_bytes_is_refused(raw, bank):
-    raw.nodes[5].objects[0x1A01, 0] = b"\x02"
-    raw.nodes[5].objects[0x1A01, 1] = bytes.fromhex("04003060")
-    raw.nodes[5].objects[0x1A01, 2] = bytes.fromhex("20000460")
-    with pytest.raises(DeviceError, match=r"leg 5.*position 4 bits into TPDO 2"):
-        await bank.open()
-
-
-@pytest.mark.parametrize("register", [0x01, 0x21])
-async def test_an_error_from_before_opening_is_found(raw, bank, register):
-    raw.nodes[2].objects[0x1001, 0] = bytes([register])
-    with pytest.raises(InvalidSampleError, match=r"leg 2.*1001h:0"):
-        await bank.open()
-
-
-async def test_a_past_communication_error_is_ignored(raw, bank):
-    raw.nodes[2].objects[0x1001, 0] = b"\x10"
-    await bank.open()
-
-
 async def test_a_node_that_fails_while_being_configured_is_named(raw, short_timeout_bank):
     node, answer = raw.nodes[3], raw.nodes[3].answer_sdo
 
@@ -286,12 +226,6 @@ async def test_a_node_that_fails_while_being_configured_is_named(raw, short_time
     node.answer_sdo = answer_until_tpdo1_is_read
     with pytest.raises(SilentNodeError, match=r"leg 3 .*1A00h:0"):
         await short_timeout_bank.open()
-
-
-async def test_an_invalid_response_is_an_error_that_names_the_leg(raw, bank):
-    raw.nodes[3].answer_sdo = lambda request: b"\x43\x00\x10\x07" + bytes(4)
-    with pytest.raises(SilentNodeError, match="leg 3"):
-        await bank.open()
 
 
 @pytest.mark.parametrize(
@@ -313,65 +247,36 @@ async def test_a_bus_that_cannot_be_opened_is_reported_with_an_action(bus, words
     assert caught.value.action
 
 
-async def test_bus_settings_are_passed_unchanged(raw, settings, monkeypatch):
-    seen = {}
-    real = can.Bus
-
-    def spy(*args, **kwargs):
-        seen.update(kwargs)
-        return real(*args, **kwargs)
-
-    monkeypatch.setattr(can, "Bus", spy)
-    stated = {**settings.bus, "preserve_timestamps": True}
-    bank = Cia406Bank(settings.model_copy(update={"bus": stated}))
-    await bank.open()
-    await bank.close()
-    assert seen == stated
-
-
-def turned_into_rotary(raw, counts: int) -> None:
+def turned_into_rotary(raw, counts: int, place: tuple[int, int] = (0x6001, 0)) -> None:
     for node in raw.nodes.values():
         node.objects[0x1000, 0] = (0x0002_0196).to_bytes(4, "little")
-        node.objects[0x6001, 0] = counts.to_bytes(4, "little")
+        node.objects[place] = counts.to_bytes(4, "little")
         del node.objects[0x6005, 1]
 
 
-def rotary_bank(raw, settings) -> Cia406Bank:
+@pytest.fixture
+async def rotary_bank(settings):
     kept = settings.model_dump(exclude={"measuring_step_nm", "step_object", "offset", "signed"})
-    return Cia406Bank(RotaryEncoderSettings(**kept, counts_per_turn=3600))
-
-
-async def test_encoders_of_angles_show_degrees(raw, settings):
-    turned_into_rotary(raw, 3600)
-    bank = rotary_bank(raw, settings)
-    identities = await bank.open()
-    try:
-        assert identities[0].description.startswith("CiA 406 absolute rotary encoder")
-        found = await bank.read()
-        assert found.unit is JointUnit.DEG
-        assert found.positions == pytest.approx([100.0 * leg for leg in range(1, 7)])
-    finally:
-        await bank.close()
-
-
-async def test_another_number_of_counts_a_turn_is_refused(raw, settings):
-    turned_into_rotary(raw, 4096)
-    with pytest.raises(DeviceError, match=r"leg 1.*has 4096 counts a turn, the cell file says 3600"):
-        await rotary_bank(raw, settings).open()
-
-
-async def test_counts_a_turn_may_be_kept_in_6501(raw, settings):
-    turned_into_rotary(raw, 3600)
-    for node in raw.nodes.values():
-        node.objects[0x6501, 0] = node.objects.pop((0x6001, 0))
-    bank = rotary_bank(raw, settings)
-    await bank.open()
+    bank = Cia406Bank(RotaryEncoderSettings(**kept, counts_per_turn=3600))
+    yield bank
     await bank.close()
 
 
-async def test_an_encoder_of_lengths_is_none_of_angles_nor_the_other_way_round(raw, bank, settings):
+@pytest.mark.parametrize("place", [(0x6001, 0), (0x6501, 0)])
+async def test_encoders_of_angles_show_degrees(raw, rotary_bank, place):
+    turned_into_rotary(raw, 3600, place)
+    identities = await rotary_bank.open()
+    assert identities[0].description.startswith("CiA 406 absolute rotary encoder")
+    found = await rotary_bank.read()
+    assert found.unit is JointUnit.DEG
+    assert found.positions == pytest.approx([100.0 * leg for leg in range(1, 7)])
+
+
+async def test_other_counts_a_turn_and_encoders_of_lengths_are_refused(raw, bank, rotary_bank):
     with pytest.raises(DeviceError, match="is no absolute rotary encoder"):
-        await rotary_bank(raw, settings).open()
-    turned_into_rotary(raw, 3600)
+        await rotary_bank.open()
+    turned_into_rotary(raw, 4096)
+    with pytest.raises(DeviceError, match=r"leg 1.*has 4096 counts a turn, the cell file says 3600"):
+        await rotary_bank.open()
     with pytest.raises(DeviceError, match="is no absolute linear encoder"):
         await bank.open()

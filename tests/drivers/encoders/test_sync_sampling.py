@@ -28,14 +28,6 @@ async def test_a_sample_is_one_sync_and_no_sdo_request(raw, bank):
     assert raw.heard == [(0x80, b"")]
 
 
-async def test_positions_are_never_requested_over_sdo(raw, bank):
-    await bank.open()
-    for _ in range(20):
-        await bank.read()
-    asked = {data[1:3] for can_id, data in raw.heard if can_id >> 7 == 0xC}
-    assert not asked & {b"\x04\x60", b"\x20\x60"}
-
-
 async def test_counts_become_millimetres_by_direction_step_and_offset(raw, settings):
     for leg, value in enumerate((0, 1, -1, 2**31 - 1, -(2**31), 400), 1):
         raw.nodes[leg].counts = value
@@ -81,17 +73,6 @@ async def test_a_joint_that_jumps_farther_than_it_can_go_is_an_error(raw, settin
     await bank.close()
 
 
-async def test_a_joint_may_be_anywhere_after_the_encoders_were_opened_again(raw, settings):
-    bank = Cia406Bank(settings.model_copy(update={"largest_speed": 1e-3}))
-    await bank.open()
-    await bank.read()
-    await bank.close()
-    raw.nodes[3].counts += 400_000
-    await bank.open()
-    assert (await bank.read()).counts[2] == 403_000
-    await bank.close()
-
-
 async def test_an_incomplete_sample_is_discarded_and_repeated(raw, bank):
     await bank.open()
     for node in raw.nodes.values():
@@ -122,16 +103,6 @@ async def test_if_all_nodes_are_silent_the_error_suggests_the_bus(raw, bank):
     silent = pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter, supply and termination")
     with short_timeout(bank), silent:
         await bank.read()
-
-
-async def test_the_bank_can_be_read_after_silence(raw, bank):
-    await bank.open()
-    raw.nodes[5].answers_sync = lambda _: []
-    with short_timeout(bank):
-        with pytest.raises(SilentNodeError):
-            await bank.read()
-        raw.nodes[5].answers_sync = None
-        assert (await bank.read()).counts[4] == 5000
 
 
 async def test_a_late_response_is_awaited_before_the_next_sync(raw, bank, monkeypatch):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid
+from drivers.errors import GaugeSilent, WrongSetting, ZeroVoid
 from drivers.gauges.cdi import CdiGauge, Parameter, parse_parameter
 from drivers.gauges.protocol import FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
@@ -55,11 +55,6 @@ parse_value = CdiGauge(GaugeSettings(name="y", axis="y", protocol="cdi"), Shared
 def test_a_value_is_read_with_its_unit(frame, value, unit):
     shown = parse_value(frame)
     assert (shown.value, shown.apparent_unit) == (value, unit)
-
-
-def test_a_plunger_at_its_end_is_known():
-    with pytest.raises(GaugeAtEnd):
-        parse_value(b"OUT OF BOUNDS\r")
 
 
 @pytest.mark.parametrize(
@@ -138,18 +133,6 @@ async def test_opening_identifies_the_gauge_and_reading_gives_its_value(dialogue
     assert await gauge.read() == GaugeReading(2.138, "+  2.1380, MM")
 
 
-async def test_echoed_requests_are_not_answers(dialogue, gauge):
-    dialogue.expect(*((ask, ask + b"\n", answer) for ask, answer in opening()))
-    dialogue.expect(*[(b"R\r", b"R\r" + VALUE)] * 2)
-    await gauge.open()
-    assert (await gauge.read()).value_mm == 2.138
-
-
-async def test_a_carriage_return_alone_ends_a_line(dialogue, gauge):
-    dialogue.expect(*((ask, answer.replace(b"\n", b"")) for ask, answer in opening()))
-    await gauge.open()
-
-
 async def test_an_older_indicator_without_parameters_is_accepted(dialogue, gauge):
     dialogue.expect((b"R\r", VALUE), (b"?p011\r",), (b"R\r", VALUE))
     await gauge.open()
@@ -179,13 +162,6 @@ async def test_an_inch_gauge_is_refused(dialogue, gauge):
     dialogue.expect((b"R\r", b"+ 0.08417, IN\r\n"))
     with pytest.raises(WrongSetting, match="gauge y: answers in inch"):
         await gauge.open()
-
-
-@pytest.mark.parametrize("value", [b"+ 0.08417, IN\r\n", b"+  0.0842, IN\r\n"])
-async def test_inch_pressed_during_a_set_is_found_in_a_reading(dialogue, opened, value):
-    dialogue.expect((b"R\r", value))
-    with pytest.raises(WrongSetting):
-        await opened.read()
 
 
 async def test_the_unit_is_requested_with_the_plunger_at_its_end(dialogue, gauge):
@@ -220,32 +196,3 @@ async def test_a_setting_changed_during_a_set_voids_the_zero(dialogue, opened, a
     dialogue.expect(*opening(**answers) * 3)
     with pytest.raises(ZeroVoid, match=words):
         await opened.check()
-
-
-async def test_one_damaged_answer_is_no_change(dialogue, opened):
-    dialogue.expect(*opening(p019=b"1\r\n"), *opening())
-    await opened.check()
-
-
-async def test_a_plunger_at_its_end_is_an_error_of_its_own(dialogue, opened):
-    dialogue.expect((b"R\r", b"OUT OF BOUNDS\r\n"))
-    with pytest.raises(GaugeAtEnd, match="plunger at its end"):
-        await opened.read()
-
-
-async def test_a_request_that_was_not_understood_is_repeated(dialogue, opened):
-    dialogue.expect((b"R\r", b"NOT FOUND\r\n"), (b"R\r", VALUE), (b"R\r", VALUE))
-    assert (await opened.read()).value_mm == 2.138
-
-
-async def test_another_protocol_is_quoted_beside_what_was_expected(dialogue, gauge):
-    dialogue.expect(*[(b"R\r", b"ERR1\r")] * 3)
-    with pytest.raises(WrongAnswer, match=r"b'ERR1\\r' where protocol cdi has answers like '\+  2\.1380"):
-        await gauge.open()
-
-
-async def test_read_once_sends_one_request(dialogue, opened):
-    dialogue.expect((b"R\r", b"+  2.1380, MM\r\n"), (b"R\r", b"OUT OF BOUNDS\r\n"))
-    assert (await opened.read_once()).value_mm == 2.138
-    with pytest.raises(GaugeAtEnd):
-        await opened.read_once()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +11,6 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, PortLost
 from drivers.gauges.modbus import ModbusGauge
@@ -138,35 +136,6 @@ async def test_a_number_that_means_an_end_is_told():
         await cell.gauges[0].close()
 
 
-@pytest.mark.parametrize("fault", ["damaged", "cut short", "repeated", "NUL bytes"])
-async def test_faults_of_the_line_change_no_value(fault):
-    with bench() as cell:
-        await cell.gauges[0].open()
-        cell.bank.faults("x")[fault](on=True)
-        for step in range(6):
-            cell.balls["x"] = 0.25 * step
-            assert (await cell.gauges[0].read()).value_mm == pytest.approx(0.25 * step)
-        await cell.gauges[0].close()
-
-
-async def test_a_late_answer_is_not_that_of_the_next_request():
-    with bench() as cell:
-        [x, *_] = cell.gauges
-        await x.open()
-        cell.bank.faults("x")["late"](on=True)
-        with pytest.raises(GaugeSilent):
-            await _read_often(x)
-        cell.bank.faults("x")["late"](on=False)
-        cell.balls["x"] = 1.75
-        assert (await x.read()).value_mm == pytest.approx(1.75)
-        await x.close()
-
-
-async def _read_often(gauge: ModbusGauge) -> None:
-    for _ in range(6):
-        await gauge.read()
-
-
 @given(st.integers(-(2**31), 2**31 - 1), st.sampled_from(["big", "little"]))
 def test_what_the_simulated_device_holds_is_understood(count, order):
     found = ModbusSettings.model_validate({"register": 0, "word_order": order, "mm_per_unit": 1.0})
@@ -200,14 +169,3 @@ async def test_without_the_extra_the_command_that_installs_it_is_told(monkeypatc
 def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file():
     with pytest.raises(FileError, match="gauge x: does not say in which register"):
         ModbusGauge(GaugeSettings(name="x", axis="x", protocol="modbus"), SharedSerialPorts())
-
-
-@pytest.mark.parametrize("change", [{"device": 0}, {"device": 248}, {"register": 65536}, {"type": "int8"}])
-def test_places_that_cannot_be_are_refused(change):
-    with pytest.raises(ValidationError):
-        ModbusSettings.model_validate({"register": 0, **change})
-
-
-def test_the_library_is_not_imported_with_the_driver():
-    code = "import sys, drivers.gauges.modbus; sys.exit('pymodbus' in sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True)

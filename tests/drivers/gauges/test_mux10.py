@@ -1,6 +1,5 @@
 """MUX-10 frames: several gauges behind one line."""
 
-import asyncio
 import re
 
 import pytest
@@ -15,7 +14,7 @@ from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.indicators import Mux10
 from hexacell.cell.devices import GaugeSettings
-from hexacell.errors import DeviceError, FileError
+from hexacell.errors import DeviceError
 
 VALUE = b"02A+0000.123\r"
 OPENING = ((b"2\r", VALUE), (b"V\r", b"MUX-10F 1.0\r"))
@@ -116,15 +115,6 @@ def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
     assert shown.value == float(noise[3:])
 
 
-@given(st.floats(-99, 99), st.integers(0, 9), st.integers(0, 9))
-def test_no_part_of_a_value_is_a_value(value, front, back):
-    frame = Mux10.format_value(2, value, inch=False)
-    part = frame[front : len(frame) - back]
-    if part != frame and not re.fullmatch(rb"9[12]\d\r", part):  # the last digits may be an error frame
-        with pytest.raises(FrameRejected):
-            parse_value(part)
-
-
 @pytest.mark.parametrize("frame", [b"911\r", b"01A+0000.123\r", b"\x80MUX\r", b"\r"])
 def test_an_error_or_a_value_is_no_description(frame):
     with pytest.raises(FrameRejected):
@@ -153,18 +143,6 @@ async def test_requests_to_a_busy_multiplexer_are_repeated(dialogue, opened, no_
         (b"2\r", b"918\r"), (b"2\r", b"918\r"), (b"2\r", VALUE), (b"2\r", b"918\r"), (b"2\r", VALUE)
     )
     assert (await opened.read()).value_mm == 0.123
-
-
-async def test_a_pause_precedes_the_repeated_request_to_a_busy_multiplexer(dialogue, opened, monkeypatch):
-    pauses = []
-
-    async def sleep(seconds):
-        pauses.append(seconds)
-
-    monkeypatch.setattr(asyncio, "sleep", sleep)
-    dialogue.expect((b"2\r", b"918\r"), (b"2\r", VALUE), (b"2\r", VALUE))
-    await opened.read()
-    assert pauses == [0.05]
 
 
 async def test_a_multiplexer_that_stays_busy_is_an_error(dialogue, opened, no_pause):
@@ -202,13 +180,6 @@ async def test_five_decimals_are_inches(dialogue, gauge):
     dialogue.expect((b"2\r", b"02A+00.00484\r"))
     with pytest.raises(WrongSetting, match="gauge y: answers in inch"):
         await gauge.open()
-
-
-@pytest.mark.parametrize("call", ["read", "check"])
-async def test_inch_pressed_during_a_set_is_found(dialogue, opened, call):
-    dialogue.expect((b"2\r", b"02A+00.00484\r"))
-    with pytest.raises(WrongSetting):
-        await getattr(opened, call)()
 
 
 @pytest.mark.parametrize("call", ["read", "check", "read_once"])
@@ -321,28 +292,6 @@ async def test_damage_below_the_agreement_is_outvoted_by_a_third_reading(
     await gauge.close()
 
 
-async def test_another_protocol_is_quoted_beside_what_was_expected(dialogue, gauge):
-    dialogue.expect(*[(b"2\r", b"ERR1\r")] * 3)
-    with pytest.raises(WrongAnswer, match=r"b'ERR1\\r' where protocol mux10 has answers like '01A"):
-        await gauge.open()
-
-
-async def test_gauges_on_one_multiplexer_share_its_line(dialogue, links, settings):
-    gauges = [Mux10Gauge(settings("mux10", f"g{each}", channel=each), links) for each in (1, 2, 3)]
-    for channel, gauge in enumerate(gauges, start=1):
-        question, value = b"%d\r" % channel, b"0%dA+0001.000\r" % channel
-        dialogue.expect((question, value), OPENING[1], (question, value), (question, value))
-        await gauge.open()
-        await gauge.read()
-    await gauges[0].close()
-    assert dialogue.is_open
-    dialogue.expect(*[(b"2\r", b"02A+0001.000\r")] * 2)
-    await gauges[1].read()
-    await gauges[1].close()
-    await gauges[2].close()
-    assert not dialogue.is_open
-
-
 async def test_a_line_lost_and_opened_again_voids_the_zero_of_every_gauge_on_it(dialogue, links, settings):
     one, two = (Mux10Gauge(settings("mux10", f"g{each}", channel=each), links) for each in (1, 2))
     first, second = (b"1\r", b"01A+0001.000\r"), (b"2\r", b"02A+0001.000\r")
@@ -364,23 +313,7 @@ async def test_a_line_lost_and_opened_again_voids_the_zero_of_every_gauge_on_it(
     await two.close()
 
 
-async def test_two_gauges_cannot_have_one_channel(dialogue, opened, links, settings):
-    with pytest.raises(FileError, match=r"gauge z: port wire, channel 2, already belongs to gauge y"):
-        await Mux10Gauge(settings("mux10", "z", channel=2), links).open()
-
-
-async def test_two_speeds_on_one_line_are_refused(dialogue, opened, links, settings):
-    other = Mux10Gauge(settings("mux10", "z", channel=1, serial={"baudrate": 2400}), links)
-    with pytest.raises(FileError, match="gauge z: port wire is shared with gauge y under other serial"):
-        await other.open()
-
-
 # Glancing
-
-
-async def test_read_once_sends_one_request(dialogue, opened):
-    dialogue.expect((b"2\r", VALUE))
-    assert await opened.read_once() == GaugeReading(0.123, "02A+0000.123")
 
 
 async def test_read_once_of_a_busy_multiplexer_is_a_wrong_answer(dialogue, opened):
@@ -388,9 +321,3 @@ async def test_read_once_of_a_busy_multiplexer_is_a_wrong_answer(dialogue, opene
     with pytest.raises(WrongAnswer, match=r"busy \(918\)"):
         await opened.read_once()
     assert (await opened.read_once()).value_mm == 0.123
-
-
-async def test_read_once_with_the_plunger_at_its_end(dialogue, opened):
-    dialogue.expect((b"2\r", b"912\r"))
-    with pytest.raises(GaugeAtEnd):
-        await opened.read_once()

@@ -13,7 +13,7 @@ from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import instrument_class
 from drivers.simulated.gauges.instruments import Indicator
-from hexacell.cell.described_devices import RequestSettings
+from hexacell.cell.described_devices import ModbusEncoderSettings, RequestSettings, StreamSettings
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError
 
@@ -98,19 +98,20 @@ async def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file(links,
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("section", "stated"),
     [
-        {"answer": r"GN01,([+-]\d{4}"},
-        {"answer": r"GN01,[+-]\d{4}\.\d{4}"},
-        {"answer": r"(GN01),[+-]\d{4}\.\d{4}"},
-        {"example": "GN01,16\r\n"},
-        {"at_end": "("},
-        {"mm_per_unit": 0.0},
+        (RequestSettings, ID_H | {"answer": r"GN01,([+-]\d{4}"}),
+        (RequestSettings, ID_H | {"answer": r"GN01,[+-]\d{4}\.\d{4}"}),
+        (RequestSettings, ID_H | {"answer": r"(GN01),[+-]\d{4}\.\d{4}"}),
+        (RequestSettings, ID_H | {"example": "GN01,16\r\n"}),
+        (RequestSettings, ID_H | {"at_end": "("}),
+        (StreamSettings, {"answer": r"(?P<channel>\+012)\.34 mm", "example": "+012.34 mm\r\n"}),
+        (ModbusEncoderSettings, {"registers": (0, 2, 4, 6, 8, 9)}),
     ],
 )
-def test_descriptions_that_cannot_be_are_refused(change):
+def test_descriptions_that_cannot_be_are_refused(section, stated):
     with pytest.raises(ValidationError):
-        RequestSettings(**ID_H | change)
+        section.model_validate(stated)
 
 
 @given(st.floats(-6.0, 6.0), st.sampled_from([ID_H, AMPLIFIER]))

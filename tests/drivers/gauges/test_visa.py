@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -128,37 +127,6 @@ async def test_what_is_no_value_is_told(answer, error, message):
         await cell.gauges[0].close()
 
 
-@pytest.mark.parametrize("transport", ["socket", "pty"])
-async def test_a_late_answer_is_not_that_of_the_next_question(transport):
-    with bench(transport) as cell:
-        await cell.gauges[0].open()
-        cell.bank.faults("x")["late"](on=True)
-        with pytest.raises(GaugeSilent):
-            await _read_often(cell.gauges[0])
-        cell.bank.faults("x")["late"](on=False)
-        cell.balls["x"] = 1.75
-        assert (await cell.gauges[0].read()).value_mm == pytest.approx(1.75)
-        await cell.gauges[0].close()
-
-
-@pytest.mark.parametrize("transport", ["socket", "pty"])
-async def test_an_answer_that_comes_twice_is_not_that_of_the_next_question(transport):
-    with bench(transport) as cell:
-        [x, *_] = cell.gauges
-        await x.open()
-        cell.bank.faults("x")["repeated"](on=True)
-        await x.read()
-        for step in range(5):
-            cell.balls["x"] = 0.5 * step
-            assert (await x.read()).value_mm == pytest.approx(0.5 * step)
-        await x.close()
-
-
-async def _read_often(gauge: VisaGauge) -> None:
-    for _ in range(6):
-        await gauge.read()
-
-
 async def test_a_resource_that_is_not_there_is_told():
     settings = GaugeSettings(name="x", axis="x", protocol="visa", visa=SCPI, port="ASRL/dev/nowhere::INSTR")
     with pytest.raises(PortLost, match="gauge x: port ASRL/dev/nowhere::INSTR cannot be opened"):
@@ -179,8 +147,3 @@ async def test_without_the_extra_the_command_that_installs_it_is_told(monkeypatc
 def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file():
     with pytest.raises(FileError, match="gauge x: does not say what is asked"):
         VisaGauge(GaugeSettings(name="x", axis="x", protocol="visa"), SharedSerialPorts())
-
-
-def test_the_library_is_not_imported_with_the_driver():
-    code = "import sys, drivers.gauges.visa; sys.exit('pyvisa' in sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True)

@@ -10,11 +10,9 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
-from pydantic import SecretStr
 
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.encoders.cia406 import Cia406Bank
-from drivers.errors import MotionInterrupted, MoveRefused
 from drivers.gauges.cdi import CdiGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.sylvac import SylvacGauge
@@ -23,12 +21,11 @@ from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.cell import SimulatedCell
 from hexacell.cell.model import CellSettings
 from hexacell.config.toml_format import NativeToml
-from hexacell.errors import FileError, HexacellError, ReachError
+from hexacell.errors import FileError, ReachError
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose
 from tests.geometries import hexaglide_geometry
 from tests.native_config import NATIVE
-from tests.waiting import until
 
 ALL = frozenset(StartupAction)
 MOVE_S = 1.0
@@ -54,18 +51,6 @@ def quick(settings: CellSettings) -> CellSettings:
     gauges = tuple(gauge.model_copy(update={"timeout_s": 10.0}) for gauge in settings.gauges)
     encoders = settings.encoders.model_copy(update={"timeout_s": 10.0, "heartbeat_ms": 10_000})
     return settings.model_copy(update={"timing": timing, "gauges": gauges, "encoders": encoders})
-
-
-def slow(settings: CellSettings) -> CellSettings:
-    """Moves that last 20 s of real time: long enough to stop one."""
-    assert settings.simulation is not None
-    motion = settings.simulation.motion.model_copy(update={"minimum_s": 4000.0})
-    simulation = settings.simulation.model_copy(update={"motion": motion})
-    return quick(settings).model_copy(update={"simulation": simulation})
-
-
-async def under_way(cell: SimulatedCell) -> None:
-    await until(lambda: cell.physics.progress() not in {0.0, 1.0})
 
 
 @asynccontextmanager
@@ -95,43 +80,6 @@ async def test_every_device_answers_and_the_robot_moves(bundled_cell) -> None:
         assert before != after
         assert after == pytest.approx(cell.physics.encoder_positions().tolist(), abs=0.01)
         assert readings == pytest.approx(seen, abs=0.05)
-
-
-async def test_a_target_out_of_reach_is_refused(bundled_cell) -> None:
-    with serve(bundled_cell) as cell:
-        async with drivers(cell.settings) as (_, encoders, controller):
-            await controller.prepare(ALL)
-            before = (await encoders.read()).positions
-            with pytest.raises(MoveRefused, match="kinematicsInverse"):
-                await controller.move(Pose(0.0, 0.0, 2000.0), MOVE_S)
-            assert (await encoders.read()).positions == pytest.approx(before, abs=0.01)
-
-
-async def test_a_cancelled_move_stops_the_robot_in_place(bundled_cell) -> None:
-    with serve(bundled_cell, slow(bundled_cell.settings)) as cell:
-        async with drivers(cell.settings) as (_, _, controller):
-            await controller.prepare(ALL)
-            moving = asyncio.create_task(controller.move(Pose(0.0, -100.0, 550.0), MOVE_S))
-            await under_way(cell)
-            moving.cancel()
-            with pytest.raises(asyncio.CancelledError):
-                await moving
-            progress = cell.physics.progress()
-            sliders = cell.physics.encoder_positions()
-        assert 0.0 < progress < 1.0
-        assert cell.physics.progress() == progress
-        assert cell.physics.encoder_positions() == pytest.approx(sliders, abs=0.01)
-
-
-async def test_a_stop_during_a_move_is_reported(bundled_cell) -> None:
-    with serve(bundled_cell, slow(bundled_cell.settings)) as cell:
-        async with drivers(cell.settings) as (_, _, controller):
-            await controller.prepare(ALL)
-            moving = asyncio.create_task(controller.move(Pose(0.0, -100.0, 550.0), MOVE_S))
-            await under_way(cell)
-            await controller.stop()
-            with pytest.raises(MotionInterrupted, match="stopped on request"):
-                await moving
 
 
 @pytest.mark.parametrize("signs", [(1, 1, 1), (-1, 1, -1)])
@@ -171,20 +119,6 @@ async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> Non
 def _geometry(values: Any) -> Any:
 
     return hexaglide_geometry(values["S"], values["B"], values["l"])
-
-
-async def test_the_passwords_of_the_cell_file_are_required(bundled_cell) -> None:
-    settings = quick(bundled_cell.settings)
-    passwords = {"connect_password": SecretStr("sesame"), "enable_password": SecretStr("open")}
-    own = settings.controller.model_copy(update=passwords)
-    with serve(bundled_cell, settings.model_copy(update={"controller": own})) as cell:
-        async with drivers(cell.settings) as (_, _, controller):
-            await controller.prepare(ALL)
-        wrong = cell.settings.controller.model_copy(update={"connect_password": SecretStr("EMC")})
-        stranger = LinuxcncrshController(wrong)
-        with pytest.raises(HexacellError, match="password"):
-            await stranger.open()
-        await stranger.close()
 
 
 def test_settings_have_an_address_for_every_device_and_no_simulation(bundled_cell) -> None:
@@ -229,16 +163,3 @@ def test_a_device_that_cannot_be_simulated_is_refused_and_nothing_stays_open(bun
     strange = (settings.gauges[0].model_copy(update={"protocol": "telepathy"}), *settings.gauges[1:])
     with pytest.raises(FileError, match="telepathy"):
         serve(bundled_cell, settings.model_copy(update={"gauges": strange}))
-
-
-async def test_faults_of_devices_reach_the_drivers(bundled_cell) -> None:
-    settings = quick(bundled_cell.settings)
-    hasty = settings.encoders.model_copy(update={"timeout_s": 0.3})
-    with serve(bundled_cell, settings.model_copy(update={"encoders": hasty})) as cell:
-        async with drivers(cell.settings) as (gauges, encoders, _):
-            cell.gauges.indicators["x"].inch = True
-            with pytest.raises(HexacellError, match="gauge x"):
-                await gauges[0].read()
-            cell.faults.inject("silent", "encoder 3")
-            with pytest.raises(HexacellError, match="3"):
-                await encoders.read()

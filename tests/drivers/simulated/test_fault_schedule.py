@@ -7,14 +7,11 @@ from typing import Any
 
 import pytest
 
-from drivers.errors import GaugeAtEnd, GaugeSilent
-from drivers.gauges.sylvac import SylvacGauge
-from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.cell import SimulatedCell
 from drivers.simulated.fault_schedule import FaultSchedule
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
-from hexacell.errors import DeviceError, UsageError
+from hexacell.errors import UsageError
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from tests.native_config import NATIVE
 from tests.waiting import wait_until
@@ -34,55 +31,6 @@ def cell(bundled_cell):
         other_processes=False,
     ) as simulated:
         yield simulated
-
-
-@pytest.fixture
-async def gauge(cell):
-    links = SharedSerialPorts()
-    opened = SylvacGauge(cell.settings.gauges[0].model_copy(update={"timeout_s": 2.0}), links)
-    await opened.open()
-    yield opened
-    await opened.close()
-    await links.close()
-
-
-async def test_a_plunger_moves_to_its_end_and_back(cell, gauge) -> None:
-    cell.faults.inject("at its end", "x")
-    with pytest.raises(GaugeAtEnd):
-        await gauge.read_once()
-    cell.faults.clear("at its end", "x")
-    assert abs((await gauge.read_once()).value_mm) < 3.0
-
-
-async def test_a_frozen_gauge_repeats_its_answer(cell, gauge) -> None:
-    cell.faults.inject("frozen", "x")
-    assert len({(await gauge.read_once()).raw for _ in range(20)}) == 1
-    cell.faults.clear("frozen", "x")
-    assert len({(await gauge.read_once()).raw for _ in range(50)}) > 1
-
-
-async def test_a_ball_moves_off_its_plate_and_back(cell, gauge) -> None:
-    before = (await gauge.read_once()).value_mm
-    cell.faults.inject("off its plate", "x")
-    assert abs((await gauge.read_once()).value_mm - before) == pytest.approx(6.0, abs=0.1)
-    cell.faults.clear("off its plate", "x")
-    assert (await gauge.read_once()).value_mm == pytest.approx(before, abs=0.1)
-
-
-async def test_a_cable_unplugged_and_plugged_in(cell, gauge) -> None:
-    cell.faults.inject("unplugged", "x")
-    with pytest.raises(DeviceError, match="lost"):
-        await gauge.read_once()
-    cell.faults.clear("unplugged", "x")
-    await gauge.open()
-    await gauge.read_once()
-
-
-async def test_a_silent_gauge(cell, gauge) -> None:
-    cell.faults.inject("silent", "x")
-    with pytest.raises(GaugeSilent):
-        await gauge.read_once()
-    cell.faults.clear("silent", "x")
 
 
 def test_the_stop_line_is_a_file(cell) -> None:

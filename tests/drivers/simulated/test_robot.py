@@ -83,13 +83,6 @@ def test_a_pose_out_of_reach_is_refused_and_nothing_moves(twin, pose: Pose) -> N
     assert twin.machine.pose().as_tuple() == pytest.approx(TILTED.as_tuple(), abs=1e-9)
 
 
-def test_a_robot_moves_after_a_refused_pose(twin) -> None:
-    with pytest.raises(MotionRefused):
-        twin.machine.move(Pose(0.0, 0.0, 2000.0))
-    twin.machine.move(TILTED)
-    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
-
-
 def stop_half_way(twin: Any) -> None:
     def stop() -> None:
         twin.clock.time_s += 0.15
@@ -131,13 +124,6 @@ def test_a_stop_while_the_line_is_computed_is_not_lost(twin, monkeypatch) -> Non
     assert twin.machine.pose().as_tuple() == pytest.approx((0.0, 0.0, 550.0, 0.0, 0.0, 0.0), abs=1e-9)
 
 
-def test_a_stop_at_standstill_does_not_stop_the_next_move(twin) -> None:
-    twin.machine.stop()
-    twin.machine.stop()
-    twin.machine.move(TILTED)
-    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
-
-
 def test_a_stop_from_another_thread_ends_the_wait(make_twin) -> None:
     twin = make_twin(motion__minimum_s=1000.0)
     waiting = threading.Event()
@@ -171,34 +157,6 @@ def test_switching_on_reads_the_geometry_and_moves_no_slider(twin) -> None:
     believed = twin.machine.pose()
     assert believed.position == pytest.approx(twin.ball_at(TILTED), abs=1e-6)
     assert twin.machine.joints() == pytest.approx(sliders, abs=1e-8)
-
-
-def test_with_the_true_geometry_the_ball_reaches_its_target(make_twin) -> None:
-    twin = make_twin(station_reach_mm=1e6)
-    rewrite(twin, twin.truth)
-    twin.machine.switch_on()
-    twin.machine.move(Pose(0.0, 0.0, 550.0))
-    before = twin.seen()
-    for pose in (Pose(0.0, 0.0, 550.0, 10.0, -5.0, 8.0), Pose(0.0, 0.0, 550.0, -8.0, 12.0, 0.0)):
-        twin.machine.move(pose)
-        assert twin.seen() == pytest.approx(before, abs=1e-6)
-
-
-def test_homing_moves_nothing(twin) -> None:
-    twin.machine.move(TILTED)
-    before = twin.physics.encoder_positions()
-    twin.machine.home()
-    assert np.array_equal(twin.physics.encoder_positions(), before)
-
-
-def test_a_config_that_cannot_be_read_leaves_the_old_geometry(twin) -> None:
-    kept = twin.config.read_text()
-    twin.config.write_text("[geometry]\n")
-    with pytest.raises(FileError, match="has no S"):
-        twin.machine.switch_on()
-    twin.config.write_text(kept)
-    twin.machine.move(TILTED)
-    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
 
 
 def test_a_geometry_that_cannot_hold_the_sliders_is_refused(twin) -> None:

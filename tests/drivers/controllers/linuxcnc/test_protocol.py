@@ -43,10 +43,6 @@ def test_bytes_without_a_line_end_are_kept():
     assert buffer.rest == "login:"
 
 
-def test_bytes_that_are_not_text_are_replaced():
-    assert LineBuffer().feed(b"\xff\xfe\x00\r\n") == ["\ufffd\ufffd\x00"]
-
-
 @given(st.text())
 def test_an_encoded_command_fits_the_server_and_is_one_line(command):
     try:
@@ -63,14 +59,6 @@ def test_a_command_longer_than_the_limit_is_refused():
     assert len(encode_command("x" * 253, "controller")) == 255
     with pytest.raises(UsageError, match="256 bytes is longer than the 255"):
         encode_command("x" * 254, "controller")
-
-
-def test_a_timed_move_is_formatted_exactly():
-    pose = Pose(10.0, -20.5, 560.123456789, 5.0, -4.0, 3.0)
-    assert timed_move(pose, 2.5) == (
-        "G21 G53 G93 G1 X10.00000000 Y-20.50000000 Z560.12345679 "
-        "A5.00000000 B-4.00000000 C3.00000000 F24.00000000"
-    )
 
 
 @given(st.builds(Pose, *[COORDINATES] * 6), st.floats(0.1, 1e5))
@@ -143,10 +131,6 @@ def test_explanations_are_distinguished_from_answers():
 
 def test_positions_beyond_the_sixth_belong_to_other_axes():
     assert parse_positions("1 -2 3.5 4 5 6 7 8") == (1.0, -2.0, 3.5, 4.0, 5.0, 6.0)
-
-
-def test_a_negative_zero_is_zero():
-    assert str(parse_positions("-0.000000 0 0 0 -0.0 0")[0]) == "0.0"
 
 
 @given(st.text() | st.lists(st.floats().map(str)).map(" ".join))

@@ -13,7 +13,7 @@ from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.errors import ConnectionLost, ResponseTimeout
 from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import WireTrace
-from hexacell.cell.robot import ControllerSettings, RotaryControllerSettings
+from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError, ExitCode, UsageError
 
 HELLO = "hello EMC hexacell 1.0"
@@ -24,11 +24,6 @@ async def test_opening_greets_takes_control_and_orders_nothing_else(play):
     identity = await driver.open()
     name = f"controller 127.0.0.1:{play.servers[0].port}"
     assert identity == DeviceIdentity(name, "linuxcncrsh", "EMCNETSVR 1.1, machine.ini")
-
-
-async def test_opening_twice_is_harmless(play):
-    driver = await play.opened([("get inifile", b"GET INIFILE NAK\r\n\r\n")] * 2)
-    assert (await driver.open()).description == "EMCNETSVR 1.1"
 
 
 async def test_opening_a_server_of_version_2_10(play):
@@ -152,12 +147,6 @@ async def test_opening_times_out_if_the_server_stops_answering_during_the_greeti
         await driver.open()
 
 
-async def test_a_server_that_closes_the_connection_during_opening_is_reported(play):
-    driver = await play.driver([(HELLO, play.HANG_UP)])
-    with pytest.raises(ConnectionLost, match="closed the connection"):
-        await driver.open()
-
-
 async def test_a_failed_opening_can_be_repeated_and_leaves_it_closed(play):
     driver = await play.driver([(HELLO, play.HANG_UP)], play.OPENING)
     with pytest.raises(ConnectionLost):
@@ -176,14 +165,6 @@ async def test_a_password_that_would_overrun_the_servers_buffer_is_not_sent(play
     driver = await play.driver([], connect_password="x" * 300)
     with pytest.raises(UsageError, match="longer than the 255"):
         await driver.open()
-
-
-async def test_closing_twice_and_without_opening(play):
-    driver = await play.opened([])
-    await driver.close()
-    await driver.close()
-    with pytest.raises(DeviceError, match="is not connected"):
-        await driver.joint_positions()
 
 
 async def test_a_cancelled_opening_leaves_nothing_behind(play):
@@ -241,11 +222,3 @@ async def test_passwords_stay_out_of_the_trace(play):
         b"hello *** hexacell 1.0\r\nset echo off\r\nset verbose on\r\nset enable ***\r\n"
     )
     assert "machine.ini" in trace.text()
-
-
-@pytest.mark.parametrize(
-    ("made", "joint_unit_mm"), [(ControllerSettings, 25.4), (RotaryControllerSettings, 1.0)]
-)
-def test_an_inch_machine_tells_angles_in_degrees(made: type[ControllerSettings], joint_unit_mm: float):
-    settings = made(config="robot.toml", port=5007, unit_mm=25.4)
-    assert (settings.unit_mm, settings.joint_unit_mm) == (25.4, joint_unit_mm)

@@ -64,11 +64,6 @@ async def test_prepare_releases_the_emergency_stop_switches_on_and_homes(play):
     await driver.prepare(ALL)
 
 
-async def test_prepare_changes_no_state_that_is_already_right(play):
-    driver = await play.opened([*TAKING_CONTROL, *READY, *MDI, *OWN_COORDINATES])
-    await driver.prepare(ALL)
-
-
 async def test_homing_leaves_teleoperation_first(play):
     driver = await play.opened(
         [
@@ -252,22 +247,10 @@ async def test_settings_that_falsify_coordinates_are_refused_and_then_nothing_mo
 
 
 @FALSE_COORDINATES
-async def test_they_are_refused_before_the_machine_is_homed(play, conversation, problem):
-    driver = await play.opened([*UNTIL_HOMED, *ON_NOT_HOMED, *conversation])
-    with pytest.raises(DeviceError, match=problem):
-        await driver.prepare(ALL)
-
-
-@FALSE_COORDINATES
 async def test_a_check_finds_them_and_sets_nothing(play, conversation, problem):
     driver = await play.opened(conversation)
     with pytest.raises(DeviceError, match=problem):
         await driver.check()
-
-
-async def test_a_check_of_coordinates_that_are_the_machines_own_finds_nothing(play):
-    driver = await play.opened(OWN_COORDINATES)
-    await driver.check()
 
 
 async def test_a_refusal_quotes_the_controllers_error_messages(play):

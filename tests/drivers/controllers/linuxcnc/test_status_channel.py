@@ -143,11 +143,6 @@ async def test_error_messages_are_read_if_the_machine_switches_off_between_prepa
     assert (await driver.status()).error_messages == ("joint 3 following error",)
 
 
-async def test_error_messages_are_not_read_if_the_machine_was_never_on(play) -> None:
-    driver = await play.opened([], [*GREETING, *asked(estop="ON", machine="OFF")])
-    assert await driver.status() == ControllerStatus(estop=True, enabled=False, heartbeat=JOINTS)
-
-
 async def test_the_status_is_read_during_a_move(play) -> None:
     arrived = play.Pause()
     there = b"ABS_ACT_POS 1.000000 2.000000 3.000000 0.000000 0.000000 0.000000\r\n"
@@ -170,14 +165,6 @@ async def test_stopping_uses_the_status_connection(play) -> None:
     assert play.servers[0].connections == 2, "no time is lost on opening a third one"
 
 
-async def test_stopping_works_if_the_status_connection_is_closed(play) -> None:
-    driver = await play.opened(
-        [], [*GREETING, *asked(), ("set enable EMCTOO", play.HANG_UP)], play.STOPPING
-    )
-    await driver.status()
-    await driver.stop()
-
-
 async def test_stopping_works_if_the_status_connection_does_not_answer(play) -> None:
     driver = await play.opened(
         [], [*GREETING, *asked(), ("set enable EMCTOO", play.SILENCE)], play.STOPPING
@@ -191,13 +178,6 @@ async def test_a_lost_status_connection_is_reopened(play) -> None:
     with pytest.raises(DeviceError, match="closed the connection"):
         await driver.status()
     assert await driver.status() == ON
-
-
-async def test_reading_the_status_after_closing_is_an_error(play) -> None:
-    driver = await play.opened([])
-    await driver.close()
-    with pytest.raises(DeviceError, match="is not connected"):
-        await driver.status()
 
 
 async def test_the_status_is_not_read_during_a_stop(play) -> None:

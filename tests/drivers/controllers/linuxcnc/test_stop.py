@@ -104,11 +104,6 @@ async def test_stopping_repeats_a_greeting_that_was_garbled(play):
     await driver.stop()
 
 
-async def test_stopping_works_before_the_driver_is_opened(play):
-    driver = await play.driver(play.STOPPING)
-    await driver.stop()
-
-
 async def test_two_stops_at_once_do_not_disturb_each_other(play):
     speak = play.Pause()
     first = [*play.GREETING, ("set abort", speak, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]]
@@ -157,17 +152,3 @@ async def test_a_move_that_waits_for_its_turn_is_not_begun_after_a_stop(play):
     with pytest.raises(MotionInterrupted, match="was stopped before it moved"):
         await moving
     await stopping
-
-
-async def test_a_pose_that_stands_still_is_no_standstill_of_the_machine(play):
-    """Where the forward kinematics fails, the pose is that of home, whatever the joints do."""
-    play.patience = play.IMPATIENT
-    driver = await play.opened([], play.GREETING)
-    play.servers[0].afterwards = {
-        "set enable EMCTOO": b"SET ENABLE ACK\n\r",
-        "set abort": b"SET ABORT ACK\n\r",
-        "get abs_act_pos": b"ABS_ACT_POS 0 0 550 0 0 0\r\n",
-        "get joint_pos": [f"JOINT_POS {n} 0 0 0 0 0\r\n".encode() for n in range(100_000)],
-    }
-    with pytest.raises(DeviceError, match="still moves"):
-        await driver.stop()

@@ -43,15 +43,6 @@ async def test_an_exchange_cancelled_before_its_turn_sends_nothing(fake):
     await link.close()
 
 
-async def test_concurrent_exchanges_run_one_after_another(fake):
-    fake(FakePort(lambda request: [(0.01, b"to " + request)]))
-    link = await opened()
-    requests = [b"%d\r" % number for number in range(10)]
-    answers = await asyncio.gather(*(link.exchange(each, b"\r", FOREVER_S) for each in requests))
-    assert answers == [b"to " + each for each in requests]
-    await link.close()
-
-
 async def test_closing_does_not_wait_for_an_answer(fake):
     port = fake(FakePort(lambda _: []))
     link = await opened()
@@ -97,12 +88,3 @@ async def test_closing_twice_is_harmless_and_use_after_closing_is_an_error(fake)
         await link.exchange(b"?\r", b"\r", FOREVER_S)
     with pytest.raises(DeviceError, match="is closed"):
         await link.open()
-
-
-async def test_a_port_that_was_never_opened_closes_and_sends_nothing(fake):
-    port = fake(FakePort())
-    link = SharedSerialPort("fake", {})
-    with pytest.raises(DeviceError, match="it is not open"):
-        await link.exchange(b"?\r", b"\r", FOREVER_S)
-    await link.close()
-    assert port.asked == []

@@ -69,12 +69,6 @@ async def test_conflicting_settings_and_channels_of_a_shared_port_are_refused(
     assert first.line.subject == "gauge x"
 
 
-async def test_a_port_used_alone_is_not_shared(links):
-    links.acquire("loop://", "x", {})
-    with pytest.raises(FileError, match="already belongs to gauge x"):
-        links.acquire("loop://", "y", {}, channel=1)
-
-
 async def test_closing_all_closes_ports_still_in_use(links, fake):
     port = fake(FakePort())
     await links.acquire("fake", "x", {}).open()

@@ -26,18 +26,6 @@ def set_alarms(bank: SimulatedEncoderBank, leg: int, bits: int = 1) -> None:
         bank._encoders[leg - 1]._node.set_data(ALARMS, 0, struct.pack("<H", bits))
 
 
-def reboot(bank: SimulatedEncoderBank, leg: int) -> None:
-    """The node restarts and loses its configuration."""
-    with bank.bus.lock:
-        bank._encoders[leg - 1].boot()
-
-
-def stop_heartbeat(bank: SimulatedEncoderBank, leg: int) -> None:
-    """The heartbeat of the node ends; it still responds."""
-    with bank.bus.lock:
-        bank._encoders[leg - 1]._node.nmt.stop_heartbeat()
-
-
 def delay(bank: SimulatedEncoderBank, leg: int, seconds: float) -> None:
     """The responses of the node are delayed; they keep the sample of their SYNC."""
     encoder = bank._encoders[leg - 1]

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import threading
 from functools import partial
-from typing import NoReturn
 
 import pytest
 
-from drivers.encoders.cia406 import Cia406Bank
-from drivers.errors import BusError, InvalidSampleError, RestartedNodeError, SilentNodeError
+from drivers.errors import BusError, SilentNodeError
 from drivers.interfaces import EncoderSample
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC
@@ -25,12 +22,6 @@ from tests.drivers.simulated.encoders.vendors import EVENTS_ONLY, TWO_MAGNETS
 from tests.waiting import until
 
 
-async def read_on(bank: Cia406Bank) -> NoReturn:
-    """Read again and again, until a reading fails."""
-    while True:
-        await bank.read()
-
-
 async def test_rounds_are_complete_and_of_one_instant(make_bank, reach, driver, samples):
     simulated = make_bank(vendors=(EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS) * 2)
     bank = driver(reach(simulated))
@@ -38,14 +29,6 @@ async def test_rounds_are_complete_and_of_one_instant(make_bank, reach, driver, 
     before = samples.taken
     rounds = [(await bank.read()).counts for _ in range(400)]
     assert rounds == [(count,) * 6 for count in range(before + 1, before + 401)]
-
-
-async def test_thousands_of_rounds(make_bank, driver, samples):
-    simulated = make_bank()
-    bank = driver(simulated.bus_settings)
-    await bank.open()
-    for _ in range(2500):
-        assert (await bank.read()).counts == (samples.taken,) * 6
 
 
 @pytest.mark.parametrize("vendor", [EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS])
@@ -98,105 +81,6 @@ async def test_latency_is_in_the_cells_time(make_bank, driver):
     assert clock.now() - begun_s >= 2.0
 
 
-async def test_a_missing_node(make_bank, reach, driver):
-    simulated = make_bank()
-    simulated.faults(4)["unplugged"](on=True)
-    with pytest.raises(BusError, match=r"encoder of leg 4 \(node 4\): no device responds"):
-        await driver(reach(simulated), timeout_s=0.3).open()
-
-
-async def test_a_duplicated_node(make_bank, reach, driver):
-    simulated = make_bank()
-    faults.add_duplicate(simulated, 4)
-    with pytest.raises(DeviceError, match=r"leg 4 \(node 4\).*two devices share"):
-        await driver(reach(simulated)).open()
-
-
-async def test_a_node_duplicated_during_a_run(make_bank, driver):
-    simulated = make_bank()
-    bank = driver(simulated.bus_settings)
-    await bank.open()
-    faults.add_duplicate(simulated, 2)
-    with pytest.raises(RestartedNodeError, match="leg 2"):
-        await read_on(bank)
-    with pytest.raises(DeviceError, match=r"leg 2.*two devices share"):
-        await bank.open()
-
-
-async def test_a_node_that_falls_silent(make_bank, reach, driver):
-    simulated = make_bank()
-    bank = driver(reach(simulated))
-    await bank.open()
-    simulated.faults(6)["silent"](on=True)
-    with short_timeout(bank):
-        with pytest.raises(SilentNodeError, match=r"leg 6"):
-            await bank.read()
-        simulated.faults(6)["silent"](on=False)
-        assert len(set((await bank.read()).counts)) == 1
-
-
-async def test_an_emergency_and_its_end(make_bank, reach, driver):
-    simulated = make_bank()
-    bank = driver(reach(simulated))
-    await bank.open()
-    simulated.faults(3)["alarm"](on=True)
-    with pytest.raises(InvalidSampleError, match=r"leg 3.*no magnet"):
-        await read_on(bank)
-    simulated.faults(3)["alarm"](on=False)
-    while True:
-        with contextlib.suppress(InvalidSampleError):
-            await bank.read()
-            break
-
-
-async def test_an_earlier_error_or_alarm_prevents_opening(make_bank, driver):
-    simulated = make_bank()
-    bank = driver(simulated.bus_settings)
-    faults.set_alarms(simulated, 5)
-    with pytest.raises(InvalidSampleError, match=r"leg 5.*6503h"):
-        await bank.open()
-    faults.set_alarms(simulated, 5, 0)
-    simulated.faults(1)["alarm"](on=True)
-    with pytest.raises(InvalidSampleError, match=r"leg 1.*1001h"):
-        await bank.open()
-    simulated.faults(1)["alarm"](on=False)
-    await bank.open()
-
-
-async def test_a_reboot_during_a_run(make_bank, reach, driver):
-    simulated = make_bank()
-    bank = driver(reach(simulated))
-    await bank.open()
-    faults.reboot(simulated, 1)
-    with pytest.raises(RestartedNodeError, match=r"leg 1.*set is void"):
-        await read_on(bank)
-    await bank.open()
-    await bank.read()
-
-
-async def test_the_loss_of_a_heartbeat(make_bank, reach, driver):
-    simulated = make_bank()
-    bank = driver(reach(simulated), heartbeat_ms=30)
-    await bank.open()
-    faults.stop_heartbeat(simulated, 2)
-    with pytest.raises(SilentNodeError, match=r"leg 2.*heartbeat"):
-        await read_on(bank)
-
-
-async def test_a_node_unplugged_and_plugged_in_again(make_bank, driver):
-    simulated = make_bank()
-    bank = driver(simulated.bus_settings)
-    await bank.open()
-    simulated.faults(2)["unplugged"](on=True)
-    with short_timeout(bank), pytest.raises(SilentNodeError, match="leg 2"):
-        await bank.read()
-    simulated.faults(2)["unplugged"](on=False)
-    with pytest.raises(RestartedNodeError, match="leg 2"):
-        await read_on(bank)
-    await bank.open()
-    await bank.read()
-
-
 @pytest.mark.parametrize("timeouts", [0.5, 1.4, 2.5, 4.5])
 async def test_late_answers_are_never_mixed_with_later_samples(make_bank, driver, timeouts):
     """Leg 3 answers every SYNC that much later, with what it saw at that SYNC."""
@@ -212,15 +96,6 @@ async def test_late_answers_are_never_mixed_with_later_samples(make_bank, driver
         else:
             assert isinstance(outcome, EncoderSample)
             assert len(set(outcome.counts)) == 1
-
-
-async def test_a_bus_whose_nodes_are_all_silent(make_bank, reach, driver):
-    simulated = make_bank()
-    bank = driver(reach(simulated))
-    await bank.open()
-    simulated.bus.stop()
-    with short_timeout(bank), pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter"):
-        await bank.read()
 
 
 async def test_an_error_of_the_simulation_silences_the_bus(make_bank, driver, caplog):
@@ -251,16 +126,6 @@ async def test_an_adapter_that_is_closed(make_bank, driver, samples, line, readi
         waiting = asyncio.ensure_future(bank.read())
     with pytest.raises(BusError, match=r"encoder bus slcan .*CAN adapter"):
         await waiting
-
-
-async def test_closing_and_opening_over_the_same_adapter(make_bank, driver, reach):
-    simulated = make_bank()
-    bus = reach(simulated)
-    for _ in range(2):
-        bank = driver(bus)
-        await bank.open()
-        assert len(set((await bank.read()).counts)) == 1
-        await bank.close()
 
 
 async def test_no_thread_is_left(settings, samples, reach):

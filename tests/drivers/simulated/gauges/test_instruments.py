@@ -127,10 +127,6 @@ def test_sylvac_reports_its_settings(sylvac, indicator):
     assert sylvac.answer(b"?") == b""
 
 
-def test_sylvac_sends_its_identification_at_power_up(sylvac):
-    assert sylvac.introduction == b"SY276.1\r"
-
-
 # MUX-10
 
 

@@ -115,21 +115,6 @@ def test_an_unknown_first_word_gets_no_answer(client):
     me.expect("get mode", b"MODE MANUAL\r\n")
 
 
-def test_success_is_silent_until_verbose_is_on(client):
-    me = client()
-    me.expect("hello EMC test 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
-    me.expect("set echo off", b"set echo off\r\n")
-    me.send("set enable EMCTOO")
-    me.expect_silence()
-    me.expect("get enable", b"ENABLE ON\r\n")
-
-
-def test_quitting_ends_the_connection(client):
-    me = client()
-    me.send("quit")
-    me.expect_end()
-
-
 def test_a_line_longer_than_the_buffer_is_fatal(client):
     me = client()
     me.send("x" * 255)
@@ -196,18 +181,6 @@ def test_an_abort_drops_waiting_moves(client, machine):
     assert machine.pose().x == 300.0
 
 
-def test_a_move_continues_when_its_client_disconnects(client, machine):
-    first, second = client(), client()
-    first.make_ready()
-    machine.duration_s = 0.1
-    first.send("set mdi G0 X100")
-    machine.wait_for("move")
-    first.close()
-    second.greet()
-    machine.wait_until(lambda machine: machine.pose().x == 100.0)
-    second.expect("get joint_pos", b"JOINT_POS 100.000000 0.000000 0.000000 0.000000 0.000000 0.000000\r\n")
-
-
 def test_switching_on_reads_the_config_again(client, machine):
     me = client()
     me.make_ready()
@@ -244,15 +217,6 @@ def test_aborted_homing_leaves_the_machine_unhomed(client, machine):
     me.expect("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n")
 
 
-def test_lines_sent_to_a_silent_server_are_lost(client, simulated):
-    me = client()
-    simulated.set_silent(on=True)
-    me.send("get estop")
-    me.expect_silence()
-    simulated.set_silent(on=False)
-    me.expect("get estop", b"ESTOP ON\r\n")
-
-
 @pytest.mark.parametrize("fault", ["estop", "following error"])
 def test_faults_during_a_move_stop_it(client, simulated, machine, fault):
     me = client()
@@ -269,17 +233,6 @@ def test_faults_during_a_move_stop_it(client, simulated, machine, fault):
     me.expect("get estop", b"ESTOP ON\r\n" if fault == "estop" else b"ESTOP OFF\r\n")
     me.expect("get error", b"ERROR OK\r\n" if fault == "estop" else b"ERROR joint 3 following error\r\n")
     assert machine.pose().x < 99.0
-
-
-def test_an_unplugged_controller_cuts_connections_and_its_machine_continues(client, simulated, machine):
-    me = client()
-    me.make_ready()
-    machine.duration_s = 30.0
-    me.send("set mdi G0 X100")
-    machine.wait_for("move")
-    simulated.set_unplugged(on=True)
-    me.expect_end()
-    assert machine.events[-1] == "move"
 
 
 def test_closing_ends_a_move_and_may_be_repeated(client, simulated, machine):

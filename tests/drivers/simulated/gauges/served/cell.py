@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import itertools
 from collections.abc import Callable
 
 from drivers.gauges.cdi import CdiGauge
@@ -133,17 +132,6 @@ def served(protocol, plunger=lambda: 1.0, transport="pty", factor=FAST, name="ga
 def send_unsolicited(line, data):
     """Send ``data`` now without a request, as a data button or a foot switch does."""
     line._run_on_thread(lambda: line._line.send(data))
-
-
-def change_answers(line, change, count=None):
-    """Let ``change`` alter every answer of a line, or the next ``count``."""
-    changes = itertools.repeat(change) if count is None else iter([change] * count)
-    answer = line.instrument.answer
-
-    def changed(command):
-        return next(changes, bytes)(answer(command))
-
-    line.instrument.answer = changed
 
 
 def questions_to(line):

@@ -1,6 +1,7 @@
 """Drivers and simulated gauges over real pseudo-terminals and sockets, at the pace of a real line."""
 
 import asyncio
+import logging
 from pathlib import Path
 
 import pytest
@@ -37,13 +38,6 @@ async def test_gauges_open_read_and_pass_the_check(protocols, transport):
             await gauge.check()
 
 
-async def test_gauges_of_one_multiplexer_share_a_line_and_others_do_not():
-    async with cell(["mux10", "sylvac", "mux10"]) as made:
-        assert made.rack.line("x") is made.rack.line("z")
-        assert made.rack.line("x") is not made.rack.line("y")
-        assert [each.port for each in made.rack.gauges] == [made.rack.line(each).url for each in "xyz"]
-
-
 def test_multiplexers_on_different_ports_are_different_lines():
     settings = [
         GaugeSettings(name=name, axis=name, protocol="mux10", channel=1, port=f"/dev/{name}")
@@ -74,15 +68,6 @@ async def test_a_pseudo_terminal_opens_with_parity_repeatedly(asked):
             if asked:
                 assert await ask(link) == b"+1.000\r"
             await link.close()
-
-
-def test_pyserial_opens_a_served_line_with_parity_repeatedly():
-    with served("sylvac") as line:
-        for _ in range(5):
-            port = serial.Serial(line.url, 4800, bytesize=7, parity="E", stopbits=2, timeout=LONG_S)
-            port.write(b"?\r")
-            assert port.read_until(b"\r") == b"+1.000\r"
-            port.close()
 
 
 @pytest.mark.parametrize("transport", TRANSPORTS)
@@ -174,3 +159,16 @@ def test_answers_without_a_client_are_lost():
         assert received.endswith(b"+1.000\r")
         assert len(received) < 1000 * 10 * 7
         port.close()
+
+
+async def test_an_error_of_the_simulation_breaks_the_line(caplog):
+    def broken():
+        raise ArithmeticError("the truth has no such pose")
+
+    with served("sylvac", broken) as line, caplog.at_level(logging.ERROR):
+        link = SharedSerialPort(line.url, {})
+        await link.open()
+        with pytest.raises(DeviceError, match="was lost"):
+            await ask(link)
+        await link.close()
+    assert "have failed" in caplog.text

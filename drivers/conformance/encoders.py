@@ -16,7 +16,7 @@ from hexacell.cell.devices import EncoderSettings
 from hexacell.cell.simulation import FaultKind
 
 POSITIONS = ((0.0,) * 6, (1.5, -2.25, 4.0, -0.5, 0.25, 3.0), (-1.0, 1.0, -1.0, 1.0, -1.0, 1.0))
-STEPS, STEP = 40, 0.05
+STEPS, STEP, PAUSE_S = 40, 0.05, 2e-4
 
 
 class EncoderTwin(Protocol):
@@ -128,7 +128,7 @@ def _moving(twin: EncoderTwin) -> Iterator[None]:
 
     def move() -> None:
         step = 0
-        while not ended.is_set():
+        while not ended.wait(PAUSE_S):
             step = (step + 1) % STEPS
             twin.stand_at((STEP * min(step, STEPS - step),) * 6)
 

@@ -17,6 +17,7 @@ from hexacell.errors import DeviceError
 
 WORST_LATENCY_S = 0.2
 VALUES_MM = (0.0, 1.5, -2.25, 4.0)
+DAMAGED_READS = 10
 
 
 class GaugeTwin(Protocol):
@@ -97,7 +98,7 @@ class GaugeConformance(Suite[Gauge, GaugeTwin]):
         await gauge.open()
         twin.inject("damaged", on=True)
         agreement_mm = twin.settings.agreement_mm or 0.05
-        for _ in range(20):
+        for _ in range(DAMAGED_READS):
             try:
                 found = await gauge.read()
             except DeviceError:

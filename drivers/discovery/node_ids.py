@@ -13,6 +13,7 @@ from typing import Any
 
 from canopen.lss import CS_INQUIRE_VENDOR_ID, LssError, LssMaster
 
+from drivers.discovery import USUAL, SearchTimeouts
 from drivers.discovery.encoders import responding_nodes
 from drivers.encoders.can_bus import EncoderBus
 from drivers.errors import BusError
@@ -26,19 +27,20 @@ _NMT, _RESET_COMMUNICATION = 0x000, bytes((0x82, 0))
 ALONE = "Connect the one device whose node id is to be set, and no other"
 
 
-def set_node_id(bus: Mapping[str, Any], node: int) -> int | None:
+def set_node_id(bus: Mapping[str, Any], node: int, timeouts: SearchTimeouts = USUAL) -> int | None:
     """Have the only device on a bus take a node id, and keep it; the id that it had, if it had one.
 
     Args:
         bus: settings for ``can.Bus``.
         node: from 1 to 127.
+        timeouts: longest waits.
 
     Raises:
         BusError: the bus cannot be opened, or has failed; or nothing has the id afterwards.
         DeviceError: there is no device, or more than one; it does not know LSS, or refuses the id.
     """
     with closing(EncoderBus(bus, threading.Event())) as opened:
-        before = responding_nodes(opened)
+        before = responding_nodes(opened, timeouts)
         if len(before) > 1:
             nodes = ", ".join(map(str, before))
             raise DeviceError(f"has several nodes: {nodes}", subject=opened.name, action=ALONE)
@@ -58,7 +60,7 @@ def set_node_id(bus: Mapping[str, Any], node: int) -> int | None:
             master.send_switch_state_global(master.WAITING_STATE)  # type: ignore[no-untyped-call]
         opened.network.send_message(_NMT, _RESET_COMMUNICATION)
         opened.network.scanner.reset()  # type: ignore[no-untyped-call]
-        if node not in responding_nodes(opened):
+        if node not in responding_nodes(opened, timeouts):
             raise BusError(
                 f"has no node {node} after it was stored",
                 subject=opened.name,

@@ -36,8 +36,8 @@ class _Scale:
 class ModbusScales(Instrument):
     """The devices of six encoders: answers requests for any registers from the first to the last position.
 
-    ``counts`` gives those of legs 1 to 6, ``scales`` what is wrong with them. ``has_gaps``: registers between
-    positions are there too.
+    ``counts`` gives those of legs 1 to 6, ``scales`` what is wrong with them. ``has_gaps``: registers
+    between positions are there too.
     """
 
     baudrate: ClassVar[int] = 19200

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 from drivers.conformance import ControllerConformance, ControllerTwin
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
@@ -15,6 +16,7 @@ from hexacell.kinematics.pose import Pose
 from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
 
 LEAST_S = 0.01
+HASTY = replace(QUICK, answer=0.5)
 
 
 class MachineInTime(FakeMachine):
@@ -51,7 +53,7 @@ class LinuxcncTwin:
 
 class TestLinuxcncrsh(ControllerConformance):
     def driver(self, settings: ControllerSettings) -> Controller:
-        return LinuxcncrshController(settings, timeouts=QUICK)
+        return LinuxcncrshController(settings, timeouts=HASTY)
 
     @contextmanager
     def twin(self) -> Iterator[ControllerTwin]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -24,6 +25,7 @@ from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
 
 TIMEOUT_S = 1.0
+CAN_TIMEOUT_S = 0.3
 
 
 class Cia406(EncoderConformance):
@@ -37,13 +39,13 @@ class Cia406(EncoderConformance):
 
 
 class TestLinear(Cia406):
-    settings = LinearEncoderSettings(timeout_s=TIMEOUT_S, heartbeat_ms=5000)
+    settings = LinearEncoderSettings(timeout_s=CAN_TIMEOUT_S, heartbeat_ms=5000)
 
 
 class TestReversedAndOffset(Cia406):
     settings = LinearEncoderSettings.model_validate(
         {
-            "timeout_s": TIMEOUT_S,
+            "timeout_s": CAN_TIMEOUT_S,
             "heartbeat_ms": 5000,
             "direction": (1, -1, 1, -1, 1, -1),
             "offset_mm": (10.0, 20.0, 30.0, 40.0, 50.0, 60.0),
@@ -52,7 +54,7 @@ class TestReversedAndOffset(Cia406):
 
 
 class TestRotary(Cia406):
-    settings = RotaryEncoderSettings(timeout_s=TIMEOUT_S, heartbeat_ms=5000)
+    settings = RotaryEncoderSettings(timeout_s=CAN_TIMEOUT_S, heartbeat_ms=5000)
 
 
 class MachineThatStands(FakeMachine):
@@ -81,7 +83,7 @@ class WithItsController:
 
     def __init__(self, twin: ControllerTwin) -> None:
         settings = ControllerSettings(config="machine.ini", port=twin.port)
-        self._controller = LinuxcncrshController(settings, timeouts=QUICK)
+        self._controller = LinuxcncrshController(settings, timeouts=replace(QUICK, answer=0.5))
         self._scales = ControllerScales(twin.settings, self._controller)
 
     async def open(self) -> tuple[DeviceIdentity, ...]:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.discovery import SearchTimeouts
 from drivers.discovery.encoders import (
     MAX_IDENTIFIERS,
     FoundFrame,
@@ -19,6 +20,7 @@ from drivers.discovery.encoders import (
 )
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
 
+QUICK = SearchTimeouts(adapter=1.0, node=0.1, listen=0.3)
 STRANGER, EXTENDED = 0x321, 0x18FF0001
 NODE_IDS = st.sets(st.integers(1, 127), max_size=6)
 
@@ -82,7 +84,7 @@ def sending(channel: str, *messages: can.Message) -> Iterator[None]:
 def test_a_stranger_among_nodes_is_told_with_length_and_rate(raw) -> None:
     strange = (frame(STRANGER, b"\1\2\3"), frame(EXTENDED, bytes(8), is_extended_id=True))
     with sending(raw.channel, *strange, frame(0x701, b"\5"), frame(0x80, b"")):
-        found = search_bus({"interface": "virtual", "channel": raw.channel})
+        found = search_bus({"interface": "virtual", "channel": raw.channel}, QUICK)
     assert [node.node for node in found.nodes] == [1, 2, 3, 4, 5, 6]
     told = [(one.identifier, one.is_extended, one.length) for one in found.frames]
     assert told == [(STRANGER, False, 3), (EXTENDED, True, 8)]
@@ -92,7 +94,7 @@ def test_a_stranger_among_nodes_is_told_with_length_and_rate(raw) -> None:
 def test_a_bus_of_another_bit_rate_is_told() -> None:
     channel = "another-bit-rate"
     with sending(channel, can.Message(is_error_frame=True)):
-        found = search_bus({"interface": "virtual", "channel": channel})
+        found = search_bus({"interface": "virtual", "channel": channel}, QUICK)
     assert "error frames within 1 s" in found.problem
     assert "try another bit rate" in found.problem
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import pytest
 
-from drivers.discovery.node_ids import set_node_id
+from drivers.discovery import SearchTimeouts, node_ids
 from drivers.errors import BusError
 from hexacell.errors import DeviceError
 from tests.drivers.encoders.conftest import LSS_REQUEST
+
+set_node_id = partial(node_ids.set_node_id, timeouts=SearchTimeouts(adapter=0.3, node=0.1))
 
 
 @pytest.fixture

@@ -38,7 +38,7 @@ class OfProtocol(GaugeConformance):
         return gauge
 
     def twin(self) -> AbstractContextManager[GaugeTwin]:
-        stated: dict[str, Any] = {"name": "x", "axis": "x", "protocol": self.protocol, "timeout_s": 1.0}
+        stated: dict[str, Any] = {"name": "x", "axis": "x", "protocol": self.protocol, "timeout_s": 0.4}
         return served_twin(GaugeSettings(**stated, **MORE.get(self.protocol, {})))
 
 

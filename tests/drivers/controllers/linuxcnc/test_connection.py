@@ -9,11 +9,12 @@ import pytest
 from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.errors import MoveRefused, ResponseTimeout
 from hexacell.errors import DeviceError
-from tests.drivers.controllers.linuxcnc.motion_dialogue import (
+from tests.drivers.controllers.linuxcnc.dialogue import (
     ACK,
     AGAIN_IN_CONTROL,
     ARRIVED,
     HALF_WAY,
+    JOINTS,
     MDI,
     MOVE_S,
     NO_ERROR,
@@ -115,7 +116,7 @@ async def test_a_garbled_query_is_repeated_and_a_garbled_command_is_not(play):
     driver = await play.opened(
         [
             ("get joint_pos", b"GET EMCTOO NAK\r\n\r\nGET JOINT_POS NAK\r\n\r\n"),
-            ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n"),
+            JOINTS,
             (MDI, b"SET NAK\r\n"),
             ("get enable", b"ENABLE ON\r\n"),
             ("get error", b"ERROR No characters found in reading real value\r\n"),

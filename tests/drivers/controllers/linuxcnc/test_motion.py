@@ -16,16 +16,29 @@ from drivers.errors import (
 )
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
-from tests.drivers.controllers.linuxcnc.motion_dialogue import (
+from tests.drivers.controllers.linuxcnc.dialogue import (
+    ABORT,
     ACK,
     AGAIN_IN_CONTROL,
     ARRIVED,
     HALF_WAY,
+    HOMED,
+    IS_ON,
+    JOINTS,
     MDI,
+    MDI_MODE,
     MOVE_S,
+    MOVED,
+    NAK,
     NO_ERROR,
+    NO_ESTOP,
+    OFFSETS,
+    OVERRIDE,
+    REFUSED,
     RESTORED,
     TARGET,
+    UNITS,
+    said,
 )
 
 
@@ -70,39 +83,27 @@ async def test_an_acknowledgement_is_not_an_arrival(play, elsewhere):
 
 
 @pytest.mark.parametrize(
-    ("estop", "machine", "why"),
+    ("state", "why"),
     [
-        (b"ESTOP ON\r\n", b"MACHINE OFF\r\n", "it is in emergency stop"),
-        (b"ESTOP OFF\r\n", b"MACHINE OFF\r\n", "it is switched off"),
-        (b"ESTOP OFF\r\n", b"MACHINE ON\r\n", "it is on, and gives no reason"),
+        ("get estop: ON", "it is in emergency stop"),
+        ("get estop: OFF | get machine: OFF", "it is switched off"),
+        ("get estop: OFF | get machine: ON", "it is on, and gives no reason"),
     ],
 )
-async def test_a_move_that_ends_elsewhere_without_an_error_message_is_reported(play, estop, machine, why):
+async def test_a_move_that_ends_elsewhere_without_an_error_message_is_reported(play, state, why):
     play.patience = play.IMPATIENT
     driver = await play.opened([(MDI, ACK)])
-    play.servers[0].afterwards = {
-        "get abs_act_pos": HALF_WAY,
-        "get error": b"ERROR OK\r\n",
-        "get estop": estop,
-        "get machine": machine,
-    }
+    play.servers[0].afterwards = {"get abs_act_pos": HALF_WAY, **dict([NO_ERROR, *said(state)])}
     with pytest.raises(MotionInterrupted, match=f"stopped at X5.000 Y10.000 Z555.000 .*: {why}"):
         await driver.move(TARGET, MOVE_S)
 
 
 async def test_a_refused_move_reports_and_clears_all_error_messages(play):
-    driver = await play.opened(
-        [
-            (MDI, b"SET MDI NAK\n\r"),
-            ("get enable", b"ENABLE ON\r\n"),
-            ("get error", b"ERROR Linear move on line 0 fails kinematicsInverse\r\n"),
-            ("get error", b"ERROR invalid params in linear command\r\n"),
-            NO_ERROR,
-            (MDI, ACK),
-            ("get abs_act_pos", ARRIVED),
-            RESTORED,
-        ]
+    errors = said(
+        "get error: Linear move on line 0 fails kinematicsInverse | "
+        "get error: invalid params in linear command | get error: OK"
     )
+    driver = await play.opened([*REFUSED, *errors, *MOVED, RESTORED])
     with pytest.raises(MoveRefused) as caught:
         await driver.move(TARGET, MOVE_S)
     assert caught.value.problem == (
@@ -113,24 +114,14 @@ async def test_a_refused_move_reports_and_clears_all_error_messages(play):
 
 
 async def test_reading_error_messages_ends_if_the_same_message_repeats(play):
-    driver = await play.opened([(MDI, b"SET MDI NAK\n\r")])
-    play.servers[0].afterwards = {
-        "get enable": b"ENABLE ON\r\n",
-        "get error": b"ERROR emc_error: bad status from EMC\r\n",
-    }
+    driver = await play.opened(REFUSED)
+    play.servers[0].afterwards = dict(said("get error: emc_error: bad status from EMC"))
     with pytest.raises(MoveRefused, match=r": emc_error: bad status from EMC$"):
         await driver.move(TARGET, MOVE_S)
 
 
 async def test_a_move_does_not_retake_control_from_another_client(play):
-    driver = await play.opened(
-        [
-            (MDI, b"SET MDI NAK\n\r"),
-            ("get enable", b"ENABLE OFF\r\n"),
-            (MDI, b"SET MDI NAK\n\r"),
-            ("get enable", b"ENABLE OFF\r\n"),
-        ]
-    )
+    driver = await play.opened([(MDI, NAK), *said("get enable: OFF")] * 2)
     for _ in range(2):
         with pytest.raises(MoveRefused, match=r"another client has taken control of it\. See that nobody"):
             await driver.move(TARGET, MOVE_S)
@@ -140,12 +131,8 @@ async def test_a_move_that_exceeds_its_timeout_is_stopped_and_its_late_answer_is
     play.patience = replace(play.patience, beyond_move=0.01)
     stopped = play.Pause()
     driver = await play.opened(
-        [
-            (MDI.replace("F20.", "F6000."), stopped, ACK),
-            AGAIN_IN_CONTROL,
-            ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n"),
-        ],
-        [*play.GREETING, ("set abort", b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
+        [(MDI.replace("F20.", "F6000."), stopped, ACK), AGAIN_IN_CONTROL, JOINTS],
+        [*play.GREETING, ABORT, *play.STOPPING[-3:]],
     )
     with pytest.raises(MotionInterrupted, match=r"still moving after 0\.03 s and was stopped"):
         await driver.move(TARGET, 0.01)
@@ -168,13 +155,7 @@ async def test_a_controller_lost_during_a_move_makes_the_error_ask_for_the_emerg
 
 
 async def test_the_position_is_pose_and_joints_of_a_homed_machine(play):
-    driver = await play.opened(
-        [
-            ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n"),
-            ("get abs_act_pos", HALF_WAY),
-            ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n"),
-        ]
-    )
+    driver = await play.opened([*HOMED, ("get abs_act_pos", HALF_WAY), JOINTS])
     found = await driver.position()
     assert found is not None
     assert found.pose == Pose(5.0, 10.0, 555.0, 2.5, -2.0, 1.5)
@@ -197,14 +178,8 @@ REFUSALS = [
 
 @pytest.mark.parametrize(("message", "axis", "is_highest"), REFUSALS)
 async def test_a_pose_beyond_a_limit_is_refused_as_a_pose(play, message, axis, is_highest):
-    refusal = [
-        (MDI, b"SET MDI NAK\n\r"),
-        ("get enable", b"ENABLE ON\r\n"),
-        ("get error", f"ERROR {message}\r\n".encode()),
-        ("get error", b"ERROR invalid params in linear command\r\n"),
-        NO_ERROR,
-    ]
-    driver = await play.opened([*refusal, (MDI, ACK), ("get abs_act_pos", ARRIVED), RESTORED])
+    errors = said(f"get error: {message} | get error: invalid params in linear command | get error: OK")
+    driver = await play.opened([*REFUSED, *errors, *MOVED, RESTORED])
     with pytest.raises(PoseRefused, match=message) as refused:
         await driver.move(TARGET, MOVE_S)
     assert (refused.value.axis, refused.value.is_highest) == (axis, is_highest)
@@ -224,64 +199,39 @@ async def test_a_refused_pose_whose_command_is_acknowledged_is_refused_all_the_s
 
 
 async def test_a_machine_that_is_not_homed_refuses_no_pose(play):
-    refusal = [
-        (MDI, b"SET MDI NAK\n\r"),
-        ("get enable", b"ENABLE ON\r\n"),
-        ("get error", b"ERROR Can't issue MDI command when not homed\r\n"),
-        NO_ERROR,
-    ]
-    driver = await play.opened(refusal)
+    why = said("get error: Can't issue MDI command when not homed | get error: OK")
+    driver = await play.opened([*REFUSED, *why])
     with pytest.raises(MoveRefused, match="when not homed") as refused:
         await driver.move(TARGET, MOVE_S)
     assert not isinstance(refused.value, PoseRefused)
 
 
-MODES = ("get program_codes", b"PROGRAM_CODES G1 G17 G40 G21 G90 G94 G54 G49 F250 S0\r\n")
-READY = [
-    ("set enable EMCTOO", ACK.replace(b"MDI", b"ENABLE")),
-    NO_ERROR,
-    ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
-    ("get estop", b"ESTOP OFF\r\n"),
-    ("get machine", b"MACHINE ON\r\n"),
-    ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n"),
-    ("set mode mdi", b"SET MODE ACK\n\r"),
-    ("get mode", b"MODE MDI\r\n"),
-]
-CHECKED = [
-    ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n"),
-    MODES,
-    ("get pos_offset", b"POS_OFFSET 0.0 0.0 0.0 0.0 0.0 0.0\r\n"),
-    ("get feed_override", b"FEED_OVERRIDE 100\r\n"),
-]
-RESTORED_HERE = ("set mdi G94 G1 F250", ACK)
+[MODES] = said("get program_codes: G1 G17 G40 G21 G90 G94 G54 G49 F250 S0")
+CONTROL = [AGAIN_IN_CONTROL, NO_ERROR, *said("set set_wait done")]
+READY = [*CONTROL, *NO_ESTOP, *IS_ON, *HOMED, *MDI_MODE]
+CHECKED = [UNITS, MODES, OFFSETS, OVERRIDE]
+[RESTORED_HERE] = said("set mdi G94 G1 F250")
+REFUSED_TO_RESTORE = said("set mdi G94 G1 F250: NAK | get enable: ON")
+STATE = said("get error: OK | get estop: OFF | get machine: ON")
 
 
 async def test_the_modes_of_before_are_restored_after_a_move(play):
-    driver = await play.opened([*READY, *CHECKED, (MDI, ACK), ("get abs_act_pos", ARRIVED), RESTORED_HERE])
+    driver = await play.opened([*READY, *CHECKED, *MOVED, RESTORED_HERE])
     await driver.prepare(frozenset())
     await driver.move(TARGET, MOVE_S)
     await driver.close()
 
 
-REFUSED_TO_RESTORE = [
-    (RESTORED_HERE[0], b"SET MDI NAK\n\r"),
-    ("get enable", b"ENABLE ON\r\n"),
-]
-
-
 async def test_modes_that_are_not_restored_for_no_reason_are_asked_for_again(play):
-    state = [NO_ERROR, ("get estop", b"ESTOP OFF\r\n"), ("get machine", b"MACHINE ON\r\n")]
-    moved = [*READY, *CHECKED, (MDI, ACK), ("get abs_act_pos", ARRIVED)]
-    refused = [*REFUSED_TO_RESTORE, *state]
-    driver = await play.opened([*moved, *refused, *refused, RESTORED_HERE])
+    refused = [*REFUSED_TO_RESTORE, *STATE] * 2
+    driver = await play.opened([*READY, *CHECKED, *MOVED, *refused, RESTORED_HERE])
     await driver.prepare(frozenset())
     await driver.move(TARGET, MOVE_S)
 
 
 async def test_modes_that_are_not_restored_for_a_reason_are_not_asked_for_again(play):
-    reason = [("get error", b"ERROR must be in MDI mode\r\n"), NO_ERROR]
-    moved = [*READY, *CHECKED, (MDI, ACK), ("get abs_act_pos", ARRIVED)]
-    driver = await play.opened([*moved, *REFUSED_TO_RESTORE, *reason, RESTORED_HERE])
+    reason = said("get error: must be in MDI mode | get error: OK")
+    driver = await play.opened([*READY, *CHECKED, *MOVED, *REFUSED_TO_RESTORE, *reason, RESTORED_HERE])
     await driver.prepare(frozenset())
     with pytest.raises(CommandRefused, match="must be in MDI mode"):
         await driver.move(TARGET, MOVE_S)
@@ -290,26 +240,19 @@ async def test_modes_that_are_not_restored_for_a_reason_are_not_asked_for_again(
 
 async def test_modes_that_are_never_restored_are_reported(play):
     play.patience = play.IMPATIENT
-    driver = await play.opened([*READY, *CHECKED, (MDI, ACK), ("get abs_act_pos", ARRIVED)])
-    play.servers[0].afterwards = {
-        **dict([*REFUSED_TO_RESTORE, NO_ERROR]),
-        "get estop": b"ESTOP OFF\r\n",
-        "get machine": b"MACHINE ON\r\n",
-    }
+    driver = await play.opened([*READY, *CHECKED, *MOVED])
+    play.servers[0].afterwards = dict([*REFUSED_TO_RESTORE, *STATE])
     await driver.prepare(frozenset())
     with pytest.raises(CommandRefused, match="it is on, and gives no reason"):
         await driver.move(TARGET, MOVE_S)
 
 
 async def test_an_inch_machine_is_commanded_in_mm_and_what_it_tells_is_converted(play):
-    inches = ("get user_linear_units", b"USER_LINEAR_UNITS INCH\r\n")
-    modes = ("get program_codes", b"PROGRAM_CODES G0 G17 G40 G20 G90 G94 G54 G49 F0 S0\r\n")
-    there = b"ABS_ACT_POS 0.393701 0.787402 22.047244 5.000000 -4.000000 3.000000\r\n"
-    joints = b"JOINT_POS 1.0 2.0 -3.0 4.0 5.0 6.0\r\n"
-    homed = ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
-    told = [homed, ("get abs_act_pos", there), ("get joint_pos", joints)]
-    moved = [(MDI, ACK), ("get abs_act_pos", there), ("set mdi G20 G94 G0", ACK)]
-    driver = await play.opened([*READY, inches, modes, *CHECKED[2:], *moved, *told], unit_mm=25.4)
+    inches = said("get user_linear_units: INCH | get program_codes: G0 G17 G40 G20 G90 G94 G54 G49 F0 S0")
+    there = said("get abs_act_pos: 0.393701 0.787402 22.047244 5.000000 -4.000000 3.000000")
+    told = [*HOMED, *there, *said("get joint_pos: 1.0 2.0 -3.0 4.0 5.0 6.0")]
+    moved = [(MDI, ACK), *there, *said("set mdi G20 G94 G0")]
+    driver = await play.opened([*READY, *inches, *CHECKED[2:], *moved, *told], unit_mm=25.4)
     await driver.prepare(frozenset())
     await driver.move(TARGET, MOVE_S)
     reported = await driver.position()
@@ -320,9 +263,7 @@ async def test_an_inch_machine_is_commanded_in_mm_and_what_it_tells_is_converted
 
 async def test_the_modes_that_a_stopped_move_leaves_are_restored_by_the_next_preparation(play):
     play.patience = play.IMPATIENT
-    refused = [(MDI, b"SET MDI NAK\n\r"), ("get enable", b"ENABLE ON\r\n"), NO_ERROR]
-    state = [("get estop", b"ESTOP OFF\r\n"), ("get machine", b"MACHINE ON\r\n")]
-    driver = await play.opened([*READY, *CHECKED, *refused, *state, *READY, RESTORED_HERE, *CHECKED])
+    driver = await play.opened([*READY, *CHECKED, *REFUSED, *STATE, *READY, RESTORED_HERE, *CHECKED])
     await driver.prepare(frozenset())
     with pytest.raises(MoveRefused):
         await driver.move(TARGET, MOVE_S)
@@ -330,9 +271,7 @@ async def test_the_modes_that_a_stopped_move_leaves_are_restored_by_the_next_pre
 
 
 async def test_the_modes_that_a_stopped_move_leaves_are_restored_on_closing(play):
-    refused = [(MDI, b"SET MDI NAK\n\r"), ("get enable", b"ENABLE ON\r\n"), NO_ERROR]
-    state = [("get estop", b"ESTOP OFF\r\n"), ("get machine", b"MACHINE ON\r\n")]
-    driver = await play.opened([*READY, *CHECKED, *refused, *state, RESTORED_HERE])
+    driver = await play.opened([*READY, *CHECKED, *REFUSED, *STATE, RESTORED_HERE])
     await driver.prepare(frozenset())
     with pytest.raises(MoveRefused):
         await driver.move(TARGET, MOVE_S)

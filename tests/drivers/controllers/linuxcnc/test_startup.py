@@ -11,106 +11,62 @@ from drivers.errors import CommandRefused, MotionInterrupted, MoveRefused, Start
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
+from tests.drivers.controllers.linuxcnc.dialogue import (
+    CODES,
+    HOMED,
+    HOMING,
+    IN_ESTOP,
+    IN_JOINT_MODE,
+    IS_ON,
+    MDI_MODE,
+    NO_ERROR,
+    NO_ESTOP,
+    NOT_HOMED,
+    OFF,
+    ON_NOT_HOMED,
+    OWN_COORDINATES,
+    READY,
+    SWITCHING_ON,
+    TAKING_CONTROL,
+    UNITS,
+    said,
+)
 
 ALL = frozenset(StartupAction)
-NO_ERROR = ("get error", b"ERROR OK\r\n")
-TAKING_CONTROL = [
-    ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
-    ("get error", b"ERROR left over from somebody else\r\n"),
-    NO_ERROR,
-    ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
-]
-IN_ESTOP = [("get estop", b"ESTOP ON\r\n")]
-NO_ESTOP = [("get estop", b"ESTOP OFF\r\n")]
-OFF = [*NO_ESTOP, ("get machine", b"MACHINE OFF\r\n")]
-ON = [("get machine", b"MACHINE ON\r\n")]
-HOMED = [("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")]
-NOT_HOMED = [("get joint_homed", b"JOINT_HOMED YES YES NO YES YES YES\r\n")]
-RESETTING = [*IN_ESTOP, *NOT_HOMED, ("set estop off", b"SET ESTOP ACK\n\r"), *NO_ESTOP]
-SWITCHING_ON = [*OFF, ("set machine on", b"SET MACHINE ACK\n\r"), *ON]
-ON_NOT_HOMED = [*NO_ESTOP, *ON, *NOT_HOMED]
-READY = [*NO_ESTOP, *ON, *HOMED]
-IN_JOINT_MODE = [
-    ("set mode manual", b"SET MODE ACK\n\r"),
-    ("get teleop_enable", b"TELEOP_ENABLE NO\r\n"),
-    NO_ERROR,
-]
-HOMING = [("set home -1", b"SET HOME ACK\n\r"), *NOT_HOMED, *HOMED]
-MDI = [("set mode mdi", b"SET MODE ACK\n\r"), ("get mode", b"MODE MDI\r\n")]
-UNITS = ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n")
-CODES = ("get program_codes", b"PROGRAM_CODES G80 G17 G40 G21 G90 G94 G54 G49 G92.2 F0 S0\r\n")
-OFFSETS = ("get pos_offset", b"POS_OFFSET 0.000000 0.000000 -0.000000 0.000000 0.000000 0.000000\r\n")
-OVERRIDE = ("get feed_override", b"FEED_OVERRIDE 100\r\n")
-OWN_COORDINATES = [UNITS, CODES, OFFSETS, OVERRIDE]
+RESETTING = [*IN_ESTOP, *NOT_HOMED, *said("set estop off"), *NO_ESTOP]
 UNTIL_HOMED = [*TAKING_CONTROL, *SWITCHING_ON]
-UNTIL_MDI = [*UNTIL_HOMED, *READY, *MDI]
+UNTIL_MDI = [*UNTIL_HOMED, *READY, *MDI_MODE]
 
 
 async def test_prepare_releases_the_emergency_stop_switches_on_and_homes(play):
-    driver = await play.opened(
-        [
-            *TAKING_CONTROL,
-            *RESETTING,
-            *SWITCHING_ON,
-            *ON_NOT_HOMED,
-            *OWN_COORDINATES,
-            *IN_JOINT_MODE,
-            *HOMING,
-            *READY,
-            *MDI,
-            *OWN_COORDINATES,
-        ]
-    )
+    until_homed = [*TAKING_CONTROL, *RESETTING, *SWITCHING_ON, *ON_NOT_HOMED, *OWN_COORDINATES]
+    homed = [*IN_JOINT_MODE, *HOMING, *READY, *MDI_MODE, *OWN_COORDINATES]
+    driver = await play.opened([*until_homed, *homed])
     await driver.prepare(ALL)
 
 
 async def test_homing_leaves_teleoperation_first(play):
-    driver = await play.opened(
-        [
-            *UNTIL_HOMED,
-            *ON_NOT_HOMED,
-            *OWN_COORDINATES,
-            ("set mode manual", b"SET MODE ACK\n\r"),
-            ("get teleop_enable", b"TELEOP_ENABLE YES\r\n"),
-            ("set teleop_enable off", b"SET TELEOP_ENABLE ACK\n\r"),
-            NO_ERROR,
-            *HOMING,
-            *READY,
-            *MDI,
-            *OWN_COORDINATES,
-        ]
-    )
+    leaving = said("set mode manual | get teleop_enable: YES | set teleop_enable off | get error: OK")
+    homed = [*leaving, *HOMING, *READY, *MDI_MODE, *OWN_COORDINATES]
+    driver = await play.opened([*UNTIL_HOMED, *ON_NOT_HOMED, *OWN_COORDINATES, *homed])
     await driver.prepare(ALL)
 
 
 async def test_prepare_waits_until_each_state_is_reached(play):
-    driver = await play.opened(
-        [
-            *TAKING_CONTROL,
-            *RESETTING[:-1],
-            *IN_ESTOP,
-            *NO_ESTOP,
-            *SWITCHING_ON[:-1],
-            OFF[-1],
-            *ON,
-            *READY,
-            MDI[0],
-            ("get mode", b"MODE MANUAL\r\n"),
-            MDI[1],
-            *OWN_COORDINATES,
-        ]
-    )
+    reset = [*TAKING_CONTROL, *RESETTING[:-1], *IN_ESTOP, *NO_ESTOP, *SWITCHING_ON[:-1], OFF[-1], *IS_ON]
+    mode = said("set mode mdi | get mode: MANUAL | get mode: MDI")
+    driver = await play.opened([*reset, *READY, *mode, *OWN_COORDINATES])
     await driver.prepare(ALL)
 
 
 async def test_a_mode_that_was_asked_for_without_effect_is_asked_for_again(play):
     play.patience = play.IMPATIENT
-    driver = await play.opened([*UNTIL_HOMED, *READY, MDI[0]])
+    driver = await play.opened([*UNTIL_HOMED, *READY, MDI_MODE[0]])
     afterwards = play.servers[0].afterwards
 
     def second_request() -> bytes:
         afterwards["get mode"] = b"MODE MDI\r\n"
-        return MDI[0][1]
+        return MDI_MODE[0][1]
 
     afterwards |= {"get mode": b"MODE MANUAL\r\n", "set mode mdi": second_request}
     afterwards |= dict(OWN_COORDINATES)
@@ -123,11 +79,11 @@ async def test_a_machine_that_is_not_switched_on_without_a_reason_is_asked_again
     afterwards = play.servers[0].afterwards
 
     def second_request() -> bytes:
-        afterwards["get machine"] = ON[0][1]
+        afterwards["get machine"] = IS_ON[0][1]
         return SWITCHING_ON[-2][1]
 
     afterwards |= {"get machine": OFF[-1][1], "get error": NO_ERROR[1], "set machine on": second_request}
-    afterwards |= dict([*NO_ESTOP, *HOMED, *MDI, *OWN_COORDINATES])
+    afterwards |= dict([*NO_ESTOP, *HOMED, *MDI_MODE, *OWN_COORDINATES])
     await driver.prepare(ALL)
 
 
@@ -142,13 +98,8 @@ async def test_a_change_of_state_may_take_as_long_as_a_command_not_as_a_query(pl
 
 
 async def test_prepare_accepts_a_server_without_the_optional_queries(play):
-    unknown = [
-        ("get user_linear_units", b"GET USER_LINEAR_UNITS NAK\r\n\r\n"),
-        ("get program_codes", b"GET PROGRAM_CODES NAK\r\n\r\n"),
-        ("get pos_offset", b"GET NAK\r\n"),
-        ("get feed_override", b"GET NAK\r\n"),
-    ]
-    driver = await play.opened([*UNTIL_MDI, *(ask for question in unknown for ask in (question,) * 2)])
+    unknown = [(asked, b"GET NAK\r\n") for asked, _ in OWN_COORDINATES for _twice in range(2)]
+    driver = await play.opened([*UNTIL_MDI, *unknown])
     await driver.prepare(ALL)
 
 
@@ -157,17 +108,12 @@ async def test_prepare_accepts_a_server_without_the_optional_queries(play):
     [
         (
             [*TAKING_CONTROL, *RESETTING[:-1]],
-            {"get estop": b"ESTOP ON\r\n", "get error": b"ERROR OK\r\n"},
+            dict(said("get estop: ON | get error: OK")),
             "stays in emergency stop: it is in emergency stop. Release",
         ),
         (
             [*TAKING_CONTROL, *SWITCHING_ON[:-1]],
-            {
-                "set machine on": b"SET MACHINE ACK\n\r",
-                "get machine": b"MACHINE OFF\r\n",
-                "get estop": b"ESTOP OFF\r\n",
-                "get error": b"ERROR OK\r\n",
-            },
+            dict(said("set machine on | get machine: OFF | get estop: OFF | get error: OK")),
             "does not switch on: it is switched off",
         ),
         (
@@ -179,14 +125,8 @@ async def test_prepare_accepts_a_server_without_the_optional_queries(play):
             "does not switch on: joint 3 following error",
         ),
         (
-            [*UNTIL_HOMED, *READY, MDI[0]],
-            {
-                "set mode mdi": MDI[0][1],
-                "get mode": b"MODE MANUAL\r\n",
-                "get estop": b"ESTOP OFF\r\n",
-                "get machine": b"MACHINE ON\r\n",
-                "get error": b"ERROR OK\r\n",
-            },
+            [*UNTIL_HOMED, *READY, MDI_MODE[0]],
+            dict([*said("set mode mdi | get mode: MANUAL"), *NO_ESTOP, *IS_ON, NO_ERROR]),
             "does not enter MDI mode: it is on, and gives no reason",
         ),
         (
@@ -211,26 +151,11 @@ async def test_an_acknowledged_command_without_effect_is_reported(play, conversa
 FALSE_COORDINATES = pytest.mark.parametrize(
     ("conversation", "problem"),
     [
-        (
-            [("get user_linear_units", b"USER_LINEAR_UNITS INCH\r\n")],
-            r"counts in inch, controller.unit_mm is 1. Set controller.unit_mm = 25.4",
-        ),
-        (
-            [("get user_linear_units", b"USER_LINEAR_UNITS CUSTOM\r\n")],
-            r"counts in custom, controller.unit_mm is 1. Set \[TRAJ\] LINEAR_UNITS = mm",
-        ),
-        (
-            [UNITS, ("get program_codes", b"PROGRAM_CODES G0 G17 G21 G91 G54 G49\r\n")],
-            r"takes coordinates as relative \(G91\). G90",
-        ),
-        (
-            [UNITS, ("get program_codes", b"PROGRAM_CODES G0 G17 G21 G90 G54 G43\r\n")],
-            r"adds a tool length \(G43\). G49",
-        ),
-        (
-            [UNITS, CODES, ("get pos_offset", b"POS_OFFSET 0.0 -5.0 0.0 0.0 0.0 0.0\r\n")],
-            r"adds an offset of 0\.0 -5\.0 .*Clear it",
-        ),
+        (said("get user_linear_units: INCH"), "counts in inch, .*Set controller.unit_mm = 25.4"),
+        (said("get user_linear_units: CUSTOM"), r"counts in custom, .*Set \[TRAJ\] LINEAR_UNITS = mm"),
+        ([UNITS, *said("get program_codes: G0 G91 G49")], r"takes coordinates as relative \(G91\). G90"),
+        ([UNITS, *said("get program_codes: G0 G90 G43")], r"adds a tool length \(G43\). G49"),
+        ([UNITS, CODES, *said("get pos_offset: 0 -5.0 0 0 0 0")], r"adds an offset of 0 -5\.0 .*Clear it"),
     ],
 )
 
@@ -254,16 +179,9 @@ async def test_a_check_finds_them_and_sets_nothing(play, conversation, problem):
 
 
 async def test_a_refusal_quotes_the_controllers_error_messages(play):
-    driver = await play.opened(
-        [
-            *TAKING_CONTROL,
-            *OFF,
-            ("set machine on", b"SET MACHINE NAK\n\r"),
-            ("get enable", b"ENABLE ON\r\n"),
-            *[("get error", f"ERROR drive {n} is cold\r\n".encode()) for n in (1, 2, 3, 4, 5, 5)],
-            NO_ERROR,
-        ]
-    )
+    refused = said("set machine on: NAK | get enable: ON")
+    errors = [("get error", f"ERROR drive {n} is cold\r\n".encode()) for n in (1, 2, 3, 4, 5, 5)]
+    driver = await play.opened([*TAKING_CONTROL, *OFF, *refused, *errors, NO_ERROR])
     with pytest.raises(CommandRefused) as caught:
         await driver.prepare(ALL)
     four = "drive 1 is cold; drive 2 is cold; drive 3 is cold; drive 4 is cold"
@@ -271,15 +189,9 @@ async def test_a_refusal_quotes_the_controllers_error_messages(play):
 
 
 async def test_the_explanations_of_2_10_come_with_the_refusal(play):
-    driver = await play.opened(
-        [
-            *TAKING_CONTROL,
-            *OFF,
-            ("set machine on", b"error: Waiting for 'SET MACHINE ON' failed\r\nSET MACHINE NAK\r\n"),
-            ("get enable", b"ENABLE ON\r\n"),
-            NO_ERROR,
-        ]
-    )
+    refused = b"error: Waiting for 'SET MACHINE ON' failed\r\nSET MACHINE NAK\r\n"
+    why = said("get enable: ON | get error: OK")
+    driver = await play.opened([*TAKING_CONTROL, *OFF, ("set machine on", refused), *why])
     with pytest.raises(
         CommandRefused, match="refuses 'set machine on': Waiting for 'SET MACHINE ON' failed"
     ):
@@ -287,35 +199,18 @@ async def test_the_explanations_of_2_10_come_with_the_refusal(play):
 
 
 async def test_a_refusal_of_2_10_without_a_nak(play):
-    driver = await play.opened(
-        [
-            *TAKING_CONTROL,
-            *UNTIL_MDI[4:-2],
-            (
-                "set mode mdi",
-                b"error: Cannot issue SET MODE command while SET MDI command is still active\r\n",
-            ),
-            ("get enable", b"ENABLE ON\r\n"),
-            NO_ERROR,
-        ]
-    )
+    refused = b"error: Cannot issue SET MODE command while SET MDI command is still active\r\n"
+    why = said("get enable: ON | get error: OK")
+    driver = await play.opened([*UNTIL_MDI[:-2], ("set mode mdi", refused), *why])
     with pytest.raises(CommandRefused, match="while SET MDI command is still active"):
         await driver.prepare(ALL)
 
 
 async def test_a_stop_during_prepare_prevents_homing(play):
     stopped = play.Pause()
-    driver = await play.opened(
-        [
-            *UNTIL_HOMED,
-            *ON_NOT_HOMED,
-            *OWN_COORDINATES,
-            IN_JOINT_MODE[0],
-            ("get teleop_enable", stopped, b"TELEOP_ENABLE NO\r\n"),
-            NO_ERROR,
-        ],
-        play.STOPPING,
-    )
+    held = [IN_JOINT_MODE[0], ("get teleop_enable", stopped, b"TELEOP_ENABLE NO\r\n"), NO_ERROR]
+    main = [*UNTIL_HOMED, *ON_NOT_HOMED, *OWN_COORDINATES, *held]
+    driver = await play.opened(main, play.STOPPING)
     preparing = asyncio.create_task(driver.prepare(ALL))
     await stopped.reached.wait()
     await driver.stop()

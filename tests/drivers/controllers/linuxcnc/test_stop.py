@@ -8,11 +8,13 @@ import pytest
 
 from drivers.errors import MotionInterrupted
 from hexacell.errors import DeviceError
-from tests.drivers.controllers.linuxcnc.motion_dialogue import (
+from tests.drivers.controllers.linuxcnc.dialogue import (
+    ABORT,
     ACK,
     AGAIN_IN_CONTROL,
     ARRIVED,
     HALF_WAY,
+    JOINTS,
     MDI,
     MOVE_S,
     RESTORED,
@@ -31,7 +33,7 @@ async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(pl
             ("get abs_act_pos", ARRIVED),
             RESTORED,
         ],
-        [*play.GREETING, ("set abort", b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
+        [*play.GREETING, ABORT, *play.STOPPING[-3:]],
     )
     moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
     await aborted.reached.wait()
@@ -67,11 +69,11 @@ async def test_the_abort_is_repeated_while_the_machine_still_moves(play):
         [],
         [
             *play.GREETING,
-            ("set abort", b"SET ABORT ACK\n\r"),
+            ABORT,
             ("get joint_pos", moving[0]),
             ("get joint_pos", moving[1]),
             AGAIN_IN_CONTROL,
-            ("set abort", b"SET ABORT ACK\n\r"),
+            ABORT,
             ("get joint_pos", moving[2]),
             ("get joint_pos", moving[2]),
             ("get joint_pos", moving[2]),
@@ -118,7 +120,7 @@ async def test_two_stops_at_once_do_not_disturb_each_other(play):
 
 async def test_the_driver_does_not_reconnect_during_a_stop(play):
     speak = play.Pause()
-    joints = ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n")
+    joints = JOINTS
     driver = await play.opened(
         [(*joints, play.HANG_UP)],
         [*play.GREETING, ("set abort", speak, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],

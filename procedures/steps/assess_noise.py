@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -12,12 +12,10 @@ from hexacell.kinematics.pose import Pose
 from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.noise.noise_assessment import NoiseReadings, assess_noise
 from hexacell.noise.standstill import display_step
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SetKey
+from procedures.run.state import RunState, SetState
 from procedures.steps.base import BaseEvent, Computation
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState, SetState
 
 
 class NoiseMeasured(BaseEvent):

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from hexacell.campaign.pilots import pilot_number
 from hexacell.cell.fields import Frozen
+from procedures.resources.run_resources import RunResources
 from procedures.run.cancellation import in_thread
 from procedures.run.keys import SetKey, SixNumbers
-
-if TYPE_CHECKING:  # whoever reads a journal needs no devices
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
+from procedures.run.state import RunState
 
 
 class BaseEvent(Frozen):

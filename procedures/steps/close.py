@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from hexacell.measurements.records import deviation_of
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SetKey, ThreeNumbers
 from procedures.run.readings import Reading, in_words
+from procedures.run.state import RunState
 from procedures.run.trips import Guard, Trip
 from procedures.steps.base import BaseEvent, StepOfSet
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
 
 
 class SetClosed(BaseEvent):

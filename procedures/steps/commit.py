@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from hexacell.config.change import ConfigChange
 from hexacell.config.write_record import WriteKind
 from hexacell.errors import LimitError
+from procedures.resources.run_resources import RunResources
 from procedures.run.questions import ask_approval
+from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, StepWithoutMotion
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
 
 
 class Committed(BaseEvent):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from hexacell.checks.quick_level import QuickAccuracy
 from hexacell.errors import LimitError
@@ -13,14 +13,12 @@ from hexacell.results.result import ExpectedImprovement, IdentificationResult
 from hexacell.verdict.assessment import Assessment, assess
 from hexacell.verdict.findings import findings
 from hexacell.verdict.fit_document import fit_document
+from procedures.calibration.calibration import Knowledge
+from procedures.calibration.held_out_poses import PosesByPoint
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SixNumbers
+from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, Computation
-
-if TYPE_CHECKING:
-    from procedures.calibration.calibration import Knowledge
-    from procedures.calibration.held_out_poses import PosesByPoint
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
 
 
 class Identified(BaseEvent):

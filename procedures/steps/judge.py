@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from statistics import fmean
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from hexacell.cell.model import CellSettings
 from hexacell.checks.check_result import CheckResult, check_line, check_result
@@ -16,14 +16,12 @@ from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import LengthMeasurements, LengthStatement, length_statement
 from hexacell.verdict.outcome import length_line, outcome_line, reason_of
 from hexacell.verdict.verification import HeldOut, Verification, verify
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase, SixNumbers
 from procedures.run.readings import legs_warmer
+from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, Computation
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
-    from procedures.steps.sample import RecordTaken
+from procedures.steps.sample import RecordTaken
 
 
 class ConfirmationPlanned(BaseEvent):

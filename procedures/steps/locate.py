@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from hexacell.measurements.records import joints_of
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SixNumbers
+from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, BaseStep
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
 
 
 class Located(BaseEvent):

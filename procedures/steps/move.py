@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -14,17 +14,14 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.pose import Pose
+from procedures.resources.run_resources import RunResources
 from procedures.run.cancellation import in_thread
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
+from procedures.run.state import RunState
 from procedures.run.trips import GuardTripped, WatchedSet
 from procedures.steps.base import BaseEvent, StepAtPose
+from procedures.steps.identify import Identified
 from procedures.steps.sample import RecordRejected
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
-    from procedures.steps.identify import Identified
-
 
 MOST_REFUSALS = 40
 """The controller refuses at most so many poses of one set; then a person is to look at its limits."""

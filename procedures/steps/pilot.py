@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Record, deviation_of
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SetKey, SixNumbers
 from procedures.run.readings import Reading
+from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, StepAtPose
 from procedures.steps.sample import RecordRejected, read_inside
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
 
 
 class PilotTaken(BaseEvent):

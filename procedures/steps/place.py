@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase, SetKey, SixNumbers
 from procedures.run.questions import ask_mounting, ask_placement
+from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, StepOfSet
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
 
 
 class MountingError(DeviceError):

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SetKey, ThreeNumbers
 from procedures.run.readings import Reading
+from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, StepOfSet
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
 
 
 class GaugesProbed(BaseEvent):

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from drivers.errors import GaugeAtEnd
 from hexacell.errors import HexacellError, consists_only_of
 from hexacell.measurements.records import deviation_of
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase, SetKey, ThreeNumbers
 from procedures.run.readings import Reading, in_words
+from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, StepOfSet
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
 
 
 class ReferenceConfirmed(BaseEvent):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -13,14 +13,12 @@ from hexacell.errors import HexacellError, consists_only_of, joined
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Record, deviation_of
 from hexacell.robot.stated import gauge_travel_of
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SetKey, SixNumbers, ThreeNumbers
 from procedures.run.readings import Reading, in_words
+from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, StepAtPose
 from procedures.steps.place import MountingError
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
 
 
 class RecordTaken(BaseEvent):

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from hexacell.config.write_record import WriteKind
 from hexacell.errors import HexacellError
+from procedures.resources.run_resources import RunResources
 from procedures.run.cancellation import in_thread
+from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, StepWithoutMotion
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
 
 
 class ProvisionalReverted(BaseEvent):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -14,14 +14,11 @@ from hexacell.errors import joined
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of
 from hexacell.noise.gauge_trial import GaugeMistake, TrialFinding, judge_response, response_of
+from procedures.resources.run_resources import RunResources
 from procedures.run.keys import SetKey, ThreeNumbers
+from procedures.run.state import RunState
 from procedures.steps.base import BaseEvent, StepOfSet
 from procedures.steps.place import MountingError
-
-if TYPE_CHECKING:
-    from procedures.resources.run_resources import RunResources
-    from procedures.run.state import RunState
-
 
 MISTAKES: Mapping[GaugeMistake, tuple[str, str, str]] = {
     GaugeMistake.DEAD: (

@@ -30,7 +30,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.results.result import AcceptedResult
-from hexacell.results.written_geometry import WrittenGeometry, as_written
+from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot
 from hexacell.robot.stated import stated_effects
 from hexacell.verdict.decision import ErrorLimits
@@ -124,14 +124,6 @@ class Calibration:
     def plan(self) -> Plan:
         """What is measured to identify the geometry, or to check it, as far as it is known at the start."""
         return self.at_start.plan
-
-    def robot_of(self, state: RunState) -> Robot:
-        """The robot with all geometries that commanded the records of the identification."""
-        return self.known(state).robot_of(state)
-
-    def as_written(self, identified: Geometry) -> WrittenGeometry:
-        """What the controller gets of a geometry in the frame convention."""
-        return as_written(self.settings, self.robot, identified)
 
     def provisional_of(self, state: RunState) -> Geometry | None:
         """The provisional geometry of a run, in the mechanism's frame convention; None if it had none."""

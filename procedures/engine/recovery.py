@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from drivers import errors as controller
 from drivers import errors as device
 from hexacell.cell.recovery import Action, Escalations, FailureKind, RecoverySettings
 from hexacell.errors import (
@@ -51,9 +50,9 @@ KINDS: Mapping[type[HexacellError], FailureKind] = {
     device.InvalidSampleError: FailureKind.ENCODER_ALARM,
     device.RestartedNodeError: FailureKind.ENCODER_RESTARTED,
     device.BusError: FailureKind.LINK_LOST,
-    controller.ConnectionLost: FailureKind.LINK_LOST,
-    controller.CommandRefused: FailureKind.CONTROLLER,
-    controller.MotionInterrupted: FailureKind.CONTROLLER,
+    device.ConnectionLost: FailureKind.LINK_LOST,
+    device.CommandRefused: FailureKind.CONTROLLER,
+    device.MotionInterrupted: FailureKind.CONTROLLER,
     device.PortLost: FailureKind.LINK_LOST,
     NeverSettled: FailureKind.UNSETTLED,
     MountingError: FailureKind.MOUNTING,

@@ -66,14 +66,6 @@ class PositionReports:
 
 
 @dataclass(frozen=True, slots=True)
-class AgreementTolerances:
-    """Differences up to which reports agree, mm: of a reported position, and of an encoder from a joint."""
-
-    position_mm: float
-    encoders: float
-
-
-@dataclass(frozen=True, slots=True)
 class PositionMismatch:
     """Reports that do not agree.
 
@@ -98,16 +90,22 @@ def position_mismatch(
     geometry: Geometry,
     branch: Branch,
     reports: PositionReports,
-    tolerances: AgreementTolerances,
+    *,
+    position_mm: float,
+    following: float,
 ) -> PositionMismatch | None:
-    """How reports disagree under the controller's geometry, at the leg where most; None if they agree."""
-    by_pose, rounding = _joints_of(mechanism, geometry, branch, reports.pose, tolerances.position_mm)
-    from_encoders = _excess(by_pose - reports.encoders, rounding + tolerances.encoders)
+    """How reports disagree under the controller's geometry, at the leg where most; None if they agree.
+
+    They agree if a reported position is off by at most ``position_mm``, and an encoder from its joint by at
+    most ``following``, mm.
+    """
+    by_pose, rounding = _joints_of(mechanism, geometry, branch, reports.pose, position_mm)
+    from_encoders = _excess(by_pose - reports.encoders, rounding + following)
     odd: PositionSource | None = None
     excess = from_encoders
     if reports.joints is not None:
         from_joints = _excess(by_pose - reports.joints, rounding)
-        between = _excess(reports.joints - reports.encoders, np.full(6, tolerances.encoders))
+        between = _excess(reports.joints - reports.encoders, np.full(6, following))
         if _agree(from_joints):
             odd, excess = PositionSource.ENCODERS, between
         elif _agree(between):
@@ -194,10 +192,14 @@ class PositionCheck:
         if joints is not None and self.settings.controller.joints_include_zeros:
             joints = joints - joint_zeros(mechanism, commanding.geometry)
         reports = PositionReports(reported.pose, joints, np.array(encoders.positions))
-        tolerances = AgreementTolerances(
-            self.settings.controller.position_tolerance_mm, self.settings.guards.following
+        mismatch = position_mismatch(
+            mechanism,
+            commanding.geometry,
+            commanding.branch,
+            reports,
+            position_mm=self.settings.controller.position_tolerance_mm,
+            following=self.settings.guards.following,
         )
-        mismatch = position_mismatch(mechanism, commanding.geometry, commanding.branch, reports, tolerances)
         if mismatch is None:
             return CheckedPosition(reports)
         return CheckedPosition(reports, self._trip(mismatch, reports), mismatch.odd)

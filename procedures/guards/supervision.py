@@ -16,9 +16,8 @@ from __future__ import annotations
 import asyncio
 import shutil
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self, TypeVar
 
 from drivers.interfaces import Controller
@@ -72,7 +71,7 @@ class MotionSupervisor:
         try:
             await shielded(self._controller.stop())
         except HexacellError as error:
-            trip = trip.unstopped(str(error))
+            trip = replace(trip, stop_failure=str(error))
         return self.latch(trip)
 
     async def supervise(
@@ -139,9 +138,7 @@ class GuardMonitor:
             task.add_done_callback(self._on_task_end)
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_error: object) -> None:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)

@@ -21,13 +21,12 @@ import stat
 import time
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from types import TracebackType
-from typing import BinaryIO, Self
+from typing import BinaryIO
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -97,7 +96,7 @@ def read_entries(path: Path, longest_line: int = LONGEST_LINE) -> tuple[Entry, .
         raise atomic_files.os_error_to_file_error("cannot be read", path, error) from error
 
 
-class Journal:
+class Journal(AbstractContextManager["Journal"]):
     """A journal open for appending; raises ``CellBusy`` if another process writes it, or ``FileError``."""
 
     def __init__(self, path: Path) -> None:
@@ -149,12 +148,7 @@ class Journal:
         """Close the file, which releases its lock."""
         os.close(self._descriptor)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
     def _line(self, event: Event) -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from hexacell.errors import DeviceError, ExitCode, HexacellError, LimitError, SeveralErrors, flatten_errors
@@ -40,18 +40,9 @@ class Trip:
     causes: tuple[HexacellError, ...] = field(default=(), compare=False)
     stop_failure: str = ""
 
-    @property
-    def is_about_the_ball(self) -> bool:
-        """Whether all devices work and only the pose was outside the gauges' range."""
-        return self.guard in {Guard.GAUGE_END, Guard.PLATE}
-
     def as_error(self) -> GuardTripped:
         """The error to raise for it."""
         return (DriftTripped if self.guard is Guard.DRIFT else GuardTripped)(self)
-
-    def unstopped(self, reason: str) -> Trip:
-        """The trip of a robot that could not be stopped: then that comes first."""
-        return replace(self, stop_failure=reason)
 
 
 class GuardTripped(DeviceError):

@@ -18,7 +18,7 @@ from procedures.resources.run_resources import RunResources
 from procedures.run.cancellation import in_thread
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.state import RunState
-from procedures.run.trips import GuardTripped, WatchedSet
+from procedures.run.trips import Guard, GuardTripped, WatchedSet
 from procedures.steps.base import BaseEvent, StepAtPose
 from procedures.steps.identify import Identified
 from procedures.steps.sample import RecordRejected
@@ -26,6 +26,9 @@ from procedures.steps.sample import RecordRejected
 MOST_REFUSALS = 40
 """The controller refuses at most so many poses of one set; then a person is to look at its limits."""
 
+
+OFF_THE_PLATE = {Guard.GAUGE_END, Guard.PLATE}
+"""Guards that trip on the pose alone, while all devices work."""
 
 STUCK_GAUGE_SIGMAS = 5.0
 """An expected displacement is reduced by so many standard deviations before a gauge counts as stuck."""
@@ -154,7 +157,8 @@ class Move(StepAtPose):
         except GuardTripped as tripped:
             measured = state.set(self.at)
             is_there = not measured.reference_unverified or measured.rejections > 0
-            if not self.at.phase.has_new_geometry or not tripped.trip.is_about_the_ball or not is_there:
+            is_off_plate = tripped.trip.guard in OFF_THE_PLATE
+            if not self.at.phase.has_new_geometry or not is_off_plate or not is_there:
                 raise
             # The new geometry takes the ball off its plate: the second time that is a verdict.
             run.guards.supervisor.clear()

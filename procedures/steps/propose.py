@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import ClassVar, Literal
 
 from hexacell.cell.fields import GeometryDocument
-from hexacell.results.written_geometry import TaskDisplacement
+from hexacell.results.written_geometry import TaskDisplacement, as_written
 from hexacell.verdict.acceptance_gates import AcceptanceGate, gates
 from procedures.resources.run_resources import RunResources
 from procedures.run.state import RunState
@@ -51,7 +51,7 @@ class Propose(Computation):
             before=commanding,
             expired=started.expired if settings.certificates and started is not None else None,
         )
-        written = run.calibration.as_written(identified.geometry)
+        written = as_written(settings, robot, identified.geometry)
         change = run.config.change_to(written.geometry, state)
         change.save(run.folder.proposal, like=run.cell.config_path)
         return Proposed(

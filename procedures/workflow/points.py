@@ -7,7 +7,6 @@ of the robot it leaves for pilot poses, which steer the choice of the others
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +15,10 @@ from hexacell.campaign.decisions import FinishPoint, MeasurePose, StartPoint
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError
-from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.motion.path_check import is_clear
 from hexacell.noise.noise_assessment import visits_agree
 from procedures.calibration.calibration import campaign_state
-from procedures.run.keys import Phase, SetKey, SixNumbers
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
 from procedures.steps.assess_noise import AssessNoise, noise_readings
 from procedures.steps.close import CloseSet
@@ -32,7 +29,7 @@ from procedures.steps.pilot import Pilot
 from procedures.steps.registry import Step
 from procedures.steps.repeat import Repeat
 from procedures.steps.standstill import Standstill
-from procedures.workflow.sets import Known, SetSteps, move_to_chosen, reference_pose, require_zero
+from procedures.workflow.sets import Known, SetSteps, beside, move_to_chosen, reference_pose, require_zero
 from procedures.workflow.trial import TrialSteps
 
 DISTANCE_SHARE = 0.3
@@ -92,27 +89,15 @@ class NoiseSteps:
             return None
         if pilot := self._to_pilot(state, key):
             return pilot
-        beside = [
-            pose
-            for pose in self._beside(reference_pose(state, key))
-            if self._is_clear(state, key, pose, known)
-        ]
-        return Move(at=key, orientation=0, pose=beside[done % len(beside)]) if beside else None
-
-    def _beside(self, reference: SixNumbers) -> Iterable[SixNumbers]:
-        """Poses on all sides of the reference, each followed by the opposite one."""
-        x, y, z, a, b, c = reference
-        distance = DISTANCE_SHARE * self.sets.robot.limits.room.smallest_mm
-        for dx, dy, dz in distance * np.concatenate([[row, -row] for row in np.eye(3)]):
-            yield (x + float(dx), y + float(dy), z + float(dz), a, b, c)
-
-    def _is_clear(self, state: RunState, key: SetKey, pose: SixNumbers, known: Known | None) -> bool:
-        """Whether the robot as it is known by now gets there and back within the limits."""
         reference = reference_pose(state, key)
-        here, there = (self.sets.robot.from_commands([Pose(*one)]) for one in (reference, pose))
         drawn = self.sets.robot.belief().zeroed_at(state.zero_shown(key))
         belief, ball = (drawn, None) if known is None else (known[0], known[1].reference)
-        return is_clear(belief, here, there, ball) and is_clear(belief, there, here, ball)
+        distance = DISTANCE_SHARE * self.sets.robot.limits.room.smallest_mm
+        # On all sides of the reference, each pose followed by the opposite one.
+        sides = distance * np.concatenate([[row, -row] for row in np.eye(3)])
+        poses = [beside(reference, (x, y, z)) for x, y, z in sides.tolist()]
+        clear = [pose for pose in poses if self.sets.is_clear_both_ways(belief, reference, pose, ball)]
+        return Move(at=key, orientation=0, pose=clear[done % len(clear)]) if clear else None
 
 
 @dataclass(frozen=True, eq=False)

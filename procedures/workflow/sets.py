@@ -16,10 +16,10 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.motion.path_check import ball_position
+from hexacell.motion.path_check import ball_position, is_clear
 from hexacell.motion.paths import PathPlanner, find_route, next_return_move
 from hexacell.robot.model import Robot
-from procedures.run.keys import Phase, SetKey, SixNumbers
+from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.state import RunState
 from procedures.steps.close import CloseSet
 from procedures.steps.move import Expectation, Move
@@ -184,10 +184,23 @@ class SetSteps:
             )
         return self.paths.towards(state, move, ball)
 
+    def is_clear_both_ways(
+        self, belief: RobotBelief, reference: SixNumbers, pose: SixNumbers, ball: Array | None
+    ) -> bool:
+        """Whether the robot gets from a reference to a pose and back within the limits."""
+        here, there = (self.robot.from_commands([Pose(*one)]) for one in (reference, pose))
+        return is_clear(belief, here, there, ball) and is_clear(belief, there, here, ball)
+
     def way_back(self, state: RunState, key: SetKey, known: Known | None) -> Move:
         """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""
         back = self.paths.back(state, key, known)
         return back or self.to_reference(state, key, None if known is None else known[1].reference)
+
+
+def beside(reference: SixNumbers, moved: ThreeNumbers) -> SixNumbers:
+    """A reference moved along x, y and z."""
+    (x, y, z, a, b, c), (dx, dy, dz) = reference, moved
+    return (x + dx, y + dy, z + dz, a, b, c)
 
 
 def reference_pose(state: RunState, key: SetKey) -> SixNumbers:

@@ -12,17 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.errors import LimitError
-from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.motion.path_check import ball_position, is_clear
-from procedures.run.keys import SetKey, SixNumbers, ThreeNumbers
+from hexacell.motion.path_check import ball_position
+from procedures.run.keys import SetKey, ThreeNumbers
 from procedures.run.state import RunState
 from procedures.steps.move import Move
 from procedures.steps.probe import Probe
 from procedures.steps.registry import Step
 from procedures.steps.try_gauges import Try
-from procedures.workflow.sets import SetSteps, reference_pose
+from procedures.workflow.sets import SetSteps, beside, reference_pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +44,10 @@ class TrialSteps:
             is_back = state.at_pose == (key, 1)
             return Try(at=key) if is_back else self.sets.to_reference(state, key, ball)
         moved = self._moved(state, key, axis)
-        pose = _beside(reference_pose(state, key), moved)
+        pose = beside(reference_pose(state, key), moved)
         if state.off_plan and state.target == pose:
             return Probe(at=key, moved_mm=moved)
-        probed = [_beside(reference_pose(state, key), probe.moved_mm) for probe in measured.probes[-1:]]
+        probed = [beside(reference_pose(state, key), probe.moved_mm) for probe in measured.probes[-1:]]
         is_beside = state.off_plan and not state.position_unknown and state.target in probed
         if state.at_pose != (key, 1) and not is_beside:
             return self.sets.to_reference(state, key, ball)
@@ -56,26 +55,15 @@ class TrialSteps:
 
     def _moved(self, state: RunState, key: SetKey, axis: int) -> ThreeNumbers:
         """The move along an axis, to the side on which there is room."""
-        belief = self.sets.robot.belief().zeroed_at(state.zero_shown(key))
+        belief = self.sets.robot.belief().zeroed_at(state.zero_shown(key))  # the robot as it was drawn
+        reference = reference_pose(state, key)
+        ball = ball_position(belief, self.sets.robot.from_commands([Pose(*reference)]))
         for side in (1.0, -1.0):
             x, y, z = (side * self.distance_mm * np.eye(3)[axis]).tolist()
-            if self._is_clear(belief, reference_pose(state, key), (x, y, z)):
+            if self.sets.is_clear_both_ways(belief, reference, beside(reference, (x, y, z)), ball):
                 return (x, y, z)
         raise LimitError(
             f"{key}: the gauges cannot be tried, because the robot cannot move by {self.distance_mm:g} mm "
             f"along {'xyz'[axis]} there within its limits",
             action="Choose another point, or a smaller trial_mm in [stations]",
         )
-
-    def _is_clear(self, belief: RobotBelief, reference: SixNumbers, moved: ThreeNumbers) -> bool:
-        """Whether the robot as it was drawn gets there and back within the limits."""
-        here, there = (
-            self.sets.robot.from_commands([Pose(*one)]) for one in (reference, _beside(reference, moved))
-        )
-        ball = ball_position(belief, here)
-        return is_clear(belief, here, there, ball) and is_clear(belief, there, here, ball)
-
-
-def _beside(reference: SixNumbers, moved: ThreeNumbers) -> SixNumbers:
-    (x, y, z, a, b, c), (dx, dy, dz) = reference, moved
-    return (x + dx, y + dy, z + dz, a, b, c)

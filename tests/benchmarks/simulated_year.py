@@ -35,6 +35,7 @@ from hexacell.identification.estimator import identify
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.results.result import IdentificationResult
+from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import config_layout, robot_of
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.runs import run_folder
@@ -281,12 +282,12 @@ class VirtualNight:
     ) -> Iterator[events.Event]:
         """As the computations and the config transactions of a run do it."""
         calibration, settings = self.calibration, self.cell.settings
-        robot = calibration.robot_of(state)
+        robot = calibration.known(state).robot_of(state)
         found = identify(robot.problem(state.measurements()))
         result = IdentificationResult.of(found)
         identified = events.Identified(result=result, held_out=())
         yield identified
-        written = calibration.as_written(found.geometry)
+        written = as_written(calibration.settings, calibration.robot, found.geometry)
         conditions = gates(
             found.estimate,
             robot.tolerance_violations(found.estimate),

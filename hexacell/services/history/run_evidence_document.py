@@ -49,7 +49,7 @@ def evidence_document(settings: CellSettings, folder: RunFolder) -> EvidenceDocu
         if np.isnan(expansion).any():
             return None
         measurements = MeasurementSet(tuple(one.record for one in samples))
-        records = machine_records(calibration.robot_of(state), measurements, free, expansion)
+        records = machine_records(calibration.known(state).robot_of(state), measurements, free, expansion)
     except (HexacellError, np.linalg.LinAlgError):  # records that fit no robot near this one
         return None
     return EvidenceDocument.of(entries[-1].at, mean_temperature(readings), len(free), records.evidence)
@@ -76,4 +76,4 @@ def _counted(
     if check is None or check.earlier_run is None or not check.is_consistent:
         return None
     calibration = Calibration(settings, robot, Mode.CHECK, accepted=started.accepted)
-    return calibration, calibration.robot_of(state).free_parameters, check.left_out
+    return calibration, calibration.known(state).robot_of(state).free_parameters, check.left_out

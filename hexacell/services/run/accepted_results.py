@@ -110,7 +110,8 @@ def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], 
         return {}
     settings, started = cell.settings, state.started
     start = started_robot(settings, started)
-    robot = Calibration(settings, start, Mode(started.mode), accepted=started.accepted).robot_of(state)
+    calibration = Calibration(settings, start, Mode(started.mode), accepted=started.accepted)
+    robot = calibration.known(state).robot_of(state)
     effects = [one for one in with_measured_scale(robot.effects, _length(state)) if one.size]
     if not effects:
         return {}

@@ -166,7 +166,7 @@ def test_what_effects_did_to_the_result_before_counts(corrected) -> None:
     assert effects is not None
     known = before.model_copy(update={"effects": effects.effects})
     calibration = Calibration(settings, robot_of(cell), Mode.QUICK, accepted=known, effort=FEW_CHOICES)
-    robot = calibration.robot_of(state)
+    robot = calibration.known(state).robot_of(state)
     assert robot.known_effects.keys() == {"scale of each encoder"}
     found = identify(robot.problem(state.measurements()))
     belief = robot.belief(found)

@@ -17,7 +17,6 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import robot_of
 from procedures.guards.position_check import (
-    AgreementTolerances,
     PositionMismatch,
     PositionReports,
     PositionSource,
@@ -25,7 +24,7 @@ from procedures.guards.position_check import (
 )
 
 ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))
-TOLERANCES = AgreementTolerances(position_mm=0.01, encoders=1.0)
+TOLERANCES = {"position_mm": 0.01, "following": 1.0}
 HOME = Pose(0.0, 0.0, 550.0)
 THERE = Pose(60.0, -80.0, 520.0, 20.0, -15.0, 30.0)
 
@@ -41,7 +40,7 @@ def rounded(pose: Pose) -> Pose:
 
 
 def mismatch(reports: PositionReports, geometry: Geometry | None = None) -> PositionMismatch | None:
-    return position_mismatch(Hexaglide(), geometry or ROBOT.controller, ROBOT.branch, reports, TOLERANCES)
+    return position_mismatch(Hexaglide(), geometry or ROBOT.controller, ROBOT.branch, reports, **TOLERANCES)
 
 
 def reports(**changes: Any) -> PositionReports:
@@ -81,7 +80,7 @@ def test_a_geometry_that_differs_by_a_twentieth_is_odd_although_the_encoders_agr
 
 def test_another_branch_is_another_geometry() -> None:
     branch: Any = tuple(-side for side in ROBOT.branch)
-    found = position_mismatch(Hexaglide(), ROBOT.controller, branch, reports(), TOLERANCES)
+    found = position_mismatch(Hexaglide(), ROBOT.controller, branch, reports(), **TOLERANCES)
     assert found is not None
     assert found.odd is PositionSource.POSE
 

@@ -263,7 +263,9 @@ def test_the_disk_must_have_room(monkeypatch, free: int, trips: bool) -> None:
 
 
 def test_a_trip_without_a_stop_asks_for_the_emergency_stop_first() -> None:
-    trip = Trip(Guard.STALE, "controller", "has not answered", "Check its cable").unstopped("no way to it")
+    trip = Trip(
+        Guard.STALE, "controller", "has not answered", "Check its cable", stop_failure="no way to it"
+    )
     error = trip.as_error()
     assert isinstance(error, GuardTripped)
     assert error.exit_code is ExitCode.HARDWARE

@@ -160,7 +160,7 @@ async def test_a_noisy_gauge_is_named_and_weighted_down(asked: Rig) -> None:
     found = await measure_noise(asked)
     assert [one.name for one in found.noise.gauges if one.is_noisier] == ["gauge y"]
     state = fold(read_journal(asked.folder.journal))
-    noise = asked.calibration.robot_of(state).noise
+    noise = asked.calibration.known(state).robot_of(state).noise
     assert noise.gauges_mm[1] == pytest.approx(0.012 / np.sqrt(5.0), rel=0.6)
     assert noise.gauges_mm[[0, 2]] == pytest.approx([0.0012, 0.0012])
     assert asked.calibration.robot.noise.gauges_mm == pytest.approx(np.full(3, 0.0012))
@@ -238,7 +238,7 @@ async def test_records_are_means_of_several_windows_where_that_is_allowed_and_pa
     assert len(zero.reading.counts) == len(second.reading.counts) == 4 * len(single.reading.counts)
     state = fold(read_journal(rig.folder.journal))
     assert state.set(P1).samples[:2] == (zero, second)
-    noise = rig.calibration.robot_of(state).noise
+    noise = rig.calibration.known(state).robot_of(state).noise
     assert noise.encoder < 0.85 * 0.0045
 
 

@@ -8,7 +8,7 @@ of the ball. :func:`.estimator.identify` goes through these steps:
    :mod:`.data_requirements` refuses records that cannot determine the parameters.
 2. ``solver/``: :func:`.fit_regularized` fits the model (:func:`.predict`) by Levenberg-Marquardt with the
    prior, which is released where the data determine the parameters.
-3. ``data_faults/``: :func:`.screen` repeats the fit without records that have a fault.
+3. ``data_faults/``: :func:`.select_faults` repeats the fit without records that have a fault.
 4. The result is an :class:`.Identification`: parameters, covariance, tests of the residuals, data faults.
 
 ``diagnostics/`` derives from it the errors at poses, tests by further records, and whether the robot can

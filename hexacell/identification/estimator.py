@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from hexacell.identification.data_faults.score_tests import OutlierStatistics
-from hexacell.identification.data_faults.stepwise_selection import screen
-from hexacell.identification.data_faults.trial_fits import LARGEST_REJECTED_SHARE
+from hexacell.identification.data_faults import messages
+from hexacell.identification.data_faults.hypotheses import OutlierStatistics
+from hexacell.identification.data_faults.stepwise_selection import (
+    LARGEST_REJECTED_SHARE,
+    UncorrectableFaultError,
+    select_faults,
+)
 from hexacell.identification.problem.data_requirements import (
     require_enough_records,
     require_rotation_diversity,
@@ -21,7 +26,7 @@ from hexacell.identification.solver.fit import (
     fit_regularized,
     solve_around_singularities,
 )
-from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.result import GaugeFaultError, Identification
 
 
 def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
@@ -41,7 +46,14 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     """
     require_enough_records(problem)
     require_rotation_diversity(problem)
-    found = screen(problem) if find_outliers else fit_regularized(problem)
+    if find_outliers:
+        try:
+            selection = select_faults(problem)
+        except UncorrectableFaultError as refused:
+            raise GaugeFaultError(messages.refused(refused)) from None
+        found = replace(selection.selected.fit, data_faults=messages.left_out(selection))
+    else:
+        found = fit_regularized(problem)
     require_enough_records(found.problem)
     return found
 

@@ -24,8 +24,8 @@ from hexacell.identification.data_faults.hypotheses import (
     GaugeFaultHypothesis,
     OutlierHypothesis,
     ZeroShiftHypothesis,
+    rank_hypotheses,
 )
-from hexacell.identification.data_faults.score_tests import rank_hypotheses
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.measurement_model import NuisanceElimination
 from hexacell.identification.solver.result import Identification

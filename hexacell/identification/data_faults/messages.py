@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from hexacell.identification.data_faults.deletion_tests import DeletionTest
 from hexacell.identification.data_faults.hypotheses import (
     MM_PER_INCH,
+    DeletionTest,
     GaugeFaultHypothesis,
     ZeroShiftHypothesis,
 )
-from hexacell.identification.data_faults.trial_fits import CorrectedFit, UncorrectableFaultError
+from hexacell.identification.data_faults.stepwise_selection import (
+    CorrectedFit,
+    Selection,
+    UncorrectableFaultError,
+)
 from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
 from hexacell.measurements.records import Deviation, RecordId
 
@@ -42,14 +44,13 @@ GAUGE_FAULT_WORDS = {
 """How a fault of one gauge looks, and of several, what corrects it, and what to do."""
 
 
-def left_out(selected: CorrectedFit, tests: Mapping[RecordId, DeletionTest]) -> tuple[DataFault, ...]:
-    """What is wrong with the records that a fit does without; ``tests`` are those of single records."""
+def left_out(selection: Selection) -> tuple[DataFault, ...]:
+    """What is wrong with the records that a fit does without."""
     shifts = []
-    for shift in selected.zero_shifts:
-        records = tuple(selected.after(shift))
+    for shift, records in selection.selected.zero_shifts.items():
         consequence = f"; orientations {shift.orientation} to {records[-1][1]} are left out"
-        shifts.append(_zero_shift(shift, consequence, records))
-    return (*map(_rejected_record, tests.values()), *shifts)
+        shifts.append(_zero_shift(shift, consequence, tuple(records)))
+    return (*map(_rejected_record, selection.tests.values()), *shifts)
 
 
 def refused(error: UncorrectableFaultError) -> DataFault:

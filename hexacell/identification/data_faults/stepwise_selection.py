@@ -1,52 +1,84 @@
 """Stepwise selection of data faults: forward by penalized score tests, backward by deletion tests.
 
 A fault hypothesis adds k unknowns to the linear model. Its gain, the decrease of the chi-square, needs no
-second fit (:mod:`.score_tests`); its cost is ``c k - gain``, like Schwarz's criterion with a constant c
+second fit (:mod:`.hypotheses`); its cost is ``c k - gain``, like Schwarz's criterion with a constant c
 instead of log n. Starting with no fault at all (:func:`select_faults`):
 
 1. Forward (:func:`_forward`). Of all significant hypotheses take the one of lowest cost that a refit of the
    corrected records confirms, and repeat. Where the fit is unreliable, hypotheses are tried by refits
-   instead (:mod:`.trial_fits`).
+   instead (:func:`_searched`).
 2. Backward (:func:`_readmitted`). Readmit the rejected records that agree with the final fit, in which they
    take no part, and go forward again.
-3. Proof (:func:`_only_proven`). Readmit those whose fault the rest of the records does not prove
-   (:mod:`.deletion_tests`).
+3. Proof (:func:`_only_proven`; ``docs/method.md``, Proof). Readmit those whose fault the other records do
+   not prove: the less these agree with the stated noise, the further beyond its critical value the
+   statistic of a fault must be. What is not proven stays in the fit, and no cause is named. The factors
+   separate the worlds of ``tests/benchmarks/worlds``: the largest statistic of an imperfect machine is 4.1
+   critical values, and that of a reading off by 0.5 mm in a good one at least 4.8.
 
 Gross errors, and all records after a shift of a gauge's zero, are left out. Gauge faults are refused, after
-other starts of the solver were tried (:func:`_other_minimum`). :mod:`.messages` puts faults into words.
+other starts of the solver were tried (:func:`_other_minimum`).
+
+First-order tests around a wrong solution are unreliable. The drawing is a better expansion point: it is
+within millimetres of the truth, whatever the gauges read. What is tried by refits, in this order
+(:func:`_candidates`):
+
+1. the most likely gauge fault around the drawing, and the most likely hypotheses of all kinds around the
+   solution, and around the solution with the records that the solver left out;
+2. greedy deletion: the most likely fault is left out, with a refit after each (:func:`_greedy_deletion`);
+3. deletion around the drawing: all outliers there at once (:func:`_outliers_at_start`);
+4. gauge faults around the fit without the deleted records, which they may have in common;
+5. the second and third of the lists of 1, and every gauge fault at all points.
 
 Sources: Efroymson 1960 (stepwise selection); Rao 1948 (score test); Baarda 1968, Pope 1976 (data snooping);
-Atkinson and Riani 2000 (several outliers); Schwarz, Annals of Statistics 6, 1978.
+Atkinson and Riani 2000 (several outliers, which hide each other around a fit to all of them, and show
+around one that they did not influence); Schwarz, Annals of Statistics 6, 1978.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from itertools import islice
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import chain, islice, zip_longest
 
 import numpy as np
 
-from hexacell.identification.data_faults import messages
-from hexacell.identification.data_faults.deletion_tests import deletion_tests, proven_faults
 from hexacell.identification.data_faults.hypotheses import (
     ALL_IN_INCHES,
+    DeletionTest,
     FaultHypothesis,
     GaugeFaultHypothesis,
     OutlierHypothesis,
+    OutlierStatistics,
     ZeroShiftHypothesis,
-)
-from hexacell.identification.data_faults.trial_fits import (
-    LARGEST_REJECTED_SHARE,
-    CorrectedFit,
-    UncorrectableFaultError,
-    hypotheses_at_solution,
-    refitted,
-    search,
+    deletion_test,
+    rank_gauge_faults,
+    rank_hypotheses,
 )
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.fit import FINE, fit_regularized
+from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
+from hexacell.identification.solver.fit import COARSE, FINE, QUICK, SolverOptions, fit_regularized
+from hexacell.identification.solver.linear_model import LinearizedModel
 from hexacell.identification.solver.multistart import restarts
-from hexacell.identification.solver.result import GaugeFaultError, Identification
+from hexacell.identification.solver.result import Identification
+from hexacell.measurements.records import RecordId
+
+SUFFICIENT_DECREASE = 20.0
+"""Factor of the mean square residual for a hypothesis to count although the fit is not yet consistent."""
+
+SETTLING_DECREASE = 400.0
+SETTLING_MISFIT = 4.0
+"""Factor and largest mean square residual for a hypothesis to need no comparison with others."""
+
+LARGEST_TRUSTED_RATIO = 10.0
+"""Residuals over the stated noise up to which first-order tests around the solution are valid."""
+
+LARGEST_REJECTED_SHARE = 0.1
+"""Share of all records above which those that disagree are not single mistakes."""
+
+LARGEST_TRIMMED_SHARE = 0.25
+"""Largest share of all records that may be outliers around the drawing."""
+
+TRIED_FROM_EACH_LIST = 3
 
 CONFIRMED_SHARE = 0.5
 """Share of the first-order gain of a gauge fault that a refit must confirm."""
@@ -60,54 +92,164 @@ OTHER_STARTS = 4
 LARGEST_MEAN_SQUARE = 3.0
 """Largest mean square difference from the drawing, in sigma, of a solution from another start."""
 
+GOOD_AGREEMENT = 0.05
+"""Probability of the residuals of the rest from which they agree well."""
 
-def screen(problem: Problem) -> Identification:
-    """Fit a problem without the records that disagree with the others.
+BESIDE_GOOD, BESIDE_AGREEING, BESIDE_DISAGREEING = 1.3, 4.0, 10.0
+
+
+class UncorrectableFaultError(Exception):
+    """A fault of the records that cannot be corrected by leaving some of them out.
+
+    Attributes:
+        before: the fit that does not explain it.
+        after: the fit corrected for it.
+        left: the records that are left without it.
+    """
+
+    def __init__(
+        self, fault: FaultHypothesis, before: CorrectedFit, after: CorrectedFit, left: Problem
+    ) -> None:
+        super().__init__(fault)
+        self.fault, self.before, self.after, self.left = fault, before, after, left
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CorrectedFit:
+    """A fit of records that are corrected for data faults.
+
+    Attributes:
+        original: all records as measured.
+        problem: the records after correction.
+        fit: of those; the solver may have left out some of them, next to a singularity.
+        faults: what was corrected, in the order of selection.
+    """
+
+    original: Problem
+    problem: Problem
+    fit: Identification
+    faults: tuple[FaultHypothesis, ...] = ()
+
+    @classmethod
+    def uncorrected(cls, problem: Problem) -> CorrectedFit:
+        """The fit of all records as measured."""
+        return cls.fitted(problem, problem)
+
+    @classmethod
+    def fitted(
+        cls,
+        original: Problem,
+        problem: Problem,
+        faults: tuple[FaultHypothesis, ...] = (),
+        options: SolverOptions = QUICK,
+    ) -> CorrectedFit:
+        """Fit the records ``problem``, which are corrected for some faults."""
+        return cls(original, problem, fit_regularized(problem, options), faults)
+
+    def corrected_for(self, hypothesis: FaultHypothesis) -> CorrectedFit:
+        """The fit after correction for one more fault."""
+        problem = hypothesis.corrected(self.problem)
+        return self.fitted(self.original, problem, (*self.faults, hypothesis))
+
+    @property
+    def rejected(self) -> list[RecordId]:
+        """The records rejected for gross errors."""
+        outliers = (fault for fault in self.faults if isinstance(fault, OutlierHypothesis))
+        return [record for outlier in outliers for record in outlier.records]
+
+    @property
+    def zero_shifts(self) -> dict[ZeroShiftHypothesis, list[RecordId]]:
+        """The shifts of the gauges' zero that were corrected, each with all records after it."""
+        ids = np.array(self.original.record_ids)
+        shifts = [fault for fault in self.faults if isinstance(fault, ZeroShiftHypothesis)]
+        return {shift: [*map(tuple, ids[shift.rows(self.original)].tolist())] for shift in shifts}
+
+    @property
+    def lost(self) -> int:
+        """How many records the solver left out."""
+        return self.problem.records - self.fit.records
+
+    @property
+    def is_reliable(self) -> bool:
+        """Whether the solution is good enough for first-order tests around it."""
+        is_near = self.fit.goodness.ratio <= LARGEST_TRUSTED_RATIO
+        return not self.lost and self.fit.converged and is_near
+
+    @property
+    def is_consistent(self) -> bool:
+        """Whether all records agree with the stated noise."""
+        return self.is_reliable and self.fit.goodness.agreement is not ChiSquareVerdict.TOO_LARGE
+
+    @property
+    def misfit(self) -> float:
+        """The mean square residual; a lost record counts as one at the largest trusted ratio."""
+        squares = self.fit.goodness.ratio**2 * self.fit.records + LARGEST_TRUSTED_RATIO**2 * self.lost
+        return squares / self.problem.records
+
+    def is_better_by_far_than(self, other: CorrectedFit) -> bool:
+        """Whether it explains so much more that it is right although something else is still wrong."""
+        return self.misfit < other.misfit / SUFFICIENT_DECREASE
+
+    def settles(self, other: CorrectedFit) -> bool:
+        """Whether no other hypothesis can explain it better: it agrees, or an imperfect machine is left."""
+        is_near_noise = self.is_reliable and self.misfit <= SETTLING_MISFIT
+        return self.is_consistent or (is_near_noise and self.misfit < other.misfit / SETTLING_DECREASE)
+
+    def likely_hypotheses(self, found_before: int = 0) -> list[FaultHypothesis]:
+        """The significant hypotheses by tests around the solution, the most likely first."""
+        return rank_hypotheses(self.fit.linear_model, self.fit.noise_test, found_before=found_before)
+
+    def deletion_tests(self) -> dict[RecordId, DeletionTest]:
+        """Tests of all records that the fit does without, but for those after a zero shift."""
+        excluded = {record for after in self.zero_shifts.values() for record in after}
+        excluded.update(self.fit.problem.record_ids)
+        tested = (record for record in self.original.record_ids if record not in excluded)
+        return {record: deletion_test(self.original, record, self.fit) for record in tested}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Selection:
+    """The fit without the records whose faults are proven, and the deletion tests of these records."""
+
+    selected: CorrectedFit
+    tests: dict[RecordId, DeletionTest]
+
+
+def select_faults(problem: Problem) -> Selection:
+    """Fit a problem, corrected for all faults that are found and proven.
 
     Args:
         problem: all records, at least as many as determine the parameters.
 
-    Returns:
-        The fit of the other records, with what is wrong with those that are left out.
-
-    Raises:
-        GaugeFaultError: a gauge fault, or a zero shift that leaves too few records.
-    """
-    try:
-        selected = select_faults(problem)
-    except UncorrectableFaultError as refused:
-        other = _other_minimum(problem)
-        if other is None:
-            raise GaugeFaultError(messages.refused(refused)) from None
-        return other
-    return replace(selected.fit, data_faults=messages.left_out(selected, deletion_tests(selected)))
-
-
-def select_faults(problem: Problem) -> CorrectedFit:
-    """The fit of a problem that is corrected for all faults that are found and proven.
-
     Raises:
         UncorrectableFaultError: a gauge fault, or a zero shift that leaves too few records.
     """
-    uncorrected = CorrectedFit.uncorrected(problem)
-    selected = _forward(uncorrected)
-    if len(selected.rejected) > 1 or not selected.is_consistent:
-        # Readings in inches resemble a machine that needs no calibration, with some gross errors.
-        in_mm = refitted(uncorrected, ALL_IN_INCHES)
-        if in_mm is not None and in_mm.is_consistent:
-            _require_correctable(uncorrected, in_mm)
-    readmitted = _readmitted(selected)
-    return _only_proven(selected if readmitted is None else _forward(readmitted))
+    try:
+        uncorrected = CorrectedFit.uncorrected(problem)
+        selected = _forward(uncorrected)
+        if len(selected.rejected) > 1 or not selected.is_consistent:
+            # Readings in inches resemble a machine that needs no calibration, with some gross errors.
+            in_mm = refitted(uncorrected, ALL_IN_INCHES)
+            if in_mm is not None and in_mm.is_consistent:
+                _require_correctable(uncorrected, in_mm)
+        readmitted = _readmitted(selected)
+        return _only_proven(selected if readmitted is None else _forward(readmitted))
+    except UncorrectableFaultError:
+        other = _other_minimum(problem)
+        if other is None:
+            raise
+        return Selection(other, {})
 
 
 def _forward(current: CorrectedFit) -> CorrectedFit:
     """Correct for the most likely hypothesis until nothing is significant, or too many were rejected."""
     while len(current.rejected) < LARGEST_REJECTED_SHARE * current.original.records:
-        extended = None if current.is_reliable else search(current)
+        extended = None if current.is_reliable else _searched(current)
         if extended is None:
-            current = current.converged()
+            if not current.fit.converged:  # the quick fit was cut short
+                current = current.fitted(current.original, current.problem, current.faults, COARSE)
             # The hypothesis of lowest cost that is confirmed.
-            ranked = hypotheses_at_solution(current, len(current.rejected)) if current.is_reliable else ()
+            ranked = current.likely_hypotheses(len(current.rejected)) if current.is_reliable else ()
             confirmed = (confirmed_by_refit(current, hypothesis) for hypothesis in ranked)
             extended = next(filter(None, confirmed), None)
         if extended is None:
@@ -137,6 +279,23 @@ def confirmed_by_refit(current: CorrectedFit, hypothesis: FaultHypothesis) -> Co
     return corrected if is_proof and corrected.fit.chi2 < limit else None
 
 
+def refitted(current: CorrectedFit, hypothesis: FaultHypothesis) -> CorrectedFit | None:
+    """The fit corrected for one more fault; None if the records contradict it, or too few could."""
+    match hypothesis:
+        case ZeroShiftHypothesis():
+            # The records after the shift must agree with the others up to a constant.
+            split = CorrectedFit.uncorrected(hypothesis.split(current.problem))
+            if not split.is_reliable or not split.problem.is_overdetermined:
+                return None
+            if not split.is_consistent and not hypothesis.corrected(current.problem).is_determined:
+                return None
+            if not hypothesis.is_constant(split.fit.linear_model):
+                return None
+        case GaugeFaultHypothesis() if not current.problem.is_overdetermined:
+            return None
+    return current.corrected_for(hypothesis)
+
+
 def _require_correctable(current: CorrectedFit, extended: CorrectedFit) -> None:
     """Raise where the additional faults cannot be corrected by leaving records out."""
     left = current.problem
@@ -147,44 +306,153 @@ def _require_correctable(current: CorrectedFit, extended: CorrectedFit) -> None:
             raise UncorrectableFaultError(fault, current, extended, left)
 
 
+def _searched(current: CorrectedFit) -> CorrectedFit | None:
+    """The first correction that settles the matter, or the best if it lowers the misfit by far."""
+    best: CorrectedFit | None = None
+    tried: set[FaultHypothesis] = set()
+    for candidate in _candidates(current):
+        if isinstance(candidate, CorrectedFit):
+            trial: CorrectedFit | None = candidate
+        elif candidate in tried:
+            continue
+        else:
+            tried.add(candidate)
+            trial = refitted(current, candidate)
+        if trial is None:
+            continue
+        if trial.settles(current):
+            return trial
+        if trial.is_better_by_far_than(current) and (best is None or trial.misfit < best.misfit):
+            best = trial
+    return best
+
+
+def _candidates(current: CorrectedFit) -> Iterator[FaultHypothesis | CorrectedFit]:
+    """What may be wrong, in the order above: hypotheses, and one fit without several records."""
+    problem, fit = current.problem, current.fit
+    at_start = LinearizedModel.at_start(problem, problem.prior.precision)
+    gauge_faults = rank_gauge_faults(at_start)
+    everywhere = LinearizedModel.at_start(problem.starting_from(fit.free), fit.active_prior)
+    elsewhere = (
+        []
+        if everywhere is None
+        else rank_hypotheses(everywhere, ChiSquareTest(everywhere.chi2, everywhere.problem.coordinates))
+    )
+    lists = (gauge_faults, current.likely_hypotheses(), elsewhere)
+    first, *others = [*zip_longest(*(one[:TRIED_FROM_EACH_LIST] for one in lists))] or [()]
+    yield from filter(None, first)
+    deleted = _greedy_deletion(current)
+    yield deleted
+    if (outliers := _outliers_at_start(problem)) is not None:
+        yield outliers
+    without = LinearizedModel.at_start(problem.starting_from(deleted.fit.free), deleted.fit.active_prior)
+    yield from rank_gauge_faults(without)[:TRIED_FROM_EACH_LIST]
+    yield from filter(None, chain(*others))
+    yield from (hypothesis for hypothesis in gauge_faults if hypothesis.point is None)
+
+
+def _greedy_deletion(start: CorrectedFit) -> CorrectedFit:
+    """Leave out the records of the most likely hypothesis, one after another with a refit in between."""
+    now, found = start, 0
+    while found < LARGEST_REJECTED_SHARE * start.problem.records and not now.is_consistent:
+        hypotheses = now.likely_hypotheses(found)
+        removing = (one for one in hypotheses if not isinstance(one, GaugeFaultHypothesis))
+        trials = (refitted(now, hypothesis) for hypothesis in removing)
+        trial = next((trial for trial in trials if trial is not None), None)
+        if trial is None:
+            break
+        now, found = trial, found + 1
+    return now
+
+
+def _outliers_at_start(problem: Problem) -> OutlierHypothesis | None:
+    """All outliers by deletion of the worst record, one after another, around the drawing."""
+    kept = problem.has_start_pose.copy()
+    while np.count_nonzero(~kept) <= LARGEST_TRIMMED_SHARE * problem.records:
+        model = LinearizedModel.at_start(problem.subset(kept), problem.prior.precision)
+        worst = None if model is None else OutlierStatistics.of(model).worst
+        if model is None or worst is None:
+            records = tuple(
+                record for record, used in zip(problem.record_ids, kept, strict=True) if not used
+            )
+            return OutlierHypothesis(gain=0.0, unknowns=0, records=records) if records else None
+        kept &= np.any(problem.labels != model.problem.labels[worst], axis=1)
+    return None
+
+
 def _readmitted(selected: CorrectedFit) -> CorrectedFit | None:
     """The fit with the rejected records that agree with it; None if no record agrees, or it is unreliable.
 
     The fewer disagree, the more significantly a record has to.
     """
-    tests = deletion_tests(selected)
+    tests = selected.deletion_tests()
     disagreeing = sum(not test.agrees() for test in tests.values())
     agreeing = {record for record, test in tests.items() if test.agrees(max(0, disagreeing - 1))}
     if not agreeing:
         return None
-    problem = selected.original
-    problem = problem.subset(problem.mask_of(agreeing.union(selected.fit.problem.record_ids)))
-    solved = problem.solve_poses(selected.fit.free)
-    if not solved.found.all():
+    used = selected.original.mask_of(agreeing.union(selected.fit.problem.record_ids))
+    problem = selected.original.subset(used).starting_from(selected.fit.free)
+    if not problem.has_start_pose.all():
         return None
-    fit = fit_regularized(problem.starting_at(selected.fit.free, solved.poses, solved.found), FINE)
     faults = tuple(
         fault.only(set(fault.records) - agreeing) if isinstance(fault, OutlierHypothesis) else fault
         for fault in selected.faults
     )
-    readmitted = CorrectedFit(selected.original, problem, fit, faults)
+    readmitted = CorrectedFit.fitted(selected.original, problem, faults, FINE)
     return readmitted if readmitted.is_reliable else None
 
 
-def _only_proven(selected: CorrectedFit) -> CorrectedFit:
+def _only_proven(selected: CorrectedFit) -> Selection:
     """The fit without only those records that are proven false by the rest, which grows meanwhile."""
-    while (proven := proven_faults(selected, deletion_tests(selected))) != selected.faults:
+    while (proven := _proven_faults(selected, tests := selected.deletion_tests())) != selected.faults:
         problem = selected.original
         for fault in proven:
             problem = fault.corrected(problem)
-        solved = problem.solve_poses(selected.fit.free)
-        if solved.found.all():
-            problem = problem.starting_at(selected.fit.free, solved.poses, solved.found)
-        selected = CorrectedFit(selected.original, problem, fit_regularized(problem), proven)
-    return selected
+        started = problem.starting_from(selected.fit.free)
+        problem = started if started.has_start_pose.all() else problem
+        selected = CorrectedFit.fitted(selected.original, problem, proven, COARSE)
+    return Selection(selected, tests)
 
 
-def _other_minimum(problem: Problem) -> Identification | None:
+def _proven_faults(
+    selected: CorrectedFit, tests: Mapping[RecordId, DeletionTest]
+) -> tuple[FaultHypothesis, ...]:
+    """The faults of a fit that the rest of its records proves; ``tests`` are those of the left-out ones."""
+    rest = selected.fit.goodness
+    can_prove = selected.fit.problem.is_overdetermined
+    records = {
+        record: tests[record].significance if can_prove or tests[record].is_certain else 0.0
+        for record in selected.rejected
+    }
+    significances = [*(shift.significance for shift in selected.zero_shifts), *records.values()]
+    required = required_significance(rest, len(significances))
+    if rest.probability > GOOD_AGREEMENT and max(significances, default=0.0) >= required:
+        return selected.faults
+    proven = {record for record, significance in records.items() if significance >= required}
+    kept: list[FaultHypothesis] = []
+    for fault in selected.faults:
+        match fault:
+            case OutlierHypothesis():
+                part = fault.only(proven)
+                kept += [part] if part.records else []
+            case ZeroShiftHypothesis() if fault.significance < required:
+                continue
+            case _:
+                kept.append(fault)
+    return tuple(kept)
+
+
+def required_significance(rest: ChiSquareTest, faults: int) -> float:
+    """How many critical values the statistic of a fault must reach beside the rest of the records.
+
+    The more ``faults`` are chosen, the less it proves that the rest agrees.
+    """
+    if rest.probability > GOOD_AGREEMENT and faults == 1:
+        return BESIDE_GOOD
+    return BESIDE_AGREEING if rest.is_explained else BESIDE_DISAGREEING
+
+
+def _other_minimum(problem: Problem) -> CorrectedFit | None:
     """A fit within the tolerances that explains all readings as they are, from another start."""
     if problem.records > FEW_RECORDS:
         return None
@@ -193,5 +461,5 @@ def _other_minimum(problem: Problem) -> Identification | None:
     for restarted in islice(restarts(problem), OTHER_STARTS):
         found = CorrectedFit.uncorrected(replace(restarted, has_start_pose=everywhere))
         if found.is_consistent and problem.prior.squared_distance(found.fit.free) <= largest:
-            return found.fit
+            return found
     return None

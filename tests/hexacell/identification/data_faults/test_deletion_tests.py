@@ -7,11 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.identification.data_faults import deletion_tests as proof
-from hexacell.identification.data_faults.deletion_tests import required_significance
+from hexacell.identification.data_faults import stepwise_selection as proof
 from hexacell.identification.data_faults.hypotheses import ALL_IN_INCHES
-from hexacell.identification.data_faults.stepwise_selection import confirmed_by_refit
-from hexacell.identification.data_faults.trial_fits import LARGEST_TRUSTED_RATIO, CorrectedFit, refitted
+from hexacell.identification.data_faults.stepwise_selection import (
+    LARGEST_TRUSTED_RATIO,
+    CorrectedFit,
+    confirmed_by_refit,
+    refitted,
+    required_significance,
+)
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.fit import fit_regularized

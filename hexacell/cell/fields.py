@@ -42,38 +42,39 @@ def broken_rule(problem: str, action: str) -> PydanticCustomError:
     return PydanticCustomError("broken_rule", "{problem}", {"problem": problem, "action": action})
 
 
-def _outside(expected: str) -> PydanticCustomError:
+def outside(expected: str) -> PydanticCustomError:
+    """The error that a validator raises where a value is not as ``expected``."""
     return PydanticCustomError("out_of_range", "must be {expected}", {"expected": expected})
 
 
 def _in_range(value: float) -> float:
     if not abs(value) <= LARGEST_NUMBER:
-        raise _outside(f"a number within +-{LARGEST_NUMBER:g}")
+        raise outside(f"a number within +-{LARGEST_NUMBER:g}")
     return value
 
 
 def _positive(value: float) -> float:
     if not SMALLEST_NUMBER <= value <= LARGEST_NUMBER:
-        raise _outside(f"more than 0: from {SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}")
+        raise outside(f"more than 0: from {SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}")
     return value
 
 
 def _not_negative(value: float) -> float:
     if value and not SMALLEST_NUMBER <= value <= LARGEST_NUMBER:
-        raise _outside(f"0 or more: 0, or from {SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}")
+        raise outside(f"0 or more: 0, or from {SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}")
     return value
 
 
 def _printable(text: str) -> str:
     if not text.isprintable():
-        raise _outside("text without control characters")
+        raise outside("text without control characters")
     return text
 
 
 def _a_password(secret: SecretStr) -> SecretStr:
     password = secret.get_secret_value()
     if len(password) > LONGEST_TEXT or not password.isprintable():
-        raise _outside(f"text of {LONGEST_TEXT} letters or fewer, without control characters")
+        raise outside(f"text of {LONGEST_TEXT} letters or fewer, without control characters")
     return secret
 
 
@@ -83,7 +84,7 @@ def _a_name(name: str) -> str:
         or name.startswith(".")
         or not all(sign.isalnum() or sign in SIGNS_OF_NAMES for sign in name)
     ):
-        raise _outside(
+        raise outside(
             "a name of letters, digits, spaces and . _ - + ( ) #, no dot first, no space at its ends"
         )
     return name
@@ -95,7 +96,7 @@ def _a_day(value: object) -> date:
     try:
         return datetime.strptime(str(value), "%Y-%m-%d").date()  # noqa: DTZ007 - a day has no zone
     except ValueError as error:
-        raise _outside('a day, as "2027-03-31"') from error
+        raise outside('a day, as "2027-03-31"') from error
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]

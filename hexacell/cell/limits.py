@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from hexacell.cell.fields import (
     InRange,
@@ -17,8 +17,10 @@ from hexacell.cell.fields import (
     Text,
     broken_rule,
     key,
+    outside,
 )
 from hexacell.kinematics.commanded_motion import RefusedCommand
+from hexacell.kinematics.parameters import LEGS
 
 SHORTEST_AXIS = 1e-6
 
@@ -42,8 +44,16 @@ def _has_direction(axis: tuple[float, float, float]) -> tuple[float, float, floa
     return axis
 
 
+def _of_all_or_of_each(given: Any) -> Any:  # noqa: ANN401 - what pydantic hands on
+    each = given if isinstance(given, list | tuple) else [given] * LEGS
+    if len(each) != LEGS or not all(type(one) in {int, float} and 0 < one <= 180 for one in each):
+        raise outside(f"an angle above 0, to 180, or a list of {LEGS} of them, one a leg")
+    return tuple(given) if isinstance(given, list) else given
+
+
 MinMax = Annotated[tuple[InRange, InRange], AfterValidator(_ordered)]
-Cone = Annotated[float, Field(gt=0, le=180, allow_inf_nan=False)]
+Cone = Annotated[float, Field(gt=0, le=180)]
+Cones = Annotated[Cone | Six[Cone], BeforeValidator(_of_all_or_of_each)]
 JointAxis = Annotated[PointInRange, AfterValidator(_has_direction)]
 
 
@@ -66,8 +76,12 @@ class AxisLimitSettings(Section):
 class PassiveJointSettings(Section):
     """How far each leg may turn in its two passive joints, from the joint's axis."""
 
-    base_cone_deg: Cone = key(180.0, "half angle of the cone at the base's end of each leg, deg; 180: any")
-    platform_cone_deg: Cone = key(180.0, "half angle of the cone at the platform, deg; 180: any")
+    base_cone_deg: Cones = key(
+        180.0, "half angle of the cone at the base's end of each leg, deg; one for all or a list; 180: any"
+    )
+    platform_cone_deg: Cones = key(
+        180.0, "half angle of the cone at the platform, deg; one for all legs or a list; 180: any"
+    )
     base_axes: Six[JointAxis] | None = key(
         None,
         "axes of the cones in the base frame of the drawing, from the platform to the base; by default "

@@ -97,7 +97,8 @@ def _joint_ranges(
 def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLimits | None:
     """The limits of passive joints and legs; None if the cell states none."""
     stated, distance = settings.limits.passive_joints, settings.limits.leg_distance_mm
-    if distance == 0.0 and min(stated.base_cone_deg, stated.platform_cone_deg) >= NO_CONE_DEG:
+    cones = [np.broadcast_to(one, LEGS) for one in (stated.base_cone_deg, stated.platform_cone_deg)]
+    if distance == 0.0 and np.min(cones) >= NO_CONE_DEG:
         return None
     mechanism = settings.mechanism
     drawing = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
@@ -105,11 +106,12 @@ def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLi
     frames = mechanism.normalize_frames(drawing)[1]
     base = _unit(legs.directions_in_carriers[0] if stated.base_axes is None else stated.base_axes)
     platform = legs.directions_in_platform[0] if stated.platform_axes is None else stated.platform_axes
+    base_cones, platform_cones = np.radians(cones)
     return LegLimits(
         base @ frames.base.T if legs.carriers is None else base,
         _unit(platform) @ frames.platform.T,
-        np.full(LEGS, np.radians(stated.base_cone_deg)),
-        np.full(LEGS, np.radians(stated.platform_cone_deg)),
+        base_cones,
+        platform_cones,
         distance,
     )
 

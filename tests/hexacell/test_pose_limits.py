@@ -64,6 +64,17 @@ def test_limits_of_the_cell_file_are_told(cell, limits, problem):
     assert any(problem in one for one in found), found
 
 
+def test_one_leg_with_a_smaller_cone_alone_refuses_a_pose(cell):
+    cones = [45.0] * 6
+    robot = with_limits(cell, passive_joints={"base_cone_deg": cones, "platform_cone_deg": 45.0})
+    assert [*broken_limits(robot, Pose(0, 0, 550, 10, -10, 20))] == []
+    cones[3] = 10.0
+    robot = with_limits(cell, passive_joints={"base_cone_deg": 45.0, "platform_cone_deg": cones})
+    [problem] = broken_limits(robot, Pose(0, 0, 550, 10, -10, 20))
+    assert problem.startswith("leg 4 is turned by ")
+    assert problem.endswith(" deg in its platform joint, beyond 10")
+
+
 def test_reach_is_the_controllers_not_the_drawings(cell):
     robot = robot_of(cell)
     short = hexaglide_geometry(robot.drawing["S"], robot.drawing["B"], np.full(6, 450.0))

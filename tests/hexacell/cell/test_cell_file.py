@@ -182,6 +182,10 @@ MISTAKES = [
     ('name = "simulated-hexaglide"', f'name = "{5000 * "a"}"', "but must be text of 64 letters or fewer"),
     ('name = "z"', 'name = "z\\n"', "but must be a name of letters, digits"),
     ('config = "', 'config = "a\\u0000', "but must be text without control characters"),
+    *(
+        ("base_cone_deg = 45.0", f"base_cone_deg = {cones}", "'base_cone_deg' .* one a leg")
+        for cones in ("0", "180.1", "true", '"wide"', "[45.0]", "[1, 2, 3, 4, 5, 0]", "[[1]]", "{}")
+    ),
 ]
 
 

@@ -20,6 +20,7 @@ texts = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=
 printable = st.text(st.characters(categories=["L", "N", "P", "S"]), min_size=1, max_size=12)
 points = st.tuples(numbers, numbers, numbers)
 six = st.tuples(*[numbers] * 6)
+cones = st.floats(1e-9, 180) | st.tuples(*[st.floats(1e-9, 180)] * 6)
 signs = st.sampled_from([1, -1])
 scalars = st.one_of(st.booleans(), st.integers(), finite, texts)
 anything = st.recursive(
@@ -76,7 +77,11 @@ cells = st.builds(
         offset_mm=six,
         serial_numbers=st.none() | st.tuples(*[st.integers(0, 2**32 - 1)] * 6),
     ),
-    limits=st.builds(limits.LimitSettings, tilt_deg=st.floats(1e-9, 80)),
+    limits=st.builds(
+        limits.LimitSettings,
+        tilt_deg=st.floats(1e-9, 80),
+        passive_joints=st.builds(limits.PassiveJointSettings, base_cone_deg=cones, platform_cone_deg=cones),
+    ),
     identification=st.builds(
         measuring.IdentificationSettings,
         points=st.lists(points, min_size=2, max_size=4).map(tuple),

@@ -62,8 +62,9 @@ docs: venv
 	$(RUN) sphinx --fail-on-warning --keep-going --quiet -c docs . build/site $(ARGS)
 	@echo "hexacell: the site is build/site/index.html"
 
-# The pictures of README and docs, as docs/figures.md has them.
+# The pictures of README and docs; CONTRIBUTING.md says which is made by what.
 figures: venv
+	$(RUN) docs.draw
 	HEXACELL_UPDATE_SNAPSHOTS=1 $(RUN) pytest -q tests/screen/test_snapshots.py
 	cp tests/screen/snapshots/measure-140x40-dark.svg docs/screen-measure.svg
 	cp tests/screen/snapshots/review-140x40-light.svg docs/screen-review.svg

@@ -8,6 +8,8 @@ draws by itself: no script and no font has to be fetched or bundled.
 from __future__ import annotations
 
 import re
+import sys
+from pathlib import Path
 
 from docutils import nodes
 from docutils.utils.math import latex2mathml
@@ -17,12 +19,14 @@ from sphinx.writers.html5 import HTML5Translator
 
 from hexacell import __version__
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 project = "hexacell"
 version = release = __version__
 copyright = "2026, the hexacell project"  # noqa: A001 - Sphinx's name for it
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-include_patterns = ["README.md", "CHANGELOG.md", "docs/*.md"]
+include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md"]
 exclude_patterns = [".*", "build", "configs", "dist", "drivers", "hexacell", "procedures", "runs", "tests"]
 root_doc = "docs/index"
 
@@ -41,20 +45,18 @@ nitpick_ignore_regex = [  # only what a page documents can be linked to
     ("py:.*", r".*\.Identity_co"),
 ]
 
-html_theme = "alabaster"
+html_theme = "furo"
+html_title = "hexacell"
 html_theme_options = {
-    "description": "A 6-DOF parallel robot made accurate with three dial gauges and a ball",
-    "page_width": "74rem",
-    "body_max_width": "none",
-    "sidebar_width": "17rem",
-    "fixed_sidebar": True,
-    "font_family": "system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif",
-    "head_font_family": "system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif",
-    "font_size": "16px",
-    "sidebar_link_underscore": "transparent",
-    "link": "#0b5a8a",
+    "sidebar_hide_name": False,
+    "light_css_variables": {
+        "color-brand-primary": "#0b5a8a",
+        "color-brand-content": "#0b5a8a",
+        "font-stack": "system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif",
+        "font-stack--monospace": "'DejaVu Sans Mono', 'Noto Sans Mono', monospace",
+    },
+    "dark_css_variables": {"color-brand-primary": "#7cc4f0", "color-brand-content": "#7cc4f0"},
 }
-html_sidebars = {"**": ["about.html", "searchfield.html", "navigation.html"]}
 html_static_path = ["_site/static"]
 html_extra_path = ["_site/root"]
 html_css_files = ["site.css"]
@@ -95,7 +97,16 @@ def pages_of_sections(_app: Sphinx, name: str, source: list[str]) -> None:
         source[0] += "\n".join(["", "```{toctree}", ":hidden:", caption, "", *pages, "```", ""])
 
 
+def generated_parts(_app: Sphinx, _name: str, source: list[str]) -> None:
+    """Put the parts of a page that are made from the program in their places."""
+    if "<!-- made from the program" in source[0]:
+        from docs.generated import page_with_generated_parts  # noqa: PLC0415 - only for pages that have any
+
+        source[0] = page_with_generated_parts(source[0])
+
+
 def setup(app: Sphinx) -> None:
-    """Add formulas and the menu."""
+    """Add formulas, the menu and the generated parts."""
     app.add_html_math_renderer("mathml", (formula_in_text, None), (formula_block, None))
     app.connect("source-read", pages_of_sections)
+    app.connect("source-read", generated_parts)

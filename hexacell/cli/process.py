@@ -1,6 +1,6 @@
 """What every command needs of its process: signals, the platform, and reports of faults of the program.
 
-SIGTERM and SIGHUP do what Ctrl-C does. ``docs/platforms.md`` says what is tested where. Nothing
+SIGTERM and SIGHUP do what Ctrl-C does. ``docs/howto-host.md`` says what is tested where. Nothing
 slow is imported.
 """
 

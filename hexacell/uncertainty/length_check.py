@@ -8,7 +8,7 @@ with P_r by the forward kinematics of the judged geometry at the joint variables
 z_1|`` is longer than L shows the scale of the encoders. All errors, propagated to first order, give the
 covariance of all records, and generalized least squares the places z. The weighted residuals have a
 chi-square distribution with 3 n - 6 degrees of freedom: a fixture that moved, or gauges that were zeroed
-in between, do not agree with it. ``docs/method.md`` (Length check) has more.
+in between, do not agree with it. ``docs/uncertainty.md`` (Length check) has more.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The decision on a stated error: a rule with a guard band w (``docs/method.md``, The verdict).
+"""The decision on a stated error: a rule with a guard band w (``docs/verdict.md``).
 
     value + w <= limit           pass
     value <= limit < value + w   conditional pass

@@ -3,7 +3,7 @@
 Three things that are kept apart. *Evidence*: tests of the model, each at a probability of 0.1 % to fail
 although the model is right. *Accuracy*: the error that the written geometry makes at the task poses,
 by an estimate that contains the held-out records as well, with its expanded uncertainty. *Decision*: the
-verdict on that error under the limit, which needs the evidence. See ``docs/method.md``.
+verdict on that error under the limit, which needs the evidence. See ``docs/verdict.md``.
 """
 
 from __future__ import annotations

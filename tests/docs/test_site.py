@@ -81,7 +81,8 @@ def broken(pages: dict[Path, Page]) -> Iterator[str]:
 
 def test_every_page_is_made(pages, site):
     made = {path.relative_to(site).as_posix() for path in pages}
-    sources = {"README.md", "CHANGELOG.md", *(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))}
+    pages_of_docs = (f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))
+    sources = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", *pages_of_docs}
     assert {source.replace(".md", ".html") for source in sources} <= made
     assert "index.html" in made
 

@@ -1,0 +1,1 @@
+"""The site: its configuration, and what of it is made from the program."""

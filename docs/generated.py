@@ -1,0 +1,453 @@
+"""Parts of the reference that are made from the program while the site is built.
+
+A page has a line ``<!-- made from the program: NAME -->``; :func:`page_with_generated_parts` puts the part
+of that name there, as Markdown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, is_dataclass
+from datetime import datetime
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from pydantic import BaseModel
+
+from hexacell.cell.loader import schema
+from hexacell.cli.parser import make_parser
+from procedures.steps.events import Event
+
+ROOT = Path(__file__).parents[1]
+MARK = re.compile(r"^<!-- made from the program: ([a-z -]+) -->$", flags=re.MULTILINE)
+GAP = "…"
+"""Stands for what a message says of the case at hand: a name, a number."""
+
+
+def page_with_generated_parts(page: str) -> str:
+    """The Markdown of a page, with the parts that are made from the program in their places."""
+    return MARK.sub(lambda mark: PARTS[mark[1]](page), page)
+
+
+def escaped(text: str) -> str:
+    """Text for a cell of a table."""
+    return re.sub(r"([|<>*_`\[\]\\])", r"\\\1", text.replace("\n", " "))
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table in Markdown."""
+    head = list(head)
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+# Commands
+
+
+def commands(_page: str = "") -> str:
+    """Every command with its arguments, as its ``--help`` has them."""
+    return "\n".join(_command_sections(make_parser()))
+
+
+def _command_sections(parser: argparse.ArgumentParser) -> Iterator[str]:
+    for action in parser._actions:
+        if not isinstance(action, argparse._SubParsersAction):
+            continue
+        for command in action.choices.values():
+            yield f"## `{command.prog}`\n\n{command.description}\n"
+            rows = [_argument_row(one) for one in command._actions if _is_described(one)]
+            if rows:
+                yield table(["argument", "meaning"], rows)
+            yield from _command_sections(command)
+
+
+def _is_described(action: argparse.Action) -> bool:
+    everywhere = {"help", "log_file", "verbose"}
+    is_special = isinstance(action, argparse._SubParsersAction)
+    return not is_special and action.dest not in everywhere and action.help != argparse.SUPPRESS
+
+
+def _argument_row(action: argparse.Action) -> tuple[str, str]:
+    choices = action.choices
+    value = action.metavar or (f"{{{','.join(map(str, choices))}}}" if choices else action.dest.upper())
+    words = " ".join(value) if isinstance(value, tuple) else value
+    if action.nargs == 0:
+        words = ""
+    elif action.nargs == "?":
+        words = f"[{words}]"
+    name = " ".join(filter(None, [*action.option_strings[:1], words]))
+    text = (action.help or "") % {"default": action.default}
+    return f"`{name}`".replace("|", r"\|"), escaped(text)
+
+
+# Keys of the cell file
+
+
+def cell_keys(_page: str = "") -> str:
+    """Every section of a cell file with its keys, from the JSON Schema."""
+    return "\n".join(_cell_sections())
+
+
+def _cell_sections() -> Iterator[str]:
+    document = schema()
+    definitions = document["$defs"]
+    waiting = [("", document)]
+    while waiting:
+        name, section = waiting.pop(0)
+        keys, parts = [], []
+        for key, value in section["properties"].items():
+            part, is_list = _section_in(value, definitions)
+            if part is None:
+                is_required = key in section.get("required", ())
+                keys.append((key, value, is_required))
+            else:
+                path = f"{name}.{key}" if name else key
+                parts.append((f"[{path}]" if is_list else path, part))
+        yield f"## {f'`[{name}]`' if name else 'At the top of the file'}\n"
+        yield f"{section.get('description', '')}\n"
+        if keys:
+            rows = [
+                (f"`{key}`", _type(value, definitions), _default(value, is_required), _meaning(value))
+                for key, value, is_required in keys
+            ]
+            yield table(["key", "value", "default", "meaning"], rows)
+        waiting = parts + waiting
+
+
+def _section_in(value: dict[str, Any], definitions: dict[str, Any]) -> tuple[dict[str, Any] | None, bool]:
+    """The section that a key holds, and whether there may be several; None for a plain value."""
+    options = [value, *value.get("anyOf", ())]
+    is_list = any(option.get("type") == "array" for option in options)
+    for option in options:
+        items = option.get("items") or next(iter(option.get("prefixItems", ())), None) or option
+        reference = items.get("$ref", "").removeprefix("#/$defs/")
+        if "properties" in definitions.get(reference, ()):
+            return definitions[reference], is_list
+    return None, False
+
+
+def _type(value: dict[str, Any], definitions: dict[str, Any]) -> str:  # noqa: PLR0911 - a case a kind of type
+    if "$ref" in value:
+        return _type(definitions[value["$ref"].removeprefix("#/$defs/")], definitions)
+    if "anyOf" in value:
+        options = [one for one in value["anyOf"] if one.get("type") != "null"]
+        return " or ".join(dict.fromkeys(_type(one, definitions) for one in options))
+    if "enum" in value:
+        return " or ".join(f"`{one}`" for one in value["enum"])
+    if "const" in value:
+        return f"`{value['const']}`"
+    match value.get("type"):
+        case "array":
+            items = value.get("items") or next(iter(value.get("prefixItems", ({},))))
+            count = value.get("minItems") if value.get("minItems") == value.get("maxItems") else None
+            return f"{count or 'list of'} {'x ' if count else ''}{_type(items, definitions)}"
+        case "number" | "integer" as kind:
+            least, most = value.get("minimum"), value.get("maximum")
+            words = "whole number" if kind == "integer" else "number"
+            if least is not None and most is not None and abs(most) < _UNBOUNDED:
+                return f"{words}, {least:g} to {most:g}"
+            return f"{words} above 0" if least is not None and 0 < least < 1 else words
+        case "boolean":
+            return "true or false"
+        case "object":
+            return "table"
+        case _:
+            return "text"
+
+
+_UNBOUNDED = 1e5
+
+
+def _default(value: dict[str, Any], is_required: bool) -> str:
+    if is_required:
+        return "**required**"
+    default = value.get("default")
+    if default is None or default in ([], {}, ""):
+        return ""
+    if isinstance(default, bool):
+        return f"`{str(default).lower()}`"
+    shown = f"{default:g}" if isinstance(default, float) else str(default).replace("'", '"')
+    return f"`{shown}`"
+
+
+def _meaning(value: dict[str, Any]) -> str:
+    return escaped(value.get("description", ""))
+
+
+# Messages
+
+
+@dataclass(frozen=True)
+class Message:
+    """A message for people: what is wrong, and what to do, as far as the program's text says it."""
+
+    kind: str
+    problem: str
+    action: str
+
+
+EXIT_CODES = {
+    "HexacellError": "The command, a file or the plan",
+    "LimitError": "Limits and data",
+    "ConvergenceError": "Limits and data",
+    "IdentifiabilityError": "Limits and data",
+    "DeviceError": "Devices and links",
+    "AnswerNeeded": "A person is needed",
+    "CellBusy": "The cell is in use, or it is not the time",
+    "Interruption": "The cell is in use, or it is not the time",
+    "OutOfTime": "The cell is in use, or it is not the time",
+    "WriteBackUndone": "The write was undone",
+    "Trip": "Guards that stop the robot",
+    "broken_rule": "Keys of the cell file",
+}
+"""The headings, by the nearest base class of an error."""
+
+
+def messages(page: str) -> str:
+    """Every message that the program raises, under what it is about, with what to do.
+
+    ``page`` has a table with what to do about messages that do not say it themselves.
+    """
+    advice = dict(re.findall(r"^\| (.+?) \| (.+?) \|$", page, flags=re.MULTILINE))
+    found: dict[str, set[tuple[str, str]]] = {}
+    for message in raised_messages():
+        problem = escaped(message.problem)
+        action = escaped(message.action) or advice.get(problem, "")
+        found.setdefault(message.kind, set()).add((problem, action))
+    order = list(dict.fromkeys(EXIT_CODES.values()))
+    sections = []
+    for heading in sorted(found, key=order.index):
+        rows = sorted(found[heading], key=lambda row: row[0].lstrip(f"{GAP} '\"").lower())
+        sections.append(f"### {heading}\n\n{table(['message', 'what to do'], rows)}")
+    return "\n".join(sections)
+
+
+@cache
+def raised_messages() -> tuple[Message, ...]:
+    """The messages of all errors, rules of the cell file and guards, as the source has them."""
+    trees = [
+        ast.parse(path.read_text(encoding="utf-8"))
+        for package in ("hexacell", "drivers", "procedures")
+        for path in sorted((ROOT / package).rglob("*.py"))
+        if not {"simulated", "study", "conformance"} & set(path.parts)
+    ]
+    bases = {
+        node.name: [base.id for base in node.bases if isinstance(base, ast.Name)]
+        for tree in trees
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef)
+    }
+    found = [message for tree in trees for message in _messages_in(tree, bases)]
+    return tuple(dict.fromkeys(found))
+
+
+def _messages_in(tree: ast.Module, bases: dict[str, list[str]]) -> Iterator[Message]:
+    for scope in ast.walk(tree):
+        if not isinstance(scope, ast.FunctionDef | ast.AsyncFunctionDef | ast.Module):
+            continue
+        names = _assigned_texts(scope)
+        for node in _within(scope):
+            if isinstance(node, ast.Call) and (kind := _heading(_called(node), bases)):
+                yield from _message(node, kind, names)
+
+
+def _within(scope: ast.AST) -> Iterator[ast.AST]:
+    """The nodes of a function without those of the functions in it."""
+    for node in ast.iter_child_nodes(scope):
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield node
+            yield from _within(node)
+
+
+def _assigned_texts(scope: ast.AST) -> dict[str, list[str]]:
+    names: dict[str, list[str]] = {}
+    for node in _within(scope):
+        targets: list[ast.expr] = []
+        if isinstance(node, ast.Assign):
+            targets = node.targets
+        elif isinstance(node, ast.AnnAssign | ast.NamedExpr):
+            targets = [node.target]
+        for target in targets:
+            if not isinstance(node, ast.Assign | ast.AnnAssign | ast.NamedExpr) or node.value is None:
+                continue
+            if isinstance(target, ast.Name):
+                names.setdefault(target.id, []).extend(_texts(node.value, {}))
+    return names
+
+
+def _called(node: ast.Call) -> str:
+    return node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
+
+
+def _heading(name: str, bases: dict[str, list[str]]) -> str | None:
+    """Under which heading a class or function that makes messages belongs; None for all others."""
+    if name in {"SeveralErrors", "GuardTripped", "RobotNotStopped"}:
+        return None
+    seen: list[str] = []
+    waiting = [name]
+    while waiting:
+        seen.append(one := waiting.pop(0))
+        if one in EXIT_CODES:
+            return EXIT_CODES[one]
+        waiting += [base for base in bases.get(one, []) if base not in seen]
+    return None
+
+
+def _message(node: ast.Call, kind: str, names: dict[str, list[str]]) -> Iterator[Message]:
+    positional = list(node.args)
+    actions = [keyword.value for keyword in node.keywords if keyword.arg == "action"]
+    match _called(node):
+        case "broken_rule":
+            actions += positional[1:2]
+        case "Trip":
+            actions += positional[3:4]
+            positional = positional[2:3]
+        case "CommandRefused" | "MoveRefused" | "PoseRefused":
+            return  # its words are the controller's own
+    problems = _texts(positional[0], names) if positional else []
+    for problem in problems:
+        if re.search(r"[a-z]{3}", problem):
+            action = " / ".join(_texts(actions[0], names)) if actions else ""
+            yield Message(kind, problem, action if action.strip(f"{GAP} ") else "")
+
+
+def _texts(node: ast.expr, names: dict[str, list[str]]) -> list[str]:
+    """The texts that an expression may be, with a gap for what is only known while it runs."""
+    match node:
+        case ast.Constant(value=str(text)):
+            return [text]
+        case ast.IfExp():
+            return _texts(node.body, names) + _texts(node.orelse, names)
+        case ast.JoinedStr():
+            text = ""
+            for part in node.values:
+                text += part.value if isinstance(part, ast.Constant) else GAP
+            return [text]
+        case ast.BinOp(op=ast.Add()):
+            lefts, rights = _texts(node.left, names), _texts(node.right, names)
+            return [left + right for left in lefts for right in rights]
+        case ast.Name() if names.get(node.id):
+            return names[node.id]
+        case _:
+            return [GAP]
+
+
+# The journal
+
+
+def journal(page: str) -> str:
+    """Every event of a journal and every part of one, with its fields.
+
+    ``page`` has a table of what the fields mean, by name, or by event and name where that differs.
+    """
+    meanings = field_meanings(page)
+    sections = []
+    for heading, model in journal_models().items():
+        rows = [
+            (f"`{name}`", words, *meanings[field_key(heading, name, meanings)])
+            for name, words in fields_of_model(model)
+        ]
+        text = re.sub(r":\w+:`[~.]*([^`]+)`", r"`\1`", " ".join((model.__doc__ or "").split()))
+        sections.append(f"### {heading}\n\n{text.replace('``', '`')}\n")
+        if rows:
+            sections.append(table(["field", "type", "unit", "meaning"], rows))
+    return "\n".join(sections)
+
+
+def field_meanings(page: str) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each field in the table of a page."""
+    rows = re.findall(r"^\| `([\w .]+)` \| ([^|]*) \| ([^|]*) \|$", page, flags=re.MULTILINE)
+    return {name: (unit.strip(), meaning.strip()) for name, unit, meaning in rows}
+
+
+def field_key(heading: str, name: str, meanings: dict[str, tuple[str, str]]) -> str:
+    """Under which name the table has the field of an event: a name of its own, or the common one."""
+    own = f"{heading}.{name}"
+    return own if own in meanings else name
+
+
+def journal_models() -> dict[str, type[Any]]:
+    """Every event by its kind, then every model within them by its kind or name."""
+    events = get_args(get_args(Event)[0])
+    found: dict[str, type[Any]] = {_heading_of(event): event for event in events}
+    for event in events:
+        found |= {_heading_of(part): part for part in _parts_of(event)}
+    return found
+
+
+def fields_of_model(model: type[Any]) -> list[tuple[str, str]]:
+    """Name and type of every field; ``kind`` says which event it is and is left out."""
+    kind = _kind_of(model)
+    return [(name, _words(one)) for name, one in _annotations(model).items() if name != "kind" or not kind]
+
+
+def _annotations(model: type[Any]) -> dict[str, Any]:
+    if is_dataclass(model):
+        return get_type_hints(model)
+    return {name: field.annotation for name, field in model.model_fields.items()}
+
+
+def _is_model(annotation: object) -> bool:
+    return isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation))
+
+
+def _parts_of(model: type[Any]) -> Iterator[type[Any]]:
+    for annotation in _annotations(model).values():
+        for part in _models_in(annotation):
+            yield part
+            yield from _parts_of(part)
+
+
+def _models_in(annotation: Any) -> Iterator[type[Any]]:  # noqa: ANN401 - a type of any form
+    if _is_model(annotation):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from _models_in(argument)
+
+
+def _kind_of(model: type[Any]) -> str | None:
+    """The word that says which event it is, where it is one of several."""
+    kind = None if is_dataclass(model) else model.model_fields.get("kind")
+    return kind.default if kind is not None and type(kind.default) is str else None
+
+
+def _heading_of(model: type[Any]) -> str:
+    return _kind_of(model) or model.__name__
+
+
+def _words(annotation: Any) -> str:  # noqa: ANN401, PLR0911 - a case a kind of type
+    """A type in words."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _words(arguments[0])
+    if origin in {Union, UnionType}:
+        options = [_words(one) for one in arguments if one is not NoneType]
+        return " or ".join([*options, *(["null"] if NoneType in arguments else [])])
+    if origin is Literal:
+        return " or ".join(f"`{one}`" for one in arguments)
+    if origin is tuple and not arguments:
+        return "an empty list"
+    if origin is tuple and arguments[-1] is Ellipsis:
+        return f"list of {_words(arguments[0])}"
+    if origin is tuple:
+        return f"{len(arguments)} x {_words(arguments[0])}"
+    if isinstance(annotation, type) and issubclass(annotation, Enum):
+        return " or ".join(f"`{one.value}`" for one in annotation)
+    if _is_model(annotation):
+        return _heading_of(annotation)
+    plain = {float: "number", int: "whole number", str: "text", bool: "true or false", datetime: "time"}
+    return plain.get(annotation, "object")
+
+
+PARTS: dict[str, Callable[[str], str]] = {
+    "commands": commands,
+    "cell keys": cell_keys,
+    "messages": messages,
+    "journal": journal,
+}

@@ -1,0 +1,56 @@
+"""Parts of the reference that are made from the program: no command, key, message or field is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from docs import draw, generated
+from hexacell.cell.loader import schema
+from hexacell.cli.parser import make_parser
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_every_command_has_its_section():
+    made = generated.commands()
+    [names] = [action.choices for action in make_parser()._actions if isinstance(action.choices, dict)]
+    assert [name for name in names if f"## `hexacell {name}`\n" not in made] == []
+    assert "| `--resume [RUN]` |" in made
+
+
+def test_every_key_of_the_cell_file_is_there():
+    made = generated.cell_keys()
+    definitions = schema()["$defs"].values()
+    missing = [
+        key
+        for section in definitions
+        for key in section.get("properties", ())
+        if f"`{key}`" not in made and f"{key}]" not in made
+    ]
+    assert missing == []
+    assert "## `[[gauges]]`" in made
+    assert "| `sign` | `1` or `-1` | `1` |" in made
+
+
+def test_every_message_says_what_to_do():
+    made = generated.messages((DOCS / "messages.md").read_text(encoding="utf-8"))
+    assert [line for line in made.splitlines() if line.endswith("|  |")] == []
+    assert len(generated.raised_messages()) > 400
+
+
+def test_messages_have_their_own_advice_and_gaps_for_what_differs():
+    made = generated.messages("")
+    assert "Free some space, then resume" in made
+    assert "| the three gauges must measure x, y and z, one each | Correct their axis |" in made
+
+
+@pytest.mark.parametrize("page", ["commands.md", "cell-file.md", "messages.md", "journal.md"])
+def test_each_page_gets_its_part(page):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    assert len(generated.page_with_generated_parts(text)) > len(text) + 8000
+
+
+def test_the_drawing_is_the_one_that_is_made():
+    assert draw.picture() == (DOCS / "gauges.svg").read_text(encoding="utf-8")

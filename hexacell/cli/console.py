@@ -36,6 +36,11 @@ class Console:
         if self.wants_json:
             _write(sys.stdout, json.dumps(document) + "\n")
 
+    def show(self, document: dict[str, Any], text: str) -> None:
+        """The result of the command: its document, and the same as text."""
+        self.document(document)
+        self.print(text)
+
 
 def _write(stream: TextIO | None, text: str) -> None:
     if stream is None:  # closed before the program began

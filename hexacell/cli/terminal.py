@@ -86,13 +86,10 @@ class SignalCommands:
         elif self._stop_requested and number is signal.SIGINT:
             self.queue.put(Abort("interrupted"))
         else:
-            self._stop(number)
-
-    def _stop(self, number: signal.Signals) -> None:
-        self._stop_requested = True
-        self.queue.put(Stop("interrupted"))
-        if number is signal.SIGINT:
-            self._console.print("Stopping after this step; Ctrl-C again stops motion at once.")
+            self._stop_requested = True
+            self.queue.put(Stop("interrupted"))
+            if number is signal.SIGINT:
+                self._console.print("Stopping after this step; Ctrl-C again stops motion at once.")
 
 
 class KeyboardCommands:

@@ -133,16 +133,15 @@ def _cannot_open(path: Path, error: OSError) -> FileError:
 
 
 def _acquire(descriptor: int, config: Path) -> None:
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        raise CellBusy(
-            f"the cell is in use by {_holder(descriptor)}",
-            subject=config,
-            action="Wait until that has ended, or stop it",
-        ) from error
-    except OSError as error:
-        raise atomic_files.os_error_to_file_error("the cell cannot be locked", config, error) from error
+    with atomic_files.os_errors("the cell cannot be locked", config):
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise CellBusy(
+                f"the cell is in use by {_holder(descriptor)}",
+                subject=config,
+                action="Wait until that has ended, or stop it",
+            ) from error
 
 
 def _note(descriptor: int, text: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -93,20 +94,17 @@ def add_resume(parser: argparse.ArgumentParser, what: str) -> None:
     )
 
 
-def not_negative(text: str) -> int:
-    """A number that is not negative; raises ``ValueError``, of which argparse makes a message."""
-    number = int(text)
-    if number < 0:
-        raise ValueError
-    return number
+def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
+    """The type of an argument: a whole number from ``least`` to ``most``, if there is a largest one."""
 
+    def read(text: str) -> int:
+        number = int(text)
+        if number < least or (most is not None and number > most):
+            raise ValueError  # argparse makes a message of it
+        return number
 
-def positive(text: str) -> int:
-    """A number above zero; raises ``ValueError``, of which argparse makes a message."""
-    number = int(text)
-    if number < 1:
-        raise ValueError
-    return number
+    read.__name__ = f"number from {least}{'' if most is None else f' to {most}'}"
+    return read
 
 
 LONGEST_S = 86_400.0
@@ -118,11 +116,3 @@ def bounded_seconds(text: str) -> float:
     if not 0.0 < seconds <= LONGEST_S:
         raise ValueError(text)
     return seconds
-
-
-def node_id(text: str) -> int:
-    """A CANopen node id, from 1 to 127; raises ``ValueError``."""
-    number = int(text)
-    if not 1 <= number <= LARGEST_NODE_ID:
-        raise ValueError
-    return number

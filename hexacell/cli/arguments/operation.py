@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hexacell.cli.arguments.commands import (
+    LARGEST_NODE_ID,
     Parser,
     add_archive,
     add_cell,
@@ -15,8 +16,7 @@ from hexacell.cli.arguments.commands import (
     add_parser,
     add_run,
     bounded_seconds,
-    node_id,
-    not_negative,
+    whole_number,
 )
 
 SHELLS = ("bash", "zsh", "fish")
@@ -67,7 +67,7 @@ def _devices(commands: Any) -> None:  # noqa: ANN401
     )
     parser.add_argument(
         "--set-node",
-        type=node_id,
+        type=whole_number(1, LARGEST_NODE_ID),
         metavar="ID",
         help="give the only device on a CAN bus this node id (LSS), after a question",
     )
@@ -109,7 +109,7 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
         )
     parser.add_argument(
         "--retries",
-        type=not_negative,
+        type=whole_number(0),
         default=3,
         metavar="N",
         help="how often, where a device or the lock is not there (default: %(default)s)",

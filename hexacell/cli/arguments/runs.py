@@ -13,8 +13,7 @@ from hexacell.cli.arguments.commands import (
     add_parser,
     add_resume,
     add_run,
-    not_negative,
-    positive,
+    whole_number,
 )
 
 
@@ -128,7 +127,7 @@ def _next(commands: Any) -> None:  # noqa: ANN401
     add_file(parser, "--measurements", "the records so far (CSV)", is_required=True)
     parser.add_argument(
         "--refused",
-        type=not_negative,
+        type=whole_number(0),
         default=0,
         metavar="N",
         help="how many poses at this point could not be measured; proposes another",
@@ -196,11 +195,11 @@ def _add_study(studies: Any, name: str, summary: str, drawn: str) -> None:  # no
     parser = add_command(studies, name, summary, target="study.main")
     parser.set_defaults(study=name)
     parser.add_argument(
-        "--draws", type=positive, default=20, metavar="N", help=f"{drawn} (default: %(default)s)"
+        "--draws", type=whole_number(1), default=20, metavar="N", help=f"{drawn} (default: %(default)s)"
     )
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument(
-        "--processes", type=positive, metavar="N", help="at a time (default: one for each processor)"
+        "--processes", type=whole_number(1), metavar="N", help="at a time (default: one for each processor)"
     )
     workers.add_argument(
         "--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT, instead of processes"

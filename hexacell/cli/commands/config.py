@@ -30,8 +30,7 @@ def apply_run(options: argparse.Namespace) -> ExitCode:
     operator = TerminalOperator(console) if is_interactive() else UnattendedOperator()
     with _edits_shown(console):
         applied = asyncio.run(apply_proposal(proposal, operator, reason=options.reason))
-    console.document(applied_document(applied))
-    console.print(applied_text(applied))
+    console.show(applied_document(applied), applied_text(applied))
     return ExitCode.DONE
 
 
@@ -40,8 +39,7 @@ def rollback_config(options: argparse.Namespace) -> ExitCode:
     console = Console(options.json)
     with _edits_shown(console):
         done = roll_back_config(cell_at(options.cell, console), options.to, reason=options.reason)
-    console.document(rollback_document(done))
-    console.print(rollback_text(done))
+    console.show(rollback_document(done), rollback_text(done))
     return ExitCode.DONE
 
 

@@ -42,8 +42,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     cell = cell_at(options.cell, console)
     if options.compare is not None:
         compared = compare_runs(cell, *options.compare)
-        console.document(comparison_document(*compared))
-        console.print(comparison_text(*compared))
+        console.show(comparison_document(*compared), comparison_text(*compared))
     elif options.show is not None:
         _show(find_run(cell, options.show), console)
     elif options.keep is not None:
@@ -53,12 +52,13 @@ def main(options: argparse.Namespace) -> ExitCode:
     elif options.drift:
         index = _index(cell, options, console)
         found, watched = parameter_trends(cell, past_runs(cell, index), index), drift_history(cell, index)
-        console.document(drift_document(found, watched))
-        console.print("\n".join(filter(None, [watch_text(watched), drift_text(found)])))
+        console.show(
+            drift_document(found, watched),
+            "\n".join(filter(None, [watch_text(watched), drift_text(found)])),
+        )
     else:
         runs = past_runs(cell, _index(cell, options, console))
-        console.document(history_document(runs))
-        console.print(history_text(runs))
+        console.show(history_document(runs), history_text(runs))
     return ExitCode.DONE
 
 
@@ -75,8 +75,7 @@ def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
     if options.archive is None or is_one_cells:
         raise UsageError("no cell is named", action="Name a cell file, or --archive URL for all")
     runs = fleet_runs(archive_url(options.archive))
-    console.document(fleet_history_document(runs))
-    console.print(fleet_history_text(runs))
+    console.show(fleet_history_document(runs), fleet_history_text(runs))
     return ExitCode.DONE
 
 
@@ -87,8 +86,10 @@ def _keep(cell: Cell, options: argparse.Namespace, console: Console) -> None:
     found = retention(cell, options.keep, _index(cell, options, console))
     if options.delete:
         delete_runs(cell, found.leaving)
-    console.document(retention_document(found, is_deleted=options.delete))
-    console.print(retention_text(found, is_deleted=options.delete))
+    console.show(
+        retention_document(found, is_deleted=options.delete),
+        retention_text(found, is_deleted=options.delete),
+    )
 
 
 def _changes(cell: Cell, console: Console) -> None:
@@ -96,13 +97,11 @@ def _changes(cell: Cell, console: Console) -> None:
     found = config_history(cell)
     for line in found.damaged:
         console.warn(f"{found.path}, line {line}: this record is torn, damaged or newer, and left out")
-    console.document(config_history_document(found))
-    console.print(config_history_text(found))
+    console.show(config_history_document(found), config_history_text(found))
 
 
 def _show(run: RunFolder, console: Console) -> None:
     entries = read_entries(run.journal)
     if not entries:
         raise UsageError("nothing happened in this run", subject=run.path, action="Name another")
-    console.document(story_document(entries))
-    console.print(story_text(entries))
+    console.show(story_document(entries), story_text(entries))

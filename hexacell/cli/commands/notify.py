@@ -18,13 +18,11 @@ def main(options: argparse.Namespace) -> ExitCode:
     cell = cell_at(options.cell, console)
     if not (options.test or options.send):
         settings, waiting = cell.settings.notifications, waiting_notices(cell)
-        console.document(notifications_document(settings, waiting))
-        console.print(notifications_text(settings, waiting))
+        console.show(notifications_document(settings, waiting), notifications_text(settings, waiting))
         return ExitCode.DONE
     if options.test and not cell.settings.notifications:
         action = "Write [[notifications]]"
         raise UsageError("nobody is notified of its runs", subject=cell.path, action=action)
     outcome = notify_test(cell, notice_of_test(cell)) if options.test else send_waiting(cell)
-    console.document(notify_document(outcome))
-    console.print(notify_text(outcome))
+    console.show(notify_document(outcome), notify_text(outcome))
     return ExitCode.DONE if outcome.are_all_sent else ExitCode.HARDWARE

@@ -42,8 +42,7 @@ def main(options: argparse.Namespace) -> ExitCode:
         console.print(wrapped(excluded))
     if mode is Mode.QUICK:
         tried = try_quick_level(new_calibration(cell, mode).at_start.quick)
-        console.document(quick_preflight_document(devices, tried))
-        console.print(wrapped(quick_trial_text(tried)))
+        console.show(quick_preflight_document(devices, tried), wrapped(quick_trial_text(tried)))
         return ExitCode.DONE
     trial = try_plan(cell)
     console.document(preflight_document(devices, trial))

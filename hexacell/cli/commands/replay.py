@@ -20,13 +20,14 @@ def main(options: argparse.Namespace) -> ExitCode:
     console = Console(options.json)
     if options.export is not None:
         names = export_run(options.run, options.export)
-        console.document({"exported": str(options.export), "files": list(names)})
-        console.print(f"{options.export}: {len(names)} files of the run, every password masked")
+        console.show(
+            {"exported": str(options.export), "files": list(names)},
+            f"{options.export}: {len(names)} files of the run, every password masked",
+        )
         return ExitCode.DONE
     tolerance = TOLERANCE if options.tolerance is None else options.tolerance
     if not 0.0 <= tolerance < float("inf"):
         raise UsageError(f"--tolerance {tolerance:g} is not a tolerance", action="Give a number from 0")
     replayed = asyncio.run(replay(options.run, Scope(options.only or "all"), tolerance))
-    console.document(replay_document(replayed))
-    console.print(replay_report(replayed))
+    console.show(replay_document(replayed), replay_report(replayed))
     return ExitCode.DONE if replayed.is_same else ExitCode.OUT_OF_LIMITS

@@ -31,8 +31,10 @@ def main(options: argparse.Namespace) -> ExitCode:
     cell = cell_at(options.cell, console)
     if options.show or options.remove:
         found = (present_schedule if options.show else remove_schedule)(cell, options.folder)
-        console.document(schedule_document(found))
-        console.print((present_schedule_text if options.show else removed_schedule_text)(found))
+        console.show(
+            schedule_document(found),
+            (present_schedule_text if options.show else removed_schedule_text)(found),
+        )
     elif options.daily is None:
         raise UsageError("the time of day is missing", action="Give --daily 02:30, --show or --remove")
     else:
@@ -54,8 +56,7 @@ def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
         if options.on_failure is not None:
             raise UsageError("only systemd starts a unit on a failure", action="Leave --on-failure away")
         line = crontab_line(scheduled_run(cell, request))
-        console.document({"crontab": line})
-        console.print(crontab_text(line, cell.settings.unattended))
+        console.show({"crontab": line}, crontab_text(line, cell.settings.unattended))
         return
     written = write_schedule(cell, request, options.folder)
     console.document(schedule_document(written))

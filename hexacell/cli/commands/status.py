@@ -36,8 +36,7 @@ def main(options: argparse.Namespace) -> ExitCode:
             console.warn(" ".join(str(error).split()))
     if options.metrics is not None:
         write_atomically(options.metrics, metrics_text(found).encode(), for_everybody=True)
-    console.document(status_document(found, unreadable))
-    console.print(status_text(found, unreadable))
+    console.show(status_document(found, unreadable), status_text(found, unreadable))
     return ExitCode.USAGE if unreadable else ExitCode.DONE
 
 
@@ -63,6 +62,5 @@ def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
     if options.metrics is not None:
         raise UsageError("metrics are of cells of this computer", action="Name their cell files")
     found = fleet_cells(archive_url(options.archive))
-    console.document(fleet_document(found))
-    console.print(fleet_text(found))
+    console.show(fleet_document(found), fleet_text(found))
     return ExitCode.DONE

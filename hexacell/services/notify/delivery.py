@@ -185,10 +185,9 @@ def post_to_webhook(address: NoticeAddress, notice: Notice, timeout_s: float) ->
     except urllib.error.HTTPError as error:
         error.close()
         raise NoticeUndelivered(f"the server answers {error.code}") from error
-    except urllib.error.URLError as error:
-        raise NoticeUndelivered(address.masked(_words(error.reason))) from error
     except (OSError, HTTPException, ValueError) as error:
-        raise NoticeUndelivered(address.masked(_words(error))) from error
+        reason = error.reason if isinstance(error, urllib.error.URLError) else error
+        raise NoticeUndelivered(address.masked(_words(reason))) from error
 
 
 def _opener(address: NoticeAddress) -> urllib.request.OpenerDirector:

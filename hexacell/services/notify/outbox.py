@@ -10,9 +10,9 @@ import fcntl
 import os
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from threading import Thread
@@ -20,7 +20,6 @@ from threading import Thread
 from pydantic import ValidationError
 
 from hexacell.cell.loader import Cell
-from hexacell.cell.operation import NotificationSettings
 from hexacell.errors import FileError, HexacellError
 from hexacell.runs.run_folder import runs_folder
 from hexacell.services.notify.delivery import NoticeAddress, deliver, resolved_address
@@ -183,7 +182,7 @@ def notify_test(cell: Cell, notice: Notice, send: Deliver = deliver) -> NotifyOu
     """Send a notice to everybody now; what is not taken is not kept."""
     queues = {one.name: [PendingNotice(to=one.name, notice=notice)] for one in cell.settings.notifications}
     sent = _in_parallel(cell, queues, lambda address, pending: send(address, pending.notice))
-    return NotifyOutcome(tuple(Delivery(name, done, 0, problem) for name, (done, problem) in sent.items()))
+    return NotifyOutcome(tuple(replace(one, wait=0) for one in sent))
 
 
 def waiting_notices(cell: Cell) -> tuple[PendingNotice, ...]:
@@ -213,26 +212,32 @@ def _send_all(
             dropped = outbox.drop_old(datetime.now(UTC))
     except HexacellError as error:
         return NotifyOutcome((Delivery("the outbox", 0, 0, str(error)),))
-    deliveries = (
-        Delivery(name, done, len(queues[name]) - done, problem) for name, (done, problem) in sent.items()
-    )
-    return NotifyOutcome(tuple(deliveries), dropped)
+    return NotifyOutcome(sent, dropped)
 
 
 def _in_parallel(
     cell: Cell,
     queues: Mapping[str, Sequence[PendingNotice]],
     act: Callable[[NoticeAddress, PendingNotice], None],
-) -> dict[str, tuple[int, str | None]]:
-    """How many each recipient took, and the problem; one that does not answer delays no other.
+) -> tuple[Delivery, ...]:
+    """Send each recipient its queue in order, so that no older state comes last; none delays another.
 
     The threads end with the process: neither a stop signal nor the end of a run waits for a slow server.
     """
     settings = {one.name: one for one in cell.settings.notifications}
-    sent: dict[str, tuple[int, str | None]] = {}
+    late = f"not finished within {LONGEST_NOTIFYING_S:g} s"
+    sent = {name: Delivery(name, 0, len(queue), late) for name, queue in queues.items()}
 
     def send_queue(name: str) -> None:
-        sent[name] = _one_queue(cell, settings[name], queues[name], act)
+        done, problem = 0, None
+        try:
+            address = resolved_address(settings[name], cell.settings.name, cell.path.parent)
+            for pending in queues[name]:
+                act(address, pending)
+                done += 1
+        except HexacellError as error:
+            problem = str(error)
+        sent[name] = Delivery(name, done, len(queues[name]) - done, problem)
 
     threads = {name: Thread(target=send_queue, args=(name,), daemon=True) for name in queues}
     for thread in threads.values():
@@ -240,22 +245,4 @@ def _in_parallel(
     until = time.monotonic() + LONGEST_NOTIFYING_S
     for thread in threads.values():
         thread.join(max(0.0, until - time.monotonic()))
-    return {name: sent.get(name, (0, f"not finished within {LONGEST_NOTIFYING_S:g} s")) for name in queues}
-
-
-def _one_queue(
-    cell: Cell,
-    settings: NotificationSettings,
-    queue: Iterable[PendingNotice],
-    act: Callable[[NoticeAddress, PendingNotice], None],
-) -> tuple[int, str | None]:
-    """In order: after one that is not taken the others wait, so that no older state comes last."""
-    sent = 0
-    try:
-        address = resolved_address(settings, cell.settings.name, cell.path.parent)
-        for pending in queue:
-            act(address, pending)
-            sent += 1
-    except HexacellError as error:
-        return sent, str(error)
-    return sent, None
+    return tuple(sent.values())

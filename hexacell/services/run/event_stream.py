@@ -9,9 +9,10 @@ import errno
 import os
 import stat
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
-from hexacell.errors import FileError, UsageError
+from hexacell.errors import UsageError
 from hexacell.storage.atomic_files import os_error_to_file_error
 from procedures.engine.engine import Listener
 from procedures.run.state import RunState
@@ -78,15 +79,9 @@ def _opened(target: Path) -> int:
         if stat.S_ISREG(os.fstat(descriptor).st_mode):
             os.ftruncate(descriptor, 0)
     except OSError as error:
-        raise _not_opened(target, error) from error
+        with suppress(OSError):
+            if target.is_fifo():
+                action = "Start its reader first"
+                raise UsageError("nobody reads this pipe", subject=target, action=action) from error
+        raise os_error_to_file_error("events cannot be written", target, error) from error
     return descriptor
-
-
-def _not_opened(target: Path, error: OSError) -> FileError | UsageError:
-    try:
-        is_pipe = target.is_fifo()
-    except OSError:
-        is_pipe = False
-    if is_pipe:
-        return UsageError("nobody reads this pipe", subject=target, action="Start its reader first")
-    return os_error_to_file_error("events cannot be written", target, error)

@@ -13,6 +13,7 @@ from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.wire_trace import WireTrace
 from hexacell.cell.robot import ControllerSettings
+from tests.drivers.controllers.linuxcnc.dialogue import said
 
 PATIENT = Timeouts(explanation=0.05, poll=0.002)
 IMPATIENT = Timeouts(
@@ -49,20 +50,12 @@ Exchange = tuple[str, Step] | tuple[str, Step, Step] | tuple[str, Step, Step, St
 GREETING: list[Exchange] = [
     ("hello EMC hexacell 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n"),
     ("set echo off", b"set echo off\r\n"),
-    ("set verbose on", b"SET VERBOSE ACK\n\r"),
-    ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
+    *said("set verbose on | set enable EMCTOO"),
 ]
-OPENING: list[Exchange] = [
-    *GREETING,
-    ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
-    ("get inifile", b"INIFILE /home/operator/machine.ini\r\n"),
-]
+OPENING = [*GREETING, *said("set set_wait done | get inifile: /home/operator/machine.ini")]
 AT_REST = b"JOINT_POS 0.000000 0.000000 0.000000 0.000000 -0.000000 0.000000\r\n"
-STOPPING: list[Exchange] = [
-    *GREETING,
-    ("set abort", b"SET ABORT ACK\n\r"),
-    *[("get joint_pos", AT_REST)] * 3,
-]
+STOPPED: list[Exchange] = [*said("set abort"), *[("get joint_pos", AT_REST)] * 3]
+STOPPING = [*GREETING, *STOPPED]
 
 
 class ScriptedServer:
@@ -150,6 +143,7 @@ class Play:
     GREETING = GREETING
     OPENING = OPENING
     STOPPING = STOPPING
+    STOPPED = STOPPED
     AT_REST = AT_REST
     SILENCE = Then.SAY_NOTHING
     HANG_UP = Then.HANG_UP

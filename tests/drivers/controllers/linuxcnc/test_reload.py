@@ -9,38 +9,31 @@ import pytest
 from drivers.errors import ConnectionLost, StartupNotPermitted
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
+from tests.drivers.controllers.linuxcnc.dialogue import (
+    HOMED,
+    HOMING,
+    IN_ESTOP,
+    IN_JOINT_MODE,
+    IS_OFF,
+    IS_ON,
+    MDI_MODE,
+    NO_ERROR,
+    NO_ESTOP,
+    NOT_HOMED,
+    OFF,
+    OWN_COORDINATES,
+    READY,
+    SWITCHING_ON,
+    said,
+)
 
 RESTARTED = frozenset({StartupAction.RESET_INITIAL_ESTOP, StartupAction.HOME})
 """What the cell file permits; to be switched on again needs no permission."""
-BEFORE = ("get joint_pos", b"JOINT_POS -461.827519 1.0 2.0 3.0 4.0 5.0\r\n")
-AFTER = ("get joint_pos", b"JOINT_POS -461.827512 1.0 2.0 3.0 4.0 5.0\r\n")
-NO_ESTOP = ("get estop", b"ESTOP OFF\r\n")
-IS_ON = ("get machine", b"MACHINE ON\r\n")
-IS_OFF = ("get machine", b"MACHINE OFF\r\n")
-HOMED = ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
-NOT_HOMED = ("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n")
-OWN_COORDINATES = [
-    ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n"),
-    ("get program_codes", b"PROGRAM_CODES G80 G17 G40 G21 G90 G94 G54 G49 G92.2 F0 S0\r\n"),
-    ("get pos_offset", b"POS_OFFSET 0.0 0.0 0.0 0.0 0.0 0.0\r\n"),
-    ("get feed_override", b"FEED_OVERRIDE 100\r\n"),
-]
-HOMING = [
-    NOT_HOMED,
-    *OWN_COORDINATES,
-    ("set mode manual", b"SET MODE ACK\n\r"),
-    ("get teleop_enable", b"TELEOP_ENABLE NO\r\n"),
-    ("get error", b"ERROR OK\r\n"),
-    ("set home -1", b"SET HOME ACK\n\r"),
-    NOT_HOMED,
-    HOMED,
-    NO_ESTOP,
-    IS_ON,
-    HOMED,
-]
-OFF = [("set machine off", b"SET MACHINE ACK\n\r"), IS_OFF]
-ON = [NO_ESTOP, IS_OFF, ("set machine on", b"SET MACHINE ACK\n\r"), IS_ON, NO_ESTOP, IS_ON]
-MDI = [("set mode mdi", b"SET MODE ACK\n\r"), ("get mode", b"MODE MDI\r\n")]
+BEFORE = said("get machine: ON | get joint_pos: -461.827519 1.0 2.0 3.0 4.0 5.0")
+AFTER = said("get joint_pos: -461.827512 1.0 2.0 3.0 4.0 5.0")
+HOMED_AGAIN = [*NOT_HOMED, *OWN_COORDINATES, *IN_JOINT_MODE, *HOMING, *READY]
+TURNED_OFF = said("set machine off | get machine: OFF")
+ON = [*SWITCHING_ON, *NO_ESTOP, *IS_ON]
 
 
 def python(program: str) -> tuple[str, ...]:
@@ -48,14 +41,14 @@ def python(program: str) -> tuple[str, ...]:
 
 
 async def test_without_a_command_the_machine_goes_off_and_on(play):
-    driver = await play.opened([IS_ON, BEFORE, *OFF, *ON, HOMED, AFTER, *MDI])
+    driver = await play.opened([*BEFORE, *TURNED_OFF, *ON, *HOMED, *AFTER, *MDI_MODE])
     await driver.reload(RESTARTED)
 
 
 async def test_the_command_runs_while_the_machine_is_off(play, tmp_path):
     ran = tmp_path / "ran"
     driver = await play.opened(
-        [IS_ON, BEFORE, *OFF, *ON, HOMED, AFTER, *MDI],
+        [*BEFORE, *TURNED_OFF, *ON, *HOMED, *AFTER, *MDI_MODE],
         reload_command=python(f"open({str(ran)!r}, 'w').close()"),
     )
     await driver.reload(RESTARTED)
@@ -66,14 +59,9 @@ async def test_a_machine_that_does_not_go_off_is_not_reloaded(play, tmp_path):
     play.patience = play.IMPATIENT
     ran = tmp_path / "ran"
     driver = await play.opened(
-        [IS_ON, BEFORE, OFF[0]], reload_command=python(f"open({str(ran)!r}, 'w').close()")
+        [*BEFORE, TURNED_OFF[0]], reload_command=python(f"open({str(ran)!r}, 'w').close()")
     )
-    play.servers[0].afterwards = {
-        "set machine off": OFF[0][1],
-        "get machine": b"MACHINE ON\r\n",
-        "get error": b"ERROR OK\r\n",
-        "get estop": b"ESTOP OFF\r\n",
-    }
+    play.servers[0].afterwards = dict([TURNED_OFF[0], *IS_ON, NO_ERROR, *NO_ESTOP])
     with pytest.raises(DeviceError, match="does not switch off"):
         await driver.reload(RESTARTED)
     assert not ran.exists()
@@ -90,7 +78,7 @@ async def test_a_machine_that_does_not_go_off_is_not_reloaded(play, tmp_path):
     ],
 )
 async def test_a_command_that_fails_leaves_the_machine_off(play, program, problem):
-    driver = await play.opened([IS_ON, BEFORE, *OFF], reload_command=python(program))
+    driver = await play.opened([*BEFORE, *TURNED_OFF], reload_command=python(program))
     with pytest.raises(DeviceError, match=problem) as caught:
         await driver.reload(RESTARTED)
     assert "the machine is off" in str(caught.value)
@@ -98,33 +86,26 @@ async def test_a_command_that_fails_leaves_the_machine_off(play, program, proble
 
 async def test_a_joint_that_moved_is_an_error(play):
     moved = ("get joint_pos", b"JOINT_POS -461.827512 1.0 2.0 9.8 4.0 5.0\r\n")
-    driver = await play.opened([IS_ON, BEFORE, *OFF, *ON, HOMED, moved])
+    driver = await play.opened([*BEFORE, *TURNED_OFF, *ON, *HOMED, moved])
     with pytest.raises(DeviceError, match=r"moved joint 4 by 6\.800 mm while it read its config again"):
         await driver.reload(RESTARTED)
 
 
 async def test_unhomed_joints_are_homed_after_the_reload_without_comparing_positions(play):
-    driver = await play.opened([IS_ON, BEFORE, *OFF, *ON, *HOMING, *MDI])
+    driver = await play.opened([*BEFORE, *TURNED_OFF, *ON, *HOMED_AGAIN, *MDI_MODE])
     await driver.reload(RESTARTED)
 
 
 async def test_an_emergency_stop_meanwhile_is_not_reset(play):
     play.patience = play.IMPATIENT
-    driver = await play.opened([IS_ON, BEFORE, *OFF, ("get estop", b"ESTOP ON\r\n"), HOMED])
+    driver = await play.opened([*BEFORE, *TURNED_OFF, *IN_ESTOP, *HOMED])
     with pytest.raises(StartupNotPermitted, match="is in emergency stop"):
         await driver.reload(RESTARTED)
 
 
 async def test_after_an_emergency_stop_meanwhile_the_machine_is_not_switched_on_without_permission(play):
-    driver = await play.opened(
-        [
-            *[IS_ON, BEFORE, *OFF, ("get estop", b"ESTOP ON\r\n"), HOMED],
-            ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
-            ("get error", b"ERROR OK\r\n"),
-            ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
-            *[NO_ESTOP, IS_OFF],
-        ]
-    )
+    control = said("set enable EMCTOO | get error: OK | set set_wait done")
+    driver = await play.opened([*BEFORE, *TURNED_OFF, *IN_ESTOP, *HOMED, *control, *OFF])
     with pytest.raises(StartupNotPermitted, match="is in emergency stop"):
         await driver.reload(RESTARTED)
     with pytest.raises(StartupNotPermitted, match="is switched off"):
@@ -132,15 +113,15 @@ async def test_after_an_emergency_stop_meanwhile_the_machine_is_not_switched_on_
 
 
 async def test_a_machine_that_was_off_is_not_switched_on_without_permission(play):
-    driver = await play.opened([IS_OFF, *OFF, NO_ESTOP, IS_OFF])
+    driver = await play.opened([*IS_OFF, *TURNED_OFF, *OFF])
     with pytest.raises(StartupNotPermitted, match="is switched off"):
         await driver.reload(RESTARTED)
 
 
 async def test_a_restarted_controller_is_left_in_emergency_stop_without_permission(play):
     driver = await play.opened(
-        [IS_ON, BEFORE, OFF[0], (*IS_OFF, play.HANG_UP)],
-        [*play.OPENING[:-1], ("get estop", b"ESTOP ON\r\n"), NOT_HOMED],
+        [*BEFORE, TURNED_OFF[0], (*TURNED_OFF[1], play.HANG_UP)],
+        [*play.OPENING[:-1], *IN_ESTOP, *NOT_HOMED],
         reload_command=python("pass"),
     )
     with pytest.raises(StartupNotPermitted, match="since it was started"):
@@ -148,18 +129,10 @@ async def test_a_restarted_controller_is_left_in_emergency_stop_without_permissi
 
 
 async def test_a_reload_command_that_restarts_the_controller_is_followed_by_reconnection(play):
+    reset = said("set estop off | get estop: OFF")
     driver = await play.opened(
-        [IS_ON, BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
-        [
-            *play.OPENING[:-1],
-            ("get estop", b"ESTOP ON\r\n"),
-            NOT_HOMED,
-            ("set estop off", b"SET ESTOP ACK\n\r"),
-            ("get estop", b"ESTOP OFF\r\n"),
-            *ON,
-            *HOMING,
-            *MDI,
-        ],
+        [*BEFORE, TURNED_OFF[0], (*TURNED_OFF[1], play.HANG_UP)],
+        [*play.OPENING[:-1], *IN_ESTOP, *NOT_HOMED, *reset, *ON, *HOMED_AGAIN, *MDI_MODE],
         reload_command=python("pass"),
     )
     await driver.reload(RESTARTED)
@@ -167,9 +140,9 @@ async def test_a_reload_command_that_restarts_the_controller_is_followed_by_reco
 
 async def test_connecting_is_repeated_until_the_restarted_controller_answers(play):
     driver = await play.opened(
-        [IS_ON, BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
+        [*BEFORE, TURNED_OFF[0], (*TURNED_OFF[1], play.HANG_UP)],
         [("hello EMC hexacell 1.0", play.HANG_UP)],
-        [*play.OPENING[:-1], *ON, HOMED, AFTER, *MDI],
+        [*play.OPENING[:-1], *ON, *HOMED, *AFTER, *MDI_MODE],
         reload_command=python("pass"),
     )
     await driver.reload(RESTARTED)
@@ -178,7 +151,7 @@ async def test_connecting_is_repeated_until_the_restarted_controller_answers(pla
 async def test_a_controller_that_does_not_restart_is_reported(play):
     play.patience = play.IMPATIENT
     driver = await play.opened(
-        [IS_ON, BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
+        [*BEFORE, TURNED_OFF[0], (*TURNED_OFF[1], play.HANG_UP)],
         reload_command=python("pass"),
     )
     play.servers[0].stop_listening()
@@ -187,5 +160,5 @@ async def test_a_controller_that_does_not_restart_is_reported(play):
 
 
 async def test_joints_that_include_zeros_are_not_compared_with_those_of_other_zeros(play):
-    driver = await play.opened([IS_ON, BEFORE, *OFF, *ON, HOMED, *MDI], joints_include_zeros=True)
+    driver = await play.opened([*BEFORE, *TURNED_OFF, *ON, *HOMED, *MDI_MODE], joints_include_zeros=True)
     await driver.reload(RESTARTED)

@@ -15,6 +15,7 @@ from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import WireTrace
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError, ExitCode, UsageError
+from tests.drivers.controllers.linuxcnc.dialogue import said
 
 HELLO = "hello EMC hexacell 1.0"
 
@@ -27,37 +28,18 @@ async def test_opening_greets_takes_control_and_orders_nothing_else(play):
 
 
 async def test_opening_a_server_of_version_2_10(play):
-    driver = await play.driver(
-        [
-            (
-                HELLO,
-                b"warning: Requested version '1.0' is newer than '0.9'\r\nHELLO ACK EMCNETSVR 0.9\r\n",
-            ),
-            ("set echo off", b"set echo off\r\n"),
-            ("set verbose on", b"SET VERBOSE ACK\r\n"),
-            ("set enable EMCTOO", b"SET ENABLE ACK\r\n"),
-            ("set set_wait done", b"error: Subcommand not found: SET set_wait\r\nSET NAK\r\n"),
-            ("get enable", b"ENABLE ON\r\n"),
-            ("get error", b"ERROR OK\r\n"),
-            ("set wait_mode done", b"SET WAIT_MODE ACK\r\n"),
-            ("get inifile", b"INIFILE /a/b.ini\r\n"),
-        ]
-    )
+    newer = b"warning: Requested version '1.0' is newer than '0.9'\r\nHELLO ACK EMCNETSVR 0.9\r\n"
+    unknown = ("set set_wait done", b"error: Subcommand not found: SET set_wait\r\nSET NAK\r\n")
+    then = said("get enable: ON | get error: OK | set wait_mode done | get inifile: /a/b.ini")
+    driver = await play.driver([(HELLO, newer), *play.GREETING[1:], unknown, *then])
     assert (await driver.open()).description == "EMCNETSVR 0.9, b.ini"
 
 
 async def test_a_server_without_echo_and_with_the_alias(play):
-    driver = await play.driver(
-        [
-            (HELLO, b"\r\n\r\nHELLO ACK EMCNETSVR 1.1\n\r"),
-            ("set echo off", play.SILENCE),
-            ("set verbose on", b"\r\nSET VERBOSE ACK\r\n"),
-            ("set enable EMCTOO", b"SET ENABLE ACK\r\n"),
-            ("set set_wait done", b"SET WAIT_MODE ACK\r\n"),
-            ("get inifile", b"GET INIFILE NAK\r\n\r\n"),
-            ("get inifile", b"GET INIFILE NAK\r\n\r\n"),
-        ]
-    )
+    greeting = [(HELLO, b"\r\n\r\nHELLO ACK EMCNETSVR 1.1\n\r"), ("set echo off", play.SILENCE)]
+    alias = [*play.GREETING[2:], ("set set_wait done", b"SET WAIT_MODE ACK\r\n")]
+    unknown = [("get inifile", b"GET INIFILE NAK\r\n\r\n")] * 2
+    driver = await play.driver([*greeting, *alias, *unknown])
     assert (await driver.open()).description == "EMCNETSVR 1.1"
 
 
@@ -92,13 +74,8 @@ async def test_an_unexpected_answer_to_the_greeting_is_quoted(play, said, proble
 
 
 async def test_a_refused_enable_password_is_reported(play):
-    driver = await play.driver(
-        [
-            *play.GREETING[:3],
-            ("set enable sesame", b"SET ENABLE NAK\n\r"),
-        ],
-        enable_password="sesame",
-    )
+    refused = [*play.GREETING[:3], *said("set enable sesame: NAK")]
+    driver = await play.driver(refused, enable_password="sesame")
     with pytest.raises(DeviceError, match="refuses the enable password") as caught:
         await driver.open()
     assert "sesame" not in str(caught.value)
@@ -205,17 +182,10 @@ def test_a_password_that_begins_with_the_other_is_masked_whole(shown, masked):
 
 async def test_passwords_stay_out_of_the_trace(play):
     trace = WireTrace()
-    driver = await play.driver(
-        [
-            ("hello knock hexacell 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n"),
-            *play.GREETING[1:3],
-            ("set enable sesame", b"SET ENABLE ACK\n\r"),
-            *play.OPENING[4:],
-        ],
-        trace=trace,
-        connect_password="knock",
-        enable_password="sesame",
-    )
+    hello = ("hello knock hexacell 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
+    opening = [hello, *play.GREETING[1:3], *said("set enable sesame"), *play.OPENING[4:]]
+    passwords = {"connect_password": "knock", "enable_password": "sesame"}
+    driver = await play.driver(opening, trace=trace, **passwords)
     await driver.open()
     sent = b"".join(entry.data for entry in trace.entries() if entry.direction == ">")
     assert sent.startswith(

@@ -9,31 +9,24 @@ import pytest
 from drivers.errors import MotionInterrupted
 from hexacell.errors import DeviceError
 from tests.drivers.controllers.linuxcnc.dialogue import (
-    ABORT,
     ACK,
     AGAIN_IN_CONTROL,
-    ARRIVED,
     HALF_WAY,
     JOINTS,
     MDI,
     MOVE_S,
+    MOVED,
     RESTORED,
     TARGET,
+    said,
 )
 
 
 async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(play):
     aborted = play.Pause()
     driver = await play.opened(
-        [
-            (MDI, aborted, ACK),
-            ("get abs_act_pos", HALF_WAY),
-            AGAIN_IN_CONTROL,
-            (MDI, ACK),
-            ("get abs_act_pos", ARRIVED),
-            RESTORED,
-        ],
-        [*play.GREETING, ABORT, *play.STOPPING[-3:]],
+        [(MDI, aborted, ACK), ("get abs_act_pos", HALF_WAY), AGAIN_IN_CONTROL, *MOVED, RESTORED],
+        [*play.GREETING, *play.STOPPED],
     )
     moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
     await aborted.reached.wait()
@@ -64,28 +57,14 @@ async def test_no_command_is_sent_on_one_connection_while_the_other_awaits_an_an
 
 
 async def test_the_abort_is_repeated_while_the_machine_still_moves(play):
-    moving = [b"JOINT_POS %d 0 0 0 0 0\r\n" % n for n in range(1, 4)]
-    driver = await play.opened(
-        [],
-        [
-            *play.GREETING,
-            ABORT,
-            ("get joint_pos", moving[0]),
-            ("get joint_pos", moving[1]),
-            AGAIN_IN_CONTROL,
-            ABORT,
-            ("get joint_pos", moving[2]),
-            ("get joint_pos", moving[2]),
-            ("get joint_pos", moving[2]),
-        ],
-    )
+    moving = said("set abort | get joint_pos: 1 0 0 0 0 0 | get joint_pos: 2 0 0 0 0 0")
+    at_rest = said("set enable EMCTOO | set abort") + said("get joint_pos: 3 0 0 0 0 0") * 3
+    driver = await play.opened([], [*play.GREETING, *moving, *at_rest])
     await driver.stop()
 
 
 async def test_a_refused_abort_of_a_machine_at_rest_counts_as_stopped(play):
-    driver = await play.opened(
-        [], [*play.GREETING, ("set abort", b"SET ABORT NAK\n\r"), *[("get joint_pos", play.AT_REST)] * 3]
-    )
+    driver = await play.opened([], [*play.GREETING, *said("set abort: NAK"), *play.STOPPED[1:]])
     await driver.stop()
 
 
@@ -93,8 +72,7 @@ async def test_a_machine_that_keeps_moving_after_the_abort_is_reported(play):
     play.patience = play.IMPATIENT
     driver = await play.opened([], play.GREETING)
     play.servers[0].afterwards = {
-        "set enable EMCTOO": b"SET ENABLE ACK\n\r",
-        "set abort": b"SET ABORT ACK\n\r",
+        **dict(said("set enable EMCTOO | set abort")),
         "get joint_pos": [f"JOINT_POS {n} 0 0 0 0 0\r\n".encode() for n in range(100_000)],
     }
     with pytest.raises(DeviceError, match=r"still moves 0\.6 s after .*Press the emergency stop"):

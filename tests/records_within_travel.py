@@ -40,7 +40,7 @@ def within_travel(
         reference = first_reached(robot, truth, point, level, 1, margin)
         drawn = _aimed(robot, truth, reference.actual, amplitude, random)
         others = first_reached(robot, truth, point, drawn, orientations - 1, margin)
-        sets.append(Reached.concatenate([reference, others]))
+        sets.append(Reached.joined([reference, others]))
     return data_set(robot, sets, orientations)
 
 

@@ -105,7 +105,7 @@ class Forecaster:
         sets = self.planned_sets()
         planned = [sets[point - 1][:more] for point, more in self.planned(state).items()]
         measured = self.from_commands(record.pose for record in state.measurements.records)
-        return self.task.error(belief, PoseBatch.concatenate([measured, *planned]))
+        return self.task.error(belief, PoseBatch.joined([measured, *planned]))
 
     def planned(self, state: CampaignState) -> dict[int, int]:
         """How many more records each point will get, as far as the budget goes."""
@@ -208,7 +208,7 @@ class PlannedInformation:
     @classmethod
     def of(cls, sets: Sequence[PoseBatch], belief: RobotBelief) -> PlannedInformation:
         """The records at the present estimate; poses it cannot reach are left out."""
-        poses = PoseBatch.concatenate(sets)
+        poses = PoseBatch.joined(sets)
         joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
         rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
         jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses[rows], joints[rows]))

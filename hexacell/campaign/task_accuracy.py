@@ -142,7 +142,7 @@ class Task:
 
         Without what another choice of frames would explain; None if no task pose can be taken.
         """
-        both = PoseBatch.concatenate([self.poses, self.workspace])
+        both = PoseBatch.joined([self.poses, self.workspace])
         taken = _are_taken(belief, both)
         task, workspace = (np.flatnonzero(some) for some in np.split(taken, [len(self.poses)]))
         if not len(task) or not len(workspace):

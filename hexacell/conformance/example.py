@@ -61,7 +61,7 @@ class MechanismExample:
     def poses(self) -> PoseBatch:
         """Poses of the drawing's robot, the same number at each point, clear of singularities."""
         random = np.random.default_rng(2)
-        return PoseBatch.concatenate([self._poses_at(point, random) for point in self.points])
+        return PoseBatch.joined([self._poses_at(point, random) for point in self.points])
 
     def joints(self, geometry: Geometry, poses: PoseBatch | None = None) -> Array:
         """Joint variables (n, 6) of a robot at the poses."""

@@ -115,7 +115,7 @@ class CandidateSpace:
                 parts.append(turned)
                 orientations = np.concatenate([orientations, turned.records.targets.poses.rotations])
                 gains = np.concatenate([gains, turned.gains])
-        rated = RatedRecords.concatenate(parts)
+        rated = RatedRecords.joined(parts)
         ranking = np.argsort(-rated.gains, kind="stable")
         is_kept = np.arange(len(rated)) < len(candidates)
         is_kept[rows_apart(rated.records.targets.poses.rotations, ranking, KEPT, KEPT_APART)] = True

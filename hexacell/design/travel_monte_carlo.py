@@ -112,7 +112,7 @@ class TravelConstraint:
         """At which of n targets the constraint holds on the robots sampled from the belief."""
         belief, zero = self.belief, self.zero
         joints = np.concatenate([zero.joints[None], targets.joints])
-        poses = PoseBatch.concatenate((zero.target.poses, targets.poses))
+        poses = PoseBatch.joined((zero.target.poses, targets.poses))
         # The reference is estimated from its records, so that it closes the legs only approximately.
         poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
         sensitivity = free_sensitivity(belief.mechanism, belief.estimate, poses, joints)
@@ -187,7 +187,7 @@ class _Scenario:
             if not len(possible):
                 break
             more = self.sampled(variates, possible)
-            robots = more if robots is None else _SampledRobots.concatenate([robots, more])
+            robots = more if robots is None else _SampledRobots.joined([robots, more])
             within = _nearly_all_within(robots, self.belief.limits, UNCERTAIN_SHARE)
             possible, robots = possible[within], robots[:, within]
         holds = np.zeros(len(self.joints) - 1, dtype=bool)

@@ -85,15 +85,15 @@ class Batch:
         return type(self)(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
     @classmethod
-    def concatenate(cls, parts: Iterable[Self]) -> Self:
+    def joined(cls, parts: Iterable[Self]) -> Self:
         """The rows of several in one."""
         several = list(parts)
-        joined: list[Any] = []
+        columns: list[Any] = []
         for name in cls.__dataclass_fields__:
             column = [getattr(part, name) for part in several]
             is_array = isinstance(column[0], np.ndarray)
-            joined.append(np.concatenate(column) if is_array else type(column[0]).concatenate(column))
-        return cls(*joined)
+            columns.append(np.concatenate(column) if is_array else type(column[0]).joined(column))
+        return cls(*columns)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

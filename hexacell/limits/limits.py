@@ -212,7 +212,7 @@ class Limits:
             joints: its joint variables there (1, 6), mm.
             wanted: margins (m,) of passive joints and legs; see :meth:`leg_margins`.
         """
-        both = self.frames.inverse().poses(PoseBatch.concatenate([command, actual]))
+        both = self.frames.inverse().poses(PoseBatch.joined([command, actual]))
         tilts, turns = both.tilts().tolist(), np.abs(both.turns()).tolist()
         margins = self.leg_margins(mechanism, geometry, actual, joints)[0]
         return replace(

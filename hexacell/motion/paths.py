@@ -57,7 +57,7 @@ class Path:
         """This path, and ``onward`` from the ``waypoint`` at its end."""
         return Path(
             (*self.waypoints, waypoint, *onward.waypoints),
-            PoseBatch.concatenate((self.poses, onward.poses)),
+            PoseBatch.joined((self.poses, onward.poses)),
             np.concatenate([self.joints, onward.joints]),
         )
 

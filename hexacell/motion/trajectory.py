@@ -79,7 +79,7 @@ def interpolate_lines(
         interpolate_line(start, end, pieces, frames).reshape(-1, len(waypoints[-1]))
         for start, end in pairwise(waypoints)
     ]
-    return PoseBatch.concatenate([parts[0][:1], *(part[1:] for part in parts)])
+    return PoseBatch.joined([parts[0][:1], *(part[1:] for part in parts)])
 
 
 def trace_path(

@@ -119,7 +119,7 @@ def first_reached(
     for commands in drawn:
         parts.append(_reached(robot, truth, commands, margin))
         if sum(len(part.commands) for part in parts) >= wanted:
-            return Reached.concatenate(parts)[:wanted]
+            return Reached.joined(parts)[:wanted]
     raise LimitError(f"too few poses can be reached at {point} without crossing a singularity")
 
 
@@ -140,6 +140,6 @@ def _reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) 
 def data_set(robot: Robot, sets: list[Reached], orientations: int) -> DataSet:
     """The data set of what was reached at each point, so many poses at each."""
     labels = [(point, turn) for point in range(1, len(sets) + 1) for turn in range(1, orientations + 1)]
-    found = Reached.concatenate(sets)
+    found = Reached.joined(sets)
     commands = robot.frames.inverse().poses(found.commands)
     return DataSet(np.array(labels), commands, found.joints, found.actual.positions @ robot.frames.base)

@@ -119,7 +119,7 @@ def _selected(
         best = int(np.argmax(gains))
         at_best = belief.covariance, records.jacobian[best], records.covariance[best]
         belief = replace(belief, covariance=covariance_update(*at_best))
-        chosen = ReachableTargets.concatenate([chosen, possible[np.array([best])]])
+        chosen = ReachableTargets.joined([chosen, possible[np.array([best])]])
     return chosen, belief
 
 

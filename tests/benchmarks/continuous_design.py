@@ -284,7 +284,7 @@ def best_design(
         at = Slopes.at(design, criterion)
         for point, domain in enumerate(domains):
             spread = possible_targets(domain.belief, domain.zero, SPREAD, number)
-            seen = ReachableTargets.concatenate([*known[point], spread])
+            seen = ReachableTargets.joined([*known[point], spread])
             known[point] = [domain.climbed(at, point, seen, random)]
         more = [domain.records(some) for domain, [some] in zip(domains, known, strict=True)]
         if (reached := at.certificate(more)) > certificate:

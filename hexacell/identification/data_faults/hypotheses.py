@@ -28,7 +28,7 @@ geodetic networks, 1968 (data snooping); Cook and Weisberg, Residuals and Influe
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -39,7 +39,7 @@ from hexacell.identification.problem.commanded_poses import ACCEPTED_MM
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linear_model import LinearizedModel
-from hexacell.identification.solver.result import GAUGES, DataFaultKind, Identification
+from hexacell.identification.solver.result import GAUGES, DataFaultKind
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import Deviation, RecordId, deviation_of
 
@@ -84,6 +84,11 @@ SPLIT_POINT = -1
 """Label of the point that the records after a zero shift form while it is tested."""
 
 
+def row_of(problem: Problem, record: RecordId) -> int:
+    """The row of a record."""
+    return int(np.flatnonzero((problem.labels == record).all(axis=1))[0])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultHypothesis(ABC):
     """One explanation of records that disagree with the others; equal however it was found.
@@ -111,10 +116,6 @@ class OutlierHypothesis(FaultHypothesis):
 
     records: tuple[RecordId, ...]
 
-    def only(self, records: Collection[RecordId]) -> OutlierHypothesis:
-        """The gross errors of some of the records alone."""
-        return replace(self, records=tuple(record for record in self.records if record in records))
-
     def corrected(self, problem: Problem) -> Problem:
         """The problem without these records."""
         return problem.subset(~problem.mask_of(self.records))
@@ -136,7 +137,7 @@ class ZeroShiftHypothesis(FaultHypothesis):
 
     def rows(self, problem: Problem) -> Mask:
         """The records (n,) after the shift."""
-        first = np.flatnonzero(problem.mask_of([(self.point, self.orientation)]))[0]
+        first = row_of(problem, (self.point, self.orientation))
         return np.asarray((problem.labels[:, 0] == self.point) & (np.arange(problem.records) >= first))
 
     def corrected(self, problem: Problem) -> Problem:
@@ -422,14 +423,18 @@ class DeletionTest:
         return bool(self.statistics.threshold_ratio(found_before)[self.row] <= 1.0)
 
 
-def deletion_test(problem: Problem, record: RecordId, fit: Identification) -> DeletionTest:
-    """Test one record of a problem against a fit that it took no part in."""
+def deletion_test(problem: Problem, record: RecordId, model: LinearizedModel | None) -> DeletionTest:
+    """Test one record of a problem against a fit that it took no part in.
+
+    Args:
+        problem: all records.
+        record: the one that is tested.
+        model: of the fit's records and this one, around the fit; None where this one has no pose there.
+    """
     leg = _inconsistent_leg(problem, record)
-    both = problem.subset(problem.mask_of({record, *fit.problem.record_ids})).starting_from(fit.free)
-    model = LinearizedModel.at_start(both, fit.active_prior) if both.has_start_pose.all() else None
     if model is None or record not in model.problem.record_ids:
         return DeletionTest(record, DataFaultKind.MISMATCHED_JOINTS if leg else DataFaultKind.SINGULAR, leg)
-    row = int(np.flatnonzero(model.problem.mask_of([record]))[0])
+    row = row_of(model.problem, record)
     statistics = OutlierStatistics.of(model)
     weights, gauges = model.weights[row], model.problem.gauges
     information = gauges.T @ weights @ model.residual_covariance[row] @ weights @ gauges
@@ -448,7 +453,7 @@ def _inconsistent_leg(problem: Problem, record: RecordId) -> tuple[int, float] |
     over the other records of the point. They change little between the poses of a point, whatever
     geometry the controller had.
     """
-    row = int(np.flatnonzero(problem.mask_of([record]))[0])
+    row = row_of(problem, record)
     misfit = problem.joints - problem.commands.joints
     is_other = (problem.labels[:, 0] == record[0]) & (np.arange(problem.records) != row)
     known = misfit[is_other & np.isfinite(misfit).all(axis=-1)]

@@ -203,8 +203,27 @@ class CorrectedFit:
         """Tests of all records that the fit does without, but for those after a zero shift."""
         excluded = {record for after in self.zero_shifts.values() for record in after}
         excluded.update(self.fit.problem.record_ids)
-        tested = (record for record in self.original.record_ids if record not in excluded)
-        return {record: deletion_test(self.original, record, self.fit) for record in tested}
+        tests = {}
+        for record in self.original.record_ids:
+            if record not in excluded:
+                both = self.with_records({record})
+                model = (
+                    LinearizedModel.at_start(both, self.fit.active_prior)
+                    if both.has_start_pose.all()
+                    else None
+                )
+                tests[record] = deletion_test(self.original, record, model)
+        return tests
+
+    def with_records(self, records: set[RecordId]) -> Problem:
+        """The records of the fit and some others, which start at the solution."""
+        used = self.original.mask_of(records.union(self.fit.problem.record_ids))
+        return self.at_solution(self.original.subset(used))
+
+    def at_solution(self, problem: Problem) -> Problem:
+        """Records that start at the solution, as far as they have poses there."""
+        solved = problem.solve_poses(self.fit.free)
+        return problem.starting_at(self.fit.free, solved.poses, solved.found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -329,15 +348,13 @@ def _searched(current: CorrectedFit) -> CorrectedFit | None:
 
 def _candidates(current: CorrectedFit) -> Iterator[FaultHypothesis | CorrectedFit]:
     """What may be wrong, in the order above: hypotheses, and one fit without several records."""
-    problem, fit = current.problem, current.fit
+    problem, solved = current.problem, current.at_solution(current.problem)
     at_start = LinearizedModel.at_start(problem, problem.prior.precision)
-    gauge_faults = rank_gauge_faults(at_start)
-    everywhere = LinearizedModel.at_start(problem.starting_from(fit.free), fit.active_prior)
-    elsewhere = (
-        []
-        if everywhere is None
-        else rank_hypotheses(everywhere, ChiSquareTest(everywhere.chi2, everywhere.problem.coordinates))
-    )
+    everywhere = LinearizedModel.at_start(solved, current.fit.active_prior)
+    gauge_faults, elsewhere = rank_gauge_faults(at_start), []
+    if everywhere is not None:
+        goodness = ChiSquareTest(everywhere.chi2, everywhere.problem.coordinates)
+        elsewhere = rank_hypotheses(everywhere, goodness)
     lists = (gauge_faults, current.likely_hypotheses(), elsewhere)
     first, *others = [*zip_longest(*(one[:TRIED_FROM_EACH_LIST] for one in lists))] or [()]
     yield from filter(None, first)
@@ -345,7 +362,7 @@ def _candidates(current: CorrectedFit) -> Iterator[FaultHypothesis | CorrectedFi
     yield deleted
     if (outliers := _outliers_at_start(problem)) is not None:
         yield outliers
-    without = LinearizedModel.at_start(problem.starting_from(deleted.fit.free), deleted.fit.active_prior)
+    without = LinearizedModel.at_start(deleted.at_solution(problem), deleted.fit.active_prior)
     yield from rank_gauge_faults(without)[:TRIED_FROM_EACH_LIST]
     yield from filter(None, chain(*others))
     yield from (hypothesis for hypothesis in gauge_faults if hypothesis.point is None)
@@ -390,16 +407,20 @@ def _readmitted(selected: CorrectedFit) -> CorrectedFit | None:
     agreeing = {record for record, test in tests.items() if test.agrees(max(0, disagreeing - 1))}
     if not agreeing:
         return None
-    used = selected.original.mask_of(agreeing.union(selected.fit.problem.record_ids))
-    problem = selected.original.subset(used).starting_from(selected.fit.free)
+    problem = selected.with_records(agreeing)
     if not problem.has_start_pose.all():
         return None
     faults = tuple(
-        fault.only(set(fault.records) - agreeing) if isinstance(fault, OutlierHypothesis) else fault
+        _only(fault, set(fault.records) - agreeing) if isinstance(fault, OutlierHypothesis) else fault
         for fault in selected.faults
     )
     readmitted = CorrectedFit.fitted(selected.original, problem, faults, FINE)
     return readmitted if readmitted.is_reliable else None
+
+
+def _only(fault: OutlierHypothesis, records: set[RecordId]) -> OutlierHypothesis:
+    """The gross errors of some of the records alone."""
+    return replace(fault, records=tuple(record for record in fault.records if record in records))
 
 
 def _only_proven(selected: CorrectedFit) -> Selection:
@@ -408,7 +429,7 @@ def _only_proven(selected: CorrectedFit) -> Selection:
         problem = selected.original
         for fault in proven:
             problem = fault.corrected(problem)
-        started = problem.starting_from(selected.fit.free)
+        started = selected.at_solution(problem)
         problem = started if started.has_start_pose.all() else problem
         selected = CorrectedFit.fitted(selected.original, problem, proven, COARSE)
     return Selection(selected, tests)
@@ -433,7 +454,7 @@ def _proven_faults(
     for fault in selected.faults:
         match fault:
             case OutlierHypothesis():
-                part = fault.only(proven)
+                part = _only(fault, proven)
                 kept += [part] if part.records else []
             case ZeroShiftHypothesis() if fault.significance < required:
                 continue

@@ -87,7 +87,7 @@ def error_jacobian(belief: RobotBelief, task: PoseBatch, workspace: PoseBatch) -
     Returns:
         (n, 6, p), mm and rad by mm.
     """
-    poses = PoseBatch.concatenate([task, workspace])
+    poses = PoseBatch.joined([task, workspace])
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
     both = free_sensitivity(belief.mechanism, belief.estimate, poses, joints).free
     of_task, of_workspace = both[: len(task)], both[len(task) :]

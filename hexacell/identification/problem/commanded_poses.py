@@ -120,7 +120,7 @@ class CommandedPoses:
         """The commands of both."""
         return replace(
             self,
-            poses=PoseBatch.concatenate([self.poses, other.poses]),
+            poses=PoseBatch.joined([self.poses, other.poses]),
             candidate_geometries=(*self.candidate_geometries, *other.candidate_geometries),
             choice=np.concatenate([self.choice, other.choice + len(self.candidate_geometries)]),
             joints=np.concatenate([self.joints, other.joints]),

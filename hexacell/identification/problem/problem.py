@@ -175,11 +175,6 @@ class Problem:
         known = self.has_start_pose if has_start_pose is None else has_start_pose
         return replace(self, initial_parameters=free, start=poses, has_start_pose=known)
 
-    def starting_from(self, free: Array) -> Problem:
-        """The problem that starts at free parameters (p,), mm, with the poses that can be found there."""
-        solved = self.solve_poses(free)
-        return self.starting_at(free, solved.poses, solved.found)
-
     def subset(self, rows: Mask) -> Problem:
         """The problem of some of the records (n,)."""
         if rows.all():
@@ -207,7 +202,7 @@ class Problem:
             deviations=np.concatenate([self.deviations, other.deviations])[order],
             first_rows=first_rows_of(labels[order, 0]),
             commands=commands[order],
-            start=PoseBatch.concatenate([self.start, other.start])[order],
+            start=PoseBatch.joined([self.start, other.start])[order],
             has_start_pose=np.concatenate([self.has_start_pose, other.has_start_pose])[order],
             labels=labels[order],
         )

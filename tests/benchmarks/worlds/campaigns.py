@@ -96,7 +96,7 @@ def setting(number: int) -> Setting:
         cell,
         robot,
         truth,
-        Commands(PoseBatch.concatenate(parts), np.array(labels)),
+        Commands(PoseBatch.joined(parts), np.array(labels)),
         task,
         _held_out(cell, belief, robot, HELD_OUT_SEED + number),
         _held_out(cell, belief, robot, CONFIRMING_SEED + number),
@@ -126,4 +126,4 @@ def _held_out(cell: Cell, belief, robot: Robot, seed: int) -> Commands:
             raise UnreachableError("the robot cannot take the held-out poses")
         parts.append(commands[:HELD_OUT])
         labels += [(place, turn) for turn in range(1, HELD_OUT + 1)]
-    return Commands(PoseBatch.concatenate(parts), np.array(labels))
+    return Commands(PoseBatch.joined(parts), np.array(labels))

@@ -134,7 +134,7 @@ class World:
         self, written: Geometry, task: PoseBatch, workspace: PoseBatch, hour: float = 0.0
     ) -> TaskErrors:
         """The errors at task poses that are commanded through a ``written`` geometry at some hour."""
-        wanted = PoseBatch.concatenate([task, workspace])
+        wanted = PoseBatch.joined([task, workspace])
         drawn = self._visits(wanted, written, hour, DRAWS if self.effect.is_random else 1)
         mean = _mean(drawn)
         length = float(np.linalg.norm(self.truth["B"], axis=-1).mean())
@@ -149,7 +149,7 @@ class World:
 
     def _visits(self, poses: PoseBatch, written: Geometry, hour: float, visits: int) -> list[PoseBatch]:
         """Where the machine goes on some visits of all poses, each from another one, all at one hour."""
-        every = PoseBatch.concatenate([poses] * visits)
+        every = PoseBatch.joined([poses] * visits)
         stops = self._stops(_one_point(every), written, hour)
         order = np.random.default_rng([self.seed, 2]).permutation(len(every))
         stops = replace(

@@ -10,18 +10,16 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 from textual.screen import Screen
-from textual.widgets import Input
+from textual.widgets import Digits, Input
 
-from hexacell.screen.widgets import RowList, TextPanel
-from hexacell.text.screens.views import ROWS, Urgency, block_text
+from hexacell.screen.widgets import RowList, TextPanel, show_parts
+from hexacell.text.screens.views import Urgency
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
     from hexacell.text.screens.first_questions import FirstCellAssistant
 
 GAUGES = 3
-OTHER_ROWS = 5
-"""Rows for guidance and spaces."""
 
 WHAT_TO_PRESS = (
     "x excludes the chosen pose or point in the cell file; on a line with OUT it removes that. "
@@ -39,17 +37,17 @@ class DigitsScreen(Screen[None]):
         """What happens now, and three figures."""
         yield TextPanel(id="digits-now")
         for number in range(GAUGES):
-            yield TextPanel(id=f"digits-{number}", classes="digits")
+            yield Digits(id=f"digits-{number}", classes="digits")
         yield TextPanel("mm, deviation from the reference where there is one. d or Escape goes back.")
 
     def draw(self, model: ScreenModel) -> None:
         """Show the gauges."""
-        self.query_one("#digits-now", TextPanel).show(model.guidance()["Now"])
-        scale = 2 if self.size.height >= 2 * GAUGES * ROWS + OTHER_ROWS and self.size.width >= 120 else 1
-        for number, (figure, urgency) in enumerate(model.figures()[:GAUGES]):
-            text = "\n".join(block_text(figure, scale))
-            self.query_one(f"#digits-{number}", TextPanel).show(text, urgency)
-        records = len(model.records())
+        now, figures, records = model.figures()
+        self.query_one("#digits-now", TextPanel).show(now)
+        for number, (figure, urgency) in enumerate(figures[:GAUGES]):
+            digits = self.query_one(f"#digits-{number}", Digits)
+            digits.update(figure)
+            digits.set_class(urgency is Urgency.ALARM, "urgency-alarm")
         if self._records not in {-1, records}:
             self.app.bell()
         self._records = records
@@ -74,8 +72,7 @@ class PlanScreen(Screen[None]):
 
     def draw(self, model: ScreenModel) -> None:
         """Show the poses."""
-        self.query_one("#plan-note", TextPanel).show(model.plan_note())
-        self.query_one(RowList).show(model.plan_rows())
+        show_parts(self, model, "plan")
 
     async def on_option_list_option_selected(self) -> None:
         """Enter does the same."""

@@ -6,26 +6,26 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable
 from functools import partial
+from operator import is_
+from typing import Any
 
 from hexacell.cell.loader import Cell, describe
 from hexacell.config.change import ConfigEditedSince
-from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import HexacellError, UsageError
 from hexacell.run_process.messages import LiveSnapshot
 from hexacell.run_process.recorded import RecordedRun
 from hexacell.screen.preferences import ONCE, ScreenAction
 from hexacell.screen.watching import DeviceWatcher, RunFollower
 from hexacell.screen.workplace import TriedPlan, Workplace
+from hexacell.services.history.run_index import PastRun
 from hexacell.text.config_changes import RELOAD, versions_text
-from hexacell.text.history import NO_RUNS, history_head
+from hexacell.text.history import NO_RUNS, history_head, history_line
 from hexacell.text.screens.live import (
     CHECKING,
-    PLAN_UNKNOWN,
     PRESS_CHECK,
     PRESS_LENGTH,
     RUNNING,
     STARTING,
-    TRYING,
     device_lines,
     gauge_figure,
     live_items,
@@ -33,10 +33,9 @@ from hexacell.text.screens.live import (
     urgency_of,
 )
 from hexacell.text.screens.measuring import accuracy_plot, fault_view, guidance, record_lines
-from hexacell.text.screens.planned_poses import exclusions_text, plan_note, plan_rows
+from hexacell.text.screens.planned_poses import plan_lines, plan_note, plan_rows
 from hexacell.text.screens.questions import PERSON, question_view
 from hexacell.text.screens.reviewing import (
-    PROPOSAL_WAITS,
     READING,
     WHAT_TO_PRESS,
     review_plots,
@@ -48,9 +47,7 @@ from hexacell.text.screens.run_picture import header_line
 from hexacell.text.screens.views import (
     ChecklistItem,
     FaultView,
-    HistoryEntry,
     Line,
-    PlotView,
     QuestionView,
     Urgency,
 )
@@ -59,21 +56,6 @@ from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo
 from procedures.run.keys import ThreeNumbers
 
-OF_A_RUN = {
-    ScreenAction.PAUSE,
-    ScreenAction.PAUSE_AT_ONCE,
-    ScreenAction.UNDO,
-    ScreenAction.MEASURE_AGAIN,
-    ScreenAction.ABORT,
-}
-WITHOUT_A_RUN = {
-    ScreenAction.CHECK,
-    ScreenAction.START,
-    ScreenAction.EXCLUDE,
-    ScreenAction.ROLL_BACK,
-    ScreenAction.APPLY,
-}
-OF_A_RECORDING = {ScreenAction.STEP, ScreenAction.PLAY}
 SPEEDS = (0.0, 1.0, 10.0, 60.0, 600.0)
 """Speeds of a recorded run, as multiples of that at which it was recorded; the first is standstill."""
 
@@ -83,6 +65,9 @@ class ScreenModel:
 
     The views are those of this moment and cost a few milliseconds at most; what takes longer is awaited.
     Everything that is awaited raises ``HexacellError``.
+
+    Attributes:
+        runs: the runs of the cell, the latest first; None until they are read.
     """
 
     def __init__(self, workplace: Workplace, now: Callable[[], float] = time.monotonic) -> None:
@@ -92,12 +77,12 @@ class ScreenModel:
         self._run_is_over = asyncio.Event()
         self._is_checking, self._is_starting, self._is_ready = False, False, False
         self._checked: tuple[ChecklistItem, ...] | None = None
-        self._entries: tuple[HistoryEntry, ...] | None = None
+        self.runs: tuple[PastRun, ...] | None = None
         self._compared: tuple[str, ...] = ()
         self._tried: TriedPlan | None = None
         self._trial: asyncio.Future[TriedPlan] | None = None
         self._described: tuple[Cell | None, tuple[str, ...]] = (None, ())
-        self._reviewed: tuple[object, dict[str, str], tuple[PlotView, ...]] | None = None
+        self._reviewed: tuple[tuple[object, ...], dict[str, tuple[Any, ...]]] | None = None
         self._does: dict[ScreenAction, Callable[[str], Awaitable[str | None]]] = {
             ScreenAction.PAUSE: self._pause,
             ScreenAction.PAUSE_AT_ONCE: partial(self._give, Pause(at_once=True)),
@@ -168,7 +153,8 @@ class ScreenModel:
         if described is None or not described.is_recorded:
             return ""
         name = described.folder.name
-        return name if any(one.name == name and one.has_proposal for one in self._entries or ()) else ""
+        proposing = (one.name for one in self.runs or () if one.summary.has_proposal)
+        return name if name in proposing else ""
 
     @property
     def _recording(self) -> RecordedRun | None:
@@ -181,37 +167,61 @@ class ScreenModel:
         """Whether a run goes on that has the devices."""
         return self._run.connection is not None and self._recording is None
 
-    @property
-    def cell(self) -> Cell:
-        """The cell as its file states it now."""
-        return self._workplace.cell
-
-    @property
-    def runs(self) -> tuple[HistoryEntry, ...] | None:
-        """The runs of the cell, the latest first; None until they are read."""
-        return self._entries
-
-    @property
-    def _planned(self) -> tuple[VisitedPose, ...]:
-        return () if self._tried is None else self._tried.poses
-
     def header(self) -> tuple[str, str, Urgency]:
         """The first line of every screen."""
-        return header_line(self.cell.settings.name, self._run.picture)
+        return header_line(self._workplace.cell.settings.name, self._run.picture)
 
-    def devices(self) -> list[Line]:
+    def shown(self, screen: str) -> dict[str, tuple[Any, ...]]:
+        """What the parts of a screen show now, by their names: what each ``show`` is called with."""
+        cell, picture = self._workplace.cell, self._run.picture
+        tried, is_trying = self._tried or TriedPlan(), self._trial is not None
+        match screen:
+            case "cell":
+                if self._described[0] is not cell:
+                    self._described = (cell, tuple(describe(cell).splitlines()))
+                title = f"What {cell.path.name} says; behind each value its line in the file, or default"
+                settings = (*self._workplace.warnings, *self._described[1])
+                return {
+                    "devices": (self._devices_now(),),
+                    "settings-title": (title,),
+                    "settings": (settings,),
+                }
+            case "preflight":
+                checked = self._checked
+                if checked is None:
+                    checked = unchecked_items(is_checking=self._is_checking)
+                items = (*live_items(self._live()[0]), *checked)
+                return {
+                    "instruction": (self._instruction(),),
+                    "checklist": ([line for item in items for line in item.lines],),
+                    "plan": (plan_lines(cell.settings, tried.lines, is_trying=is_trying),),
+                }
+            case "plan":
+                note = plan_note(tried.poses, is_trying=is_trying)
+                return {"plan-note": (note,), "poses": (plan_rows(cell.settings, tried.poses),)}
+            case "measure":
+                return {
+                    "guidance": (guidance(picture, cell.settings),),
+                    "devices": (device_lines(*self._measured()),),
+                    "records": (record_lines(picture),),
+                    "accuracy": (accuracy_plot(picture, cell.settings.identification.target_mm),),
+                }
+            case "review":
+                return self._result()
+            case "history":
+                title = history_head() if self.runs else READING if self.runs is None else NO_RUNS
+                asked = () if self.runs is None else (*WHAT_TO_PRESS, "", *self._compared)
+                rows = [(run.name, history_line(run)) for run in self.runs or ()]
+                return {"history-header": (title,), "comparison": (asked,), "runs": (rows,)}
+            case _:
+                raise UsageError(f"there is no screen {screen!r}")
+
+    def _devices_now(self) -> list[Line]:
         """The devices as they show now."""
         snapshot, later_s = self._live()
         if self._devices.problem and snapshot is None:
             return [(self._devices.problem, Urgency.CALM)]
         return device_lines(snapshot, later_s)
-
-    def cell_lines(self) -> tuple[str, ...]:
-        """What is to be changed in the cell file, and what it says with the origin of each value."""
-        cell = self.cell
-        if self._described[0] is not cell:
-            self._described = (cell, tuple(describe(cell).splitlines()))
-        return (*self._workplace.warnings, *self._described[1])
 
     def _live(self) -> tuple[LiveSnapshot | None, float]:
         """What the devices showed last, and how long ago, s."""
@@ -231,91 +241,38 @@ class ScreenModel:
         zero = None if picture.at is None else picture.state.zero_shown(picture.at)
         return picture.live, self._now() - picture.live_at_s, zero
 
-    def instruction(self) -> str:
+    def _instruction(self) -> str:
         """What to press before a run, or why none can be started now."""
         if self._is_checking:
             return CHECKING
         if self._is_running or self._is_starting:
             return RUNNING if self._is_running else STARTING
-        has_fixture = self.cell.settings.length_check is not None
+        has_fixture = self._workplace.cell.settings.length_check is not None
         return f"{PRESS_CHECK} {PRESS_LENGTH}" if has_fixture else PRESS_CHECK
 
-    def checklist(self) -> list[str]:
-        """Everything that must hold before motion."""
-        checked = self._checked
-        if checked is None:
-            checked = unchecked_items(is_checking=self._is_checking)
-        return [line for item in (*live_items(self._live()[0]), *checked) for line in item.lines]
+    def mounting(self) -> list[Line]:
+        """How each gauge is to be moved while the gauges are placed."""
+        return device_lines(*self._measured(), self._workplace.cell.settings.stations.mounting_mm)
 
-    def plan_lines(self) -> list[str]:
-        """What the plan is expected to give."""
-        tried = () if self._tried is None else self._tried.lines
-        lines = (exclusions_text(self.cell.settings), *((TRYING,) if self._trial is not None else tried))
-        return list(filter(None, lines)) or [PLAN_UNKNOWN]
-
-    def plan_note(self) -> str:
-        """Where the planned poses come from."""
-        return plan_note(self._planned, is_trying=self._trial is not None)
-
-    def plan_rows(self) -> list[tuple[str, str]]:
-        """What the cell file excludes, and the poses of the plan."""
-        return plan_rows(self.cell.settings, self._planned)
-
-    def guidance(self) -> dict[str, str]:
-        """What happens now, what is next, how long it takes, and how to stop."""
-        return guidance(self._run.picture, self.cell.settings)
-
-    def run_devices(self, *, for_mounting: bool = False) -> list[Line]:
-        """The devices of the run; or how each gauge is to be moved."""
-        return device_lines(
-            *self._measured(), self.cell.settings.stations.mounting_mm if for_mounting else None
-        )
-
-    def figures(self) -> list[Line]:
-        """The figure of each gauge that is to be read across the room."""
+    def figures(self) -> tuple[str, list[Line], int]:
+        """What happens now, the figure of each gauge, and the number of records."""
         snapshot, _, zero = self._measured()
         gauges = () if snapshot is None else snapshot.gauges
-        return [(gauge_figure(one, zero), urgency_of(one.problem)) for one in gauges]
+        figures = [(gauge_figure(one, zero), urgency_of(one.problem)) for one in gauges]
+        records = sum(len(measured.samples) for measured in self._run.picture.state.sets.values())
+        return guidance(self._run.picture, self._workplace.cell.settings)["Now"], figures, records
 
-    def records(self) -> tuple[str, ...]:
-        """A line for each record of the run."""
-        return record_lines(self._run.picture)
-
-    def accuracy(self) -> PlotView:
-        """The predicted error against the records."""
-        return accuracy_plot(self._run.picture, self.cell.settings.identification.target_mm)
-
-    def review(self) -> dict[str, str]:
-        """The texts of the result; made again where something has changed beside the live values."""
-        shown = self._result()[0]
-        if not self.proposing_run:
-            return shown
-        return {**shown, "approval": f"{shown['approval']} {PROPOSAL_WAITS}"}
-
-    def review_plots(self) -> tuple[PlotView, ...]:
-        """The pictures of the result."""
-        return self._result()[1]
-
-    def verdict_urgency(self) -> Urgency:
-        """How much attention the verdict needs."""
-        return verdict_urgency(self._run.picture.state)
-
-    def _result(self) -> tuple[dict[str, str], tuple[PlotView, ...]]:
-        picture = self._run.picture
-        shown = (id(picture.state), id(picture.question))
-        if self._reviewed is None or self._reviewed[0] != shown:
-            self._reviewed = (shown, review_texts(picture, self.cell.settings), review_plots(picture))
-        return self._reviewed[1:]
-
-    def history_title(self) -> str:
-        """The header of the list of runs, or why there is no list."""
-        if self._entries:
-            return history_head()
-        return READING if self._entries is None else NO_RUNS
-
-    def comparison(self) -> tuple[str, ...]:
-        """What may be asked about a run, and what was asked last."""
-        return () if self._entries is None else (*WHAT_TO_PRESS, "", *self._compared)
+    def _result(self) -> dict[str, tuple[Any, ...]]:
+        """The parts of the result; made again where something has changed beside the live values."""
+        picture, may_write = self._run.picture, bool(self.proposing_run)
+        seen = (picture.state, picture.question, may_write)
+        if self._reviewed is None or not all(map(is_, self._reviewed[0], seen)):
+            texts = review_texts(picture, self._workplace.cell.settings, may_write=may_write)
+            shown: dict[str, tuple[Any, ...]] = {name: (text,) for name, text in texts.items()}
+            shown["verdict"] = (texts["verdict"], verdict_urgency(picture.state))
+            plots = enumerate(review_plots(picture))
+            self._reviewed = (seen, shown | {f"plot-{number}": (plot,) for number, plot in plots})
+        return self._reviewed[1]
 
     def question(self) -> QuestionView | None:
         """The question that waits, if one does and may be answered here."""
@@ -333,16 +290,19 @@ class ScreenModel:
 
     def allows(self, action: ScreenAction) -> bool:
         """Whether an action has an effect now."""
-        if action in OF_A_RUN:
-            is_over = self._run.picture.status is Status.ENDED
-            return self._is_running and self._run.picture.may_command and not is_over
-        if action in OF_A_RECORDING:
-            return self._recording is not None
-        if action is ScreenAction.TAKE_CONTROL:
-            return self._is_running and not self._run.picture.may_command
-        if action in WITHOUT_A_RUN:
-            return not (self._is_running or self._is_checking or self._is_starting)
-        return True
+        asked = ScreenAction
+        match action:
+            case asked.PAUSE | asked.PAUSE_AT_ONCE | asked.UNDO | asked.MEASURE_AGAIN | asked.ABORT:
+                is_over = self._run.picture.status is Status.ENDED
+                return self._is_running and self._run.picture.may_command and not is_over
+            case asked.STEP | asked.PLAY:
+                return self._recording is not None
+            case asked.TAKE_CONTROL:
+                return self._is_running and not self._run.picture.may_command
+            case asked.CHECK | asked.START | asked.EXCLUDE | asked.ROLL_BACK | asked.APPLY:
+                return not (self._is_running or self._is_checking or self._is_starting)
+            case _:
+                return True
 
     async def perform(self, action: ScreenAction, argument: str = "") -> str:
         """Do what was asked for; a remark about it, or an empty text."""
@@ -427,7 +387,7 @@ class ScreenModel:
             trial.cancel()
 
     async def _exclude(self, name: str) -> None:
-        await self._workplace.toggle_exclusion(name, self._planned)
+        await self._workplace.toggle_exclusion(name, () if self._tried is None else self._tried.poses)
         await self._preview("")
 
     async def _compare(self, run: str) -> None:
@@ -455,9 +415,9 @@ class ScreenModel:
     async def _read_history(self) -> None:
         """Read which runs there are; where that fails, the history says why."""
         try:
-            self._entries = await self._workplace.runs()
+            self.runs = await self._workplace.runs()
         except HexacellError as error:
-            self._entries, self._compared = (), tuple(str(error).splitlines())
+            self.runs, self._compared = (), tuple(str(error).splitlines())
 
     async def _step(self, argument: str) -> None:
         """To an end, or by a number of events."""

@@ -127,7 +127,7 @@ class QuestionOverlay(AnswerOverlay[None]):
     def draw(self, model: ScreenModel) -> None:
         """Show the gauges as they are now."""
         if self.view.shows_gauges:
-            self.query_one(DevicePanel).show(model.run_devices(for_mounting=True))
+            self.query_one(DevicePanel).show(model.mounting())
 
 
 class FaultOverlay(ModalScreen[None]):

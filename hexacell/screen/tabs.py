@@ -21,8 +21,8 @@ from hexacell.screen.widgets import (
     TextList,
     TextPanel,
     TopLine,
+    show_parts,
 )
-from hexacell.text.screens.views import Urgency
 
 if TYPE_CHECKING:
     from hexacell.screen.model import ScreenModel
@@ -51,11 +51,8 @@ class TabScreen(Screen[None]):
     def draw(self, model: ScreenModel) -> None:
         """Show what is so now."""
         self.query_one(TopLine).show(*model.header())
-        self.draw_body(model)
+        show_parts(self, model, self.TAB)
         self.query_one(KeyLine).show(model.allows)
-
-    def draw_body(self, model: ScreenModel) -> None:
-        """Show what this screen has of its own."""
 
 
 class CellScreen(TabScreen):
@@ -70,13 +67,6 @@ class CellScreen(TabScreen):
         yield DevicePanel(id="devices")
         yield TextPanel("Cell file", id="settings-title", classes="title")
         yield TextList(id="settings")
-
-    def draw_body(self, model: ScreenModel) -> None:
-        """Show the cell."""
-        self.query_one(DevicePanel).show(model.devices())
-        title = f"What {model.cell.path.name} says; behind each value its line in the file, or default"
-        self.query_one("#settings-title", TextPanel).show(title)
-        self.query_one("#settings", TextList).show(model.cell_lines())
 
 
 class PreflightScreen(TabScreen):
@@ -104,12 +94,6 @@ class PreflightScreen(TabScreen):
         yield TextPanel("The plan", classes="title")
         yield TextList(id="plan")
 
-    def draw_body(self, model: ScreenModel) -> None:
-        """Show the checklist."""
-        self.query_one("#instruction", TextPanel).show(model.instruction())
-        self.query_one("#checklist", TextList).show(model.checklist())
-        self.query_one("#plan", TextList).show(model.plan_lines())
-
 
 RECORDS_HEADER = f"{'point/pose':12}{'x':>8}{'y':>8}{'z':>8}{'residual':>9}{'sigma':>6}"
 """The residual is the largest of x, y and z; sigma its ratio to noise."""
@@ -134,7 +118,7 @@ class MeasureScreen(TabScreen):
 
     def compose_body(self) -> ComposeResult:
         """The parts of this screen."""
-        yield GuidancePanel()
+        yield GuidancePanel(id="guidance")
         yield TextPanel("Devices", id="devices-title", classes="title")
         yield DevicePanel(id="devices")
         with Horizontal(id="lower"):
@@ -143,13 +127,6 @@ class MeasureScreen(TabScreen):
                 yield TextPanel(RECORDS_HEADER, id="records-header", classes="table-header")
                 yield TextList(id="records", follows=True)
             yield PlotPanel(id="accuracy")
-
-    def draw_body(self, model: ScreenModel) -> None:
-        """Show the run."""
-        self.query_one(GuidancePanel).show(model.guidance())
-        self.query_one(DevicePanel).show(model.run_devices())
-        self.query_one("#records", TextList).show(model.records())
-        self.query_one(PlotPanel).show(model.accuracy())
 
 
 PLOTS = 3
@@ -179,14 +156,6 @@ class ReviewScreen(TabScreen):
                 yield TextPanel("The change of the controller's config", classes="title")
                 yield TextPanel(id="change")
 
-    def draw_body(self, model: ScreenModel) -> None:
-        """Show the result."""
-        for place, text in model.review().items():
-            urgency = model.verdict_urgency() if place == "verdict" else Urgency.CALM
-            self.query_one(f"#{place}", TextPanel).show(text, urgency)
-        for number, plot in enumerate(model.review_plots()):
-            self.query_one(f"#plot-{number}", PlotPanel).show(plot)
-
 
 class HistoryScreen(TabScreen):
     """The runs above, what was asked about one of them below."""
@@ -209,12 +178,10 @@ class HistoryScreen(TabScreen):
         yield TextPanel("Comparison", classes="title")
         yield TextList(id="comparison")
 
-    def draw_body(self, model: ScreenModel) -> None:
-        """Show the runs."""
+    def draw(self, model: ScreenModel) -> None:
+        """Show what is so now."""
         self.is_asked = model.question() is not None
-        self.query_one("#history-header", TextPanel).show(model.history_title())
-        self.query_one("#comparison", TextList).show(model.comparison())
-        self.query_one(RowList).show([(one.name, one.line) for one in model.runs or ()])
+        super().draw(model)
 
     async def action_about(self, what: str) -> None:
         """Do something about the run that is chosen."""

@@ -7,16 +7,21 @@ takes longer than all else on it; so the keys are a line of text.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.content import Content
+from textual.screen import Screen
 from textual.widgets import OptionList, Static
 from textual.widgets.option_list import Option
 
 from hexacell.screen.preferences import KEYS, ScreenAction
 from hexacell.text.screens.plot_lines import plot_lines
 from hexacell.text.screens.views import Line, PlotView, Urgency
+
+if TYPE_CHECKING:
+    from hexacell.screen.model import ScreenModel
 
 
 class TextPanel(Static):
@@ -93,9 +98,9 @@ class DevicePanel(Vertical):
 class GuidancePanel(Vertical):
     """Four lines, the first one emphasised."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - as in every widget
         self._lines = {word: TextPanel(classes=f"guidance-{word.lower()}") for word in WORDS}
-        super().__init__(*self._lines.values())
+        super().__init__(*self._lines.values(), id=id)
 
     def show(self, guidance: Mapping[str, str]) -> None:
         """Show the guidance."""
@@ -236,3 +241,10 @@ class KeyLine(Static):
         has_effect = action not in _ACTIONS or self._has_effect[_ACTIONS[action]]
         text = "[b]$key[/b] $word" if has_effect else "[dim][b]$key[/b] $word[/dim]"
         return Content.from_markup(f"[@click=app.{call}]{text}[/]", key=self._keys[name], word=word)
+
+
+def show_parts(screen: Screen[Any], model: ScreenModel, name: str) -> None:
+    """Show in each part of a screen what the model has for it."""
+    for part, shown in model.shown(name).items():
+        widget: Any = screen.query_one(f"#{part}")
+        widget.show(*shown)

@@ -30,8 +30,7 @@ from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, approval_question, read_proposal
 from hexacell.text.config_changes import applied_text, rollback_text
 from hexacell.text.history import comparison_text, drift_text
-from hexacell.text.screens.reviewing import history_entries
-from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.text.screens.views import ChecklistItem, Mark
 from procedures.calibration.calibration import Mode
 from procedures.journal.journal import read_journal
 from procedures.run.questions import Question
@@ -128,13 +127,13 @@ class Workplace:
         """Write an exclusion into the cell file, or remove it."""
         self.cell = await asyncio.to_thread(toggle_exclusion, self.cell, name, planned)
 
-    async def runs(self) -> tuple[HistoryEntry, ...]:
+    async def runs(self) -> tuple[PastRun, ...]:
         """The runs of the cell, the latest first."""
-        return history_entries(await self._past_runs())
+        return await asyncio.to_thread(past_runs, self.cell)
 
     async def compare(self, run: str) -> tuple[str, ...]:
         """A run beside the one before it."""
-        identified = [one.name for one in await self._past_runs() if one.summary.has_result]
+        identified = [one.name for one in await self.runs() if one.summary.has_result]
         earlier = identified[identified.index(run) + 1 :] if run in identified else []
         if not earlier:
             raise UsageError(f"no run before {run} identified a geometry", action="Choose a later one")
@@ -143,16 +142,16 @@ class Workplace:
 
     async def drift(self) -> tuple[str, ...]:
         """The drift of each parameter over all runs."""
-        found = await asyncio.to_thread(parameter_trends, self.cell, await self._past_runs())
+        found = await asyncio.to_thread(parameter_trends, self.cell, await self.runs())
         return tuple(drift_text(found).splitlines())
 
     async def is_in_controller(self, run: str) -> bool:
         """Whether the controller's config is the one that a run wrote."""
-        return any(one.name == run and one.is_in_controller for one in await self._past_runs())
+        return any(one.name == run and one.is_in_controller for one in await self.runs())
 
     async def approval(self, run: str) -> Question:
         """The question that a person is asked before the open proposal of a run is written."""
-        if not any(one.name == run and one.summary.has_proposal for one in await self._past_runs()):
+        if not any(one.name == run and one.summary.has_proposal for one in await self.runs()):
             raise UsageError(f"{run} has no proposal that could be written", action="Choose one that has")
         return approval_question(read_proposal(find_run(self.cell, run)))
 
@@ -179,14 +178,8 @@ class Workplace:
         done = await asyncio.to_thread(roll_back_config, self.cell, to, by=by)
         return tuple(rollback_text(done).splitlines())
 
-    async def _past_runs(self) -> tuple[PastRun, ...]:
-        return await asyncio.to_thread(past_runs, self.cell)
-
     async def open_run(self, run: str) -> RunConnection:
         """A recorded run."""
-        return await asyncio.to_thread(self._recorded_run, run)
-
-    def _recorded_run(self, run: str) -> RecordedRun:
         folder = find_run(self.cell, run)
-        read_sound(folder, self.cell.settings)
-        return RecordedRun(folder)
+        await asyncio.to_thread(read_sound, folder, self.cell.settings)
+        return await asyncio.to_thread(RecordedRun, folder)

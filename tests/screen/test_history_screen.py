@@ -21,6 +21,7 @@ from hexacell.screen.overlays import ConfirmOverlay, FaultOverlay
 from hexacell.screen.workplace import Workplace
 from hexacell.services.write_back.config_history import config_history
 from hexacell.text.config_changes import RELOAD
+from hexacell.text.history import history_line
 from hexacell.text.screens.questions import PERSON
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
@@ -159,7 +160,7 @@ def latest_line(pilot: Pilot[int]) -> str:
     assert isinstance(app, TechnicianApp)
     assert app.model is not None
     assert app.model.runs
-    return app.model.runs[0].line
+    return history_line(app.model.runs[0])
 
 
 async def until_asked(pilot: Pilot[int]) -> None:

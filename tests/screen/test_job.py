@@ -16,7 +16,7 @@ from hexacell.screen.app import TechnicianApp
 from hexacell.screen.overlays import FaultOverlay, QuestionOverlay
 from hexacell.screen.widgets import TextList, TextPanel
 from hexacell.screen.workplace import Preflight
-from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.text.screens.views import ChecklistItem, Mark
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo
@@ -25,7 +25,7 @@ from procedures.run.questions import PLACED, ask_approval, ask_placement, ask_re
 from procedures.run.trips import Guard
 from procedures.steps import events
 from tests.screen.conftest import Opened, settled
-from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot
+from tests.screen.told_run import ToldRun, ToldWorkplace, past_run, snapshot
 from tests.waiting import until
 
 PLACED_AT, IDENTIFIED, PROPOSED = 6, 333, 455
@@ -373,7 +373,7 @@ async def test_a_run_that_is_over_is_in_the_history(cell: Cell, run: ToldRun, op
         app = pilot.app
         assert isinstance(app, TechnicianApp)
         assert app.model is not None
-        workplace.entries = (HistoryEntry("2026-03-02T080000Z", "it passed"),)
+        workplace.entries = (past_run("2026-03-02T080000Z"),)
         run.tell(StatusChanged(status=Status.ENDED))
         run.end()
         backend = app.model

@@ -18,8 +18,10 @@ from hexacell.screen.app import TechnicianApp
 from hexacell.screen.further_screens import AssistantScreen
 from hexacell.screen.preferences import THEMES
 from hexacell.screen.workplace import Preflight, TriedPlan
-from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.services.history.run_index import PastRun
+from hexacell.text.screens.views import ChecklistItem, Mark
 from hexacell.verdict.acceptance_gates import AcceptanceGate
+from hexacell.verdict.decision import JudgedError, Verdict, VerifiedAccuracy
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import ask_approval, ask_placement
@@ -28,7 +30,7 @@ from procedures.steps import events
 from tests.screen.conftest import SNAPSHOTS, UPDATE, Opened, compare_with_snapshot, settled
 from tests.screen.test_job import until_shown
 from tests.screen.test_plan_screen import tried
-from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot
+from tests.screen.told_run import ToldRun, ToldWorkplace, past_run, snapshot
 from tests.waiting import until
 
 SIZES = {"80x24": (80, 24), "140x40": (140, 40)}
@@ -47,15 +49,22 @@ DIFF = """\
 """
 
 
+def judged(
+    name: str, mode: str, verdict: Verdict, mm: float, expanded_mm: float, *, is_in_controller: bool = False
+) -> PastRun:
+    error = JudgedError(value=mm, expanded=expanded_mm, limit=0.3, verdict=verdict)
+    accuracy = VerifiedAccuracy(
+        position=error, orientation=error, poses=6, task_named=True, worst=(0.0,) * 6
+    )
+    return past_run(
+        name, is_in_controller=is_in_controller, mode=mode, verdict=verdict, accuracy=accuracy, is_over=True
+    )
+
+
 def idle(cell: Cell) -> ToldWorkplace:
     entries = (
-        HistoryEntry(
-            "2026-03-02T080000Z",
-            "2026-03-02T080000Z     optimise pass             0.034 +- 0.090   in controller",
-        ),
-        HistoryEntry(
-            "2026-02-02T073000Z", "2026-02-02T073000Z     check    conditional pass 0.201 +- 0.080"
-        ),
+        judged("2026-03-02T080000Z", "optimise", Verdict.PASS, 0.034, 0.090, is_in_controller=True),
+        judged("2026-02-02T073000Z", "check", Verdict.CONDITIONAL_PASS, 0.201, 0.080),
     )
     return ToldWorkplace(
         cell,

@@ -24,14 +24,21 @@ from hexacell.run_process.messages import (
     RunDescribed,
     StatusChanged,
 )
+from hexacell.runs.run_folder import RunFolder
 from hexacell.screen.workplace import Preflight, TriedPlan, Workplace
-from hexacell.text.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.services.history.run_index import PastRun, RunSummary
+from hexacell.text.screens.views import ChecklistItem, Mark
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Command
 from procedures.run.questions import Question
 from procedures.steps.events import Event
 
 BEGUN = datetime(2026, 3, 2, 8, 0, tzinfo=UTC)
+
+
+def past_run(name: str, *, is_in_controller: bool = False, **summary: object) -> PastRun:
+    """A run in the history of a cell."""
+    return PastRun(RunFolder(Path(name)), RunSummary.model_validate(summary), is_in_controller)
 
 
 def gauges(**changes: dict[str, object]) -> tuple[GaugeSnapshot, ...]:
@@ -142,7 +149,7 @@ class ToldWorkplace(Workplace):
         default_factory=lambda: Preflight((ChecklistItem(Mark.DONE, "all"),), is_ready=True)
     )
     plan: TriedPlan = field(default_factory=lambda: TriedPlan(()))
-    entries: tuple[HistoryEntry, ...] = ()
+    entries: tuple[PastRun, ...] = ()
     compared: tuple[str, ...] = ()
     started: RunConnection | None = None
     opened: RunConnection | None = None
@@ -176,7 +183,7 @@ class ToldWorkplace(Workplace):
     async def toggle_exclusion(self, name: str, planned: tuple[VisitedPose, ...]) -> None:
         self.toggled.append(name)
 
-    async def runs(self) -> tuple[HistoryEntry, ...]:
+    async def runs(self) -> tuple[PastRun, ...]:
         return self.entries
 
     async def compare(self, run: str) -> tuple[str, ...]:

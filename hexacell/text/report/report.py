@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date
+
 from drivers.interfaces import DeviceIdentity
-from hexacell.cell.fields import CertificateSettings
 from hexacell.services.history.reported_run import ReportedRun
 from hexacell.text.measured_noise import measured_noise_sentences
 from hexacell.text.report.pages import Chapter, Facts, Paragraph, Report, Table, Tone
@@ -94,18 +97,13 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
 
 def traceability_chapter(run: ReportedRun) -> Chapter:
     """Every instrument with its serial number and certificate."""
-    day = run.began.date()
-    rows = []
-    for device in run.started.devices:
-        certificate = certificate_of(run, device)
-        number = NOT_STATED if certificate is None else certificate.number
-        if certificate is not None and certificate.expanded_um is not None:
-            number = f"{number} (U {certificate.expanded_um:g} um)"
-        due = "" if certificate is None or certificate.due is None else certificate.due.isoformat()
-        if certificate is not None and certificate.has_expired(day):
-            due = f"{due}: EXPIRED"
-        serial = serial_number_of(run, device) or NOT_STATED
-        rows.append((device.name, device.description, serial, number, due))
+    day, rows = run.began.date(), []
+    for one in instruments(run):
+        number = one.certificate or NOT_STATED
+        if one.expanded_um is not None:
+            number = f"{number} (U {one.expanded_um:g} um)"
+        due = "" if one.due is None else f"{one.due.isoformat()}{': EXPIRED' if one.due < day else ''}"
+        rows.append((one.device.name, one.device.description, one.serial_number or NOT_STATED, number, due))
     expired = run.settings.expired_on(day)
     text = f"Expired on the day of the run: {', '.join(expired)}."
     note = (Paragraph(text, is_strong=True),) if expired else ()
@@ -145,16 +143,28 @@ def temperature_ranges(run: ReportedRun) -> dict[str, tuple[float, float]]:
     return {name: (min(values), max(values)) for name, values in shown.items()}
 
 
-def certificate_of(run: ReportedRun, device: DeviceIdentity) -> CertificateSettings | None:
-    """Certificate of an instrument: a gauge has its own, the encoders have one together."""
-    certificates = run.settings.certificates
-    if device.name.startswith("encoder"):
-        return certificates.get("encoders")
-    return certificates.get(f"gauge {device.name}")
+@dataclass(frozen=True, slots=True)
+class Instrument:
+    """An instrument of a run; ``certificate`` is its number, empty without one, ``due`` when it ends."""
+
+    device: DeviceIdentity
+    serial_number: str
+    certificate: str
+    due: date | None
+    expanded_um: float | None
 
 
-def serial_number_of(run: ReportedRun, device: DeviceIdentity) -> str:
-    """Serial number that an instrument reports, or else that of the cell file; empty without either."""
-    return device.serial_number or next(
-        (gauge.serial_number for gauge in run.settings.gauges if gauge.name == device.name), ""
-    )
+def instruments(run: ReportedRun) -> Iterator[Instrument]:
+    """The instruments: a gauge has a certificate of its own, the encoders have one together.
+
+    A serial number is the one that the instrument reports, or else that of the cell file.
+    """
+    for device in run.started.devices:
+        is_encoder = device.name.startswith("encoder")
+        found = run.settings.certificates.get("encoders" if is_encoder else f"gauge {device.name}")
+        stated = (gauge.serial_number for gauge in run.settings.gauges if gauge.name == device.name)
+        serial_number = device.serial_number or next(stated, "")
+        if found is None:
+            yield Instrument(device, serial_number, "", None, None)
+        else:
+            yield Instrument(device, serial_number, found.number, found.due, found.expanded_um)

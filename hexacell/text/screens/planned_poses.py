@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from hexacell.cell.model import CellSettings
 from hexacell.dry_run.campaign import VisitedPose
-from hexacell.text.screens.live import TRYING
+from hexacell.text.screens.live import PLAN_UNKNOWN, TRYING
 
 NOT_TRIED = "v in 2 Preflight tries the plan; then its poses are here."
 EVERYTHING = "These poses were measured on a simulated robot; a real one is sent to others near them."
@@ -21,6 +21,12 @@ def plan_note(planned: Sequence[VisitedPose], *, is_trying: bool) -> str:
 def plan_rows(settings: CellSettings, planned: Sequence[VisitedPose]) -> list[tuple[str, str]]:
     """Name and line of each exclusion of the cell file and, once the plan was tried, of its poses."""
     return [*_exclusions(settings), *(_poses(settings, planned) if planned else ())]
+
+
+def plan_lines(settings: CellSettings, tried: Sequence[str], *, is_trying: bool) -> list[str]:
+    """How much the cell file excludes, and what the plan is expected to give."""
+    lines = (exclusions_text(settings), *([TRYING] if is_trying else tried))
+    return list(filter(None, lines)) or [PLAN_UNKNOWN]
 
 
 def exclusions_text(settings: CellSettings) -> str:

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from hexacell.cell.model import CellSettings
-from hexacell.services.history.run_index import PastRun
-from hexacell.text.history import history_line
 from hexacell.text.line_face import event_text
 from hexacell.text.parameters import parameter_table, rows_of_run
 from hexacell.text.screens.measuring import accuracy_plot
 from hexacell.text.screens.questions import PERSON, approval_refusal
 from hexacell.text.screens.run_picture import RunPicture
-from hexacell.text.screens.views import Choice, HistoryEntry, PlotView, QuestionView, Series, Urgency
+from hexacell.text.screens.views import Choice, PlotView, QuestionView, Series, Urgency
 from hexacell.text.verdict import VERDICT_MEANINGS
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import DeviationStatistics
@@ -34,8 +30,13 @@ WHAT_TO_PRESS = (
 URGENCIES = {Verdict.PASS: Urgency.CALM, Verdict.FAIL: Urgency.ALARM}
 
 
-def review_texts(picture: RunPicture, settings: CellSettings | None) -> dict[str, str]:
-    """The texts of a result, by the part of the screen that shows each; the verdict first."""
+def review_texts(
+    picture: RunPicture, settings: CellSettings | None, *, may_write: bool = False
+) -> dict[str, str]:
+    """The texts of a result, by the part of the screen that shows each; the verdict first.
+
+    ``may_write`` is whether this is a recorded run whose proposal can be written.
+    """
     state, subject = picture.state, picture.question and picture.question.subject
     diff = subject.diff if isinstance(subject, PendingChange) else ""
     verdict = "No verdict yet: it is given once the held-out poses are measured."
@@ -45,7 +46,7 @@ def review_texts(picture: RunPicture, settings: CellSettings | None) -> dict[str
     return {
         "verdict": verdict,
         "scope": "\n".join(_scope(state)),
-        "approval": _approval(picture),
+        "approval": f"{_approval(picture)} {PROPOSAL_WAITS}" if may_write else _approval(picture),
         "comparison": "\n".join(_comparison(state)),
         "parameters-header": header,
         "parameters": "\n".join(parameters) or "The geometry is not identified yet.",
@@ -146,11 +147,6 @@ def residual_plot(picture: RunPicture) -> PlotView:
         level=0.0,
         note="No record beside a reference is taken yet.",
     )
-
-
-def history_entries(runs: Sequence[PastRun]) -> tuple[HistoryEntry, ...]:
-    """A line for each run, in their order."""
-    return tuple(HistoryEntry(run.name, history_line(run), run.summary.has_proposal) for run in runs)
 
 
 def rollback_question(run: str, *, is_in_controller: bool) -> QuestionView:

@@ -29,7 +29,7 @@ from hexacell.text.screens.measuring import fault_view, guidance, record_lines
 from hexacell.text.screens.questions import question_view
 from hexacell.text.screens.reviewing import review_texts
 from hexacell.text.screens.run_picture import RunPicture, picture_after
-from hexacell.text.screens.views import Urgency, block_text
+from hexacell.text.screens.views import Urgency
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
 from procedures.engine.command_loop import Status
@@ -214,17 +214,6 @@ def test_a_fault_has_its_cause_and_the_next_action() -> None:
         "the cell is in use",
         "Wait",
     )
-
-
-def test_figures_for_across_the_room() -> None:
-    assert [line.replace(" ", ".") for line in block_text("-1.")] == [
-        "..........██",
-        "........████",
-        "██████....██",
-        "..........██",
-        "........██████..██",
-    ]
-    assert len(block_text("5", 2)) == 10
 
 
 def test_a_check_shows_what_has_changed() -> None:

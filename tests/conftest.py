@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import fnmatch
-import json
 import os
 import re
 import signal
@@ -21,7 +20,6 @@ GRACE_S = 20.0  # for what is on its way out when a test returns; only a test th
 TESTS = Path(__file__).parent
 BENCHMARKS = TESTS / "benchmarks"
 _KEPT_OPEN = re.compile(r"/mpl-data/|\.so(\.[0-9.]+)?$")
-FAULTS = "fault-matrix"  # what a test calls the cases that it tried
 
 # As in the program and the Makefile: threads only slow small matrices down. Numpy is imported later.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -58,19 +56,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             f"these samples name no parameters of their tests: {sorted(patterns - taken)}"
         )
     items.sort(key=lambda item: item.path.parent != TESTS)
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Print the fault matrix of the tests in tests/faults that were run, by whichever process."""
-    reports = [
-        report for outcome in ("passed", "failed") for report in terminalreporter.getreports(outcome)
-    ]
-    entries = [value for report in reports for name, value in report.user_properties if name == FAULTS]
-    if entries:
-        from tests.faults.matrix import Case, table
-
-        terminalreporter.section("fault matrix")
-        terminalreporter.write_line(table(Case(*json.loads(str(entry))) for entry in entries))
 
 
 @pytest.fixture(scope="module")

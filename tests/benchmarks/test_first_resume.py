@@ -24,7 +24,7 @@ import pytest
 
 from hexacell.cell.bundled import bundled_config
 from procedures.journal.journal import read_journal
-from tests.faults.matrix import step_of
+from tests.faults.steps import step_of
 from tests.faults.test_killed_at_random import instants
 
 pytestmark = pytest.mark.benchmark

@@ -23,7 +23,6 @@ from procedures.steps import events
 from tests.faults.cell import MEASURED, NEVER_GOOD_ENOUGH, PROVISIONAL, Site, make_site
 from tests.faults.driver import UNEXPECTED, Order
 from tests.faults.interception import Call
-from tests.faults.matrix import PROPERTY, Case
 from tests.made_once import made_once
 from tests.signals import terminal_signals
 
@@ -206,13 +205,3 @@ def whole_with(request: pytest.FixtureRequest) -> Callable[[str], Whole]:
         return found
 
     return find
-
-
-@pytest.fixture
-def case(request: pytest.FixtureRequest) -> Callable[[str, str, str], None]:
-    """Enter a case into the fault matrix, which is printed at the end of all tests."""
-
-    def enter(fault: str, step: str, outcome: str) -> None:
-        request.node.user_properties.append((PROPERTY, Case(fault, step, outcome).to_json()))
-
-    return enter

@@ -8,13 +8,10 @@ from typing import Any
 from procedures.journal.journal import read_journal
 from procedures.steps import events
 from tests.faults.cell import Site
-from tests.faults.matrix import step_of
 from tests.faults.promises import require_tidy, require_valid, whole_lines
+from tests.faults.steps import step_of
 
 KILLED = -9
-SAME = "resumed, same result"
-OVER = "was over, same result"
-ANEW = "begun anew, same result"
 
 
 def history_of(site: Site) -> Sequence[events.Event]:
@@ -22,7 +19,7 @@ def history_of(site: Site) -> Sequence[events.Event]:
     return read_journal(site.runs()[-1].journal) if site.runs() else ()
 
 
-def finish(program: Any, site: Site, *, code: int = 0) -> str:
+def finish(program: Any, site: Site, *, code: int = 0) -> None:
     """Do what the user of a killed run does: resume it, or begin anew where nothing was begun."""
     at_the_kill = {run.journal: run.journal.read_bytes() for run in site.runs()}
     begun = bool(history_of(site))
@@ -38,7 +35,6 @@ def finish(program: Any, site: Site, *, code: int = 0) -> str:
     assert ended.code == (2 if over else code), ended.words
     require_valid(site.run())
     require_tidy(site)
-    return OVER if over else SAME if begun else ANEW
 
 
 def places(history: Sequence[events.Event]) -> dict[str, int]:

@@ -7,7 +7,7 @@ from typing import Any
 from drivers.simulated import cell as simulated_cell
 from procedures.journal import journal
 from procedures.steps import events
-from tests.faults.matrix import step_of
+from tests.faults.steps import step_of
 
 DEVICES = ("gauge x", "gauge y", "gauge z", "encoder 3", "all encoders", "controller")
 """A gauge of every protocol, one encoder, the cable that all of them are on, and the controller."""

@@ -37,8 +37,8 @@ def _begun(calls: Sequence[Call], replaced: int) -> int:
 class Cutter:
     """Ends the process at a call, looks at the config, and goes on."""
 
-    def __init__(self, program: Any, new_site: Any, whole: Any, case: Any) -> None:
-        self._program, self._new_site, self._case = program, new_site, case
+    def __init__(self, program: Any, new_site: Any, whole: Any) -> None:
+        self._program, self._new_site = program, new_site
         self._whole = whole
         self._after = whole.config_lent or whole.config_after
 
@@ -52,25 +52,24 @@ class Cutter:
         left = bool(site.beside_the_config())
         finish(self._program, site, code=self._whole.ended.code)
         require_identical(site, self._whole.site)
-        self._case("killed in a config write", step, f"{found}, way back kept")
         return f"{found}, leftover" if left else found
 
 
 def test_a_kill_before_the_replacement_leaves_the_old_config(
-    program: Any, new_site: Any, undisturbed: Any, case: Any
+    program: Any, new_site: Any, undisturbed: Any
 ) -> None:
     calls = undisturbed.ended.calls
     replaced = next(number for number, call in enumerate(calls) if call.other.endswith(CONFIG))
-    cutter = Cutter(program, new_site, undisturbed, case)
+    cutter = Cutter(program, new_site, undisturbed)
     assert cutter.cut(replaced, "committing") == "old config, leftover"
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 def test_a_kill_at_any_call_of_a_write_back_or_rollback_leaves_a_valid_config(
-    program: Any, new_site: Any, rolled_back: Any, case: Any
+    program: Any, new_site: Any, rolled_back: Any
 ) -> None:
-    cutter = Cutter(program, new_site, rolled_back, case)
+    cutter = Cutter(program, new_site, rolled_back)
     committing, rolling_back = writes_of_the_config(rolled_back.ended.calls)
     require_cut_everywhere(cutter, committing, "committing", rolling_back, "rolling back")
 
@@ -78,9 +77,9 @@ def test_a_kill_at_any_call_of_a_write_back_or_rollback_leaves_a_valid_config(
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 def test_a_kill_at_any_call_of_a_provisional_write_or_its_reversal_leaves_a_valid_config(
-    program: Any, new_site: Any, lent: Any, case: Any
+    program: Any, new_site: Any, lent: Any
 ) -> None:
-    cutter = Cutter(program, new_site, lent, case)
+    cutter = Cutter(program, new_site, lent)
     lending, taking_back, _ = writes_of_the_config(lent.ended.calls)
     require_cut_everywhere(cutter, lending, "lending", taking_back, "taking back")
 

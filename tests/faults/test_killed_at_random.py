@@ -7,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.faults.killing import KILLED, finish, history_of
-from tests.faults.matrix import step_of
+from tests.faults.killing import KILLED, finish
 from tests.faults.promises import require_identical
 
 INSTANTS = 200
@@ -21,13 +20,12 @@ SOONER = 0.95
     "number", [SAMPLE, pytest.param(INSTANTS, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])]
 )
 def test_a_run_killed_at_a_random_instant_is_resumed(
-    number: int, program: Any, new_site: Any, undisturbed: Any, case: Any
+    number: int, program: Any, new_site: Any, undisturbed: Any
 ) -> None:
     duration_s = undisturbed.ended.seconds
     for share in instants(number):
         site, duration_s = killed(program, new_site, share, duration_s)
-        step = step_of(history_of(site))
-        case("killed at a random instant", step, finish(program, site))
+        finish(program, site)
         require_identical(site, undisturbed.site)
 
 

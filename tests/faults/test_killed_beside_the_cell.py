@@ -12,9 +12,9 @@ import pytest
 
 from tests.faults.cell import Site
 from tests.faults.conftest import ROOT
-from tests.faults.killing import KILLED, after, finish, history_of, places
-from tests.faults.matrix import STEPS, step_of
+from tests.faults.killing import KILLED, after, finish, places
 from tests.faults.promises import require_identical
+from tests.faults.steps import STEPS
 from tests.signals import terminal_signals
 
 STEPS_OF_A_RUN = [step for step in STEPS if step not in {"beginning", "revisiting", "ending"}]
@@ -43,28 +43,24 @@ def served(site: Site) -> Iterator[None]:
             process.terminate()
 
 
-def run_over_killed(records: int, program: Any, site: Site, whole: Any, case: Any) -> None:
+def run_over_killed(records: int, program: Any, site: Site, whole: Any) -> None:
     with served(site):
         assert program.run(site, **after(records)).code == KILLED
-        step = step_of(history_of(site))
-        outcome = finish(program, site, code=whole.ended.code)
+        finish(program, site, code=whole.ended.code)
         require_identical(site, whole.site)
-        case("killed beside a living cell", step, outcome)
 
 
-def test_a_run_killed_within_a_set_is_resumed(
-    program: Any, new_site: Any, undisturbed: Any, case: Any
-) -> None:
+def test_a_run_killed_within_a_set_is_resumed(program: Any, new_site: Any, undisturbed: Any) -> None:
     records = places(undisturbed.history)["sampling"] + 20
-    run_over_killed(records, program, new_site(), undisturbed, case)
+    run_over_killed(records, program, new_site(), undisturbed)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("step", STEPS_OF_A_RUN)
 def test_a_run_killed_at_any_kind_of_step_is_resumed(
-    step: str, program: Any, new_site: Any, whole_with: Any, case: Any
+    step: str, program: Any, new_site: Any, whole_with: Any
 ) -> None:
     whole = whole_with(step)
     records = places(whole.history)[step]
-    run_over_killed(records, program, new_site(*whole.changes), whole, case)
+    run_over_killed(records, program, new_site(*whole.changes), whole)

@@ -9,9 +9,9 @@ import pytest
 from procedures.steps import events
 from tests.faults.cell import Site
 from tests.faults.killing import KILLED, after, finish, history_of, places
-from tests.faults.matrix import STEPS
 from tests.faults.promises import require_identical, require_valid
 from tests.faults.pulling import DEVICES
+from tests.faults.steps import STEPS
 
 TIMEOUT_S = 1.0
 PULLED = tuple(step for step in STEPS if step not in {"beginning", "ending"})
@@ -21,8 +21,8 @@ PULLED = tuple(step for step in STEPS if step not in {"beginning", "ending"})
 class Puller:
     """Pulls a plug out of a run and says what became of it."""
 
-    def __init__(self, program: Any, new_site: Any, whole_with: Any, case: Any) -> None:
-        self._program, self._new_site, self._case = program, new_site, case
+    def __init__(self, program: Any, new_site: Any, whole_with: Any) -> None:
+        self._program, self._new_site = program, new_site
         self._whole_with = whole_with
 
     def pull(self, device: str, step: str, *, back: bool) -> str:
@@ -36,7 +36,6 @@ class Puller:
             finish(self._program, site, code=whole.ended.code)
         require_valid(site.run())
         require_identical(site, whole.site)
-        self._case(f"{device} out{' and back' if back else ''}", step, outcome)
         return outcome
 
     def _begun(self, site: Site, step: str, whole: Any) -> Any:
@@ -60,18 +59,8 @@ class Puller:
 
 
 @pytest.fixture
-def puller(program: Any, new_site: Any, whole_with: Any, case: Any) -> Puller:
-    return Puller(program, new_site, whole_with, case)
-
-
-@pytest.mark.slow
-def test_a_gauge_plugged_in_again_while_measuring_is_recovered(puller: Puller) -> None:
-    assert puller.pull("gauge y", "sampling", back=True) == "done, recovered"
-
-
-@pytest.mark.slow
-def test_a_gauge_plugged_in_again_while_the_noise_is_measured_is_recovered(puller: Puller) -> None:
-    assert puller.pull("gauge y", "measuring noise", back=True) == "done, recovered"
+def puller(program: Any, new_site: Any, whole_with: Any) -> Puller:
+    return Puller(program, new_site, whole_with)
 
 
 def test_a_controller_left_unplugged_ends_the_run_with_the_old_config(puller: Puller) -> None:

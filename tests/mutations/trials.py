@@ -37,89 +37,84 @@ class Templates:
 Trial = Callable[[Templates, Place, random.Random], Attempt]
 
 
-def _rewrite(path: Path, data: bytes) -> None:
-    path.write_bytes(data)
+def mutated_file(path: Path, draw: random.Random) -> bytes:
+    """The content of a file, mutated after its kind."""
+    if path.suffix == ".jsonl":
+        return mutated_journal(path.read_bytes(), draw)
+    mutations = {".toml": TOML, ".json": TOML, ".csv": CSV}.get(path.suffix, ANY)
+    return mutated(path.read_bytes(), mutations, draw)
+
+
+def spoiled(
+    template: Path, templates: Templates, place: Place, name: Path | str, draw: random.Random
+) -> Path:
+    """Make a place a copy of a template, in which one file is mutated."""
+    place.refill(template, templates.small)
+    path = place.cell / name
+    path.write_bytes(mutated_file(path, draw))
+    return path
 
 
 def cell_file(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A cell file that is validated or shown."""
-    sound = (templates.plain, templates.small, templates.furnished)
-    place.refill(draw.choice(sound), templates.small)
-    path = place.cell / CELL
-    _rewrite(path, mutated(path.read_bytes(), TOML, draw))
+    sound = draw.choice((templates.plain, templates.small, templates.furnished))
+    path = spoiled(sound, templates, place, CELL, draw)
     action = draw.choice((["validate"], ["validate", "--json"], ["show"], ["show", "--json"]))
     return attempt(["cell", *action, path], place)
 
 
 def config(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A controller's config."""
-    place.refill(templates.plain, templates.small)
-    path = place.cell / CONFIG
-    _rewrite(path, mutated(path.read_bytes(), TOML, draw))
+    spoiled(templates.plain, templates, place, CONFIG, draw)
     return attempt(["cell", "validate", place.cell / CELL], place)
 
 
 def records(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A measurement file."""
-    place.refill(templates.small, templates.small)
-    path = place.cell / RECORDS
-    _rewrite(path, mutated(path.read_bytes(), CSV, draw))
+    path = spoiled(templates.small, templates, place, RECORDS, draw)
     command = draw.choice(("fit", "fit", "next"))
     return attempt([command, place.cell / CELL, "--measurements", path, "--json"], place)
 
 
 def cell_file_of_records(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A cell file with which records are identified."""
-    place.refill(templates.small, templates.small)
-    path = place.cell / CELL
-    _rewrite(path, mutated(path.read_bytes(), TOML, draw))
+    path = spoiled(templates.small, templates, place, CELL, draw)
     command = draw.choice(("fit", "next"))
     return attempt([command, path, "--measurements", place.cell / RECORDS], place)
 
 
 def journal_replayed(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A journal that is replayed."""
-    place.refill(templates.small, templates.small)
-    path = place.cell / RUN / "journal.jsonl"
-    _rewrite(path, mutated_journal(path.read_bytes(), draw))
+    path = spoiled(templates.small, templates, place, RUN / "journal.jsonl", draw)
     only = draw.choice(("identification", "identification", "identification", "results"))
     return attempt(["replay", path.parent, "--only", only, "--json"], place)
 
 
 def journal_exported(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A run folder that is exported."""
-    place.refill(templates.small, templates.small)
-    path = (
-        place.cell
-        / RUN
-        / draw.choice(("journal.jsonl", "proposal.json", "cell.toml", "wire", "config-before"))
-    )
-    _rewrite(path, mutated_file(path, draw))
+    name = draw.choice(("journal.jsonl", "proposal.json", "cell.toml", "wire", "config-before"))
+    spoiled(templates.small, templates, place, RUN / name, draw)
     return attempt(["replay", place.cell / RUN, "--export", place.cell / "copy"], place)
-
-
-def mutated_file(path: Path, draw: random.Random) -> bytes:
-    """A file of a run folder, mutated after its kind."""
-    if path.suffix == ".jsonl":
-        return mutated_journal(path.read_bytes(), draw)
-    return mutated(path.read_bytes(), TOML if path.suffix in {".toml", ".json"} else ANY, draw)
 
 
 def journal_beside_records(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A run folder whose records are identified again."""
-    place.refill(templates.small, templates.small)
-    path = place.cell / RUN / "journal.jsonl"
-    _rewrite(path, mutated_journal(path.read_bytes(), draw))
+    path = spoiled(templates.small, templates, place, RUN / "journal.jsonl", draw)
     return attempt(["fit", place.cell / CELL, "--measurements", path.with_name("measurements.csv")], place)
+
+
+def files_of(folder: Path) -> list[Path]:
+    """All files below a folder, always in one order."""
+    return [path for path in sorted(folder.rglob("*")) if path.is_file()]
 
 
 def run_resumed(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A run that is resumed, with a mutated file in its folder."""
     place.refill(draw.choice(templates.interrupted), templates.small)
     folder = place.cell / RUN
-    others = [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name != "journal.jsonl"]
+    others = [path for path in files_of(folder) if path.name != "journal.jsonl"]
     path = draw.choice(others) if draw.random() < 0.2 else folder / "journal.jsonl"
-    _rewrite(path, mutated_file(path, draw))
+    path.write_bytes(mutated_file(path, draw))
     named = draw.choice(([], ["run"]))
     command = ["run", place.cell / CELL, "--unattended", "--mode", "optimise", "--resume", *named]
     return attempt(command, place)
@@ -127,9 +122,8 @@ def run_resumed(templates: Templates, place: Place, draw: random.Random) -> Atte
 
 def run_checked(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A cell out of its own reach whose earlier run was mutated: a check reads that, and ends."""
-    place.refill(templates.small, templates.small)
-    path = place.cell / RUN / draw.choice(("journal.jsonl", "write-back.json"))
-    _rewrite(path, mutated_file(path, draw))
+    name = draw.choice(("journal.jsonl", "write-back.json"))
+    spoiled(templates.small, templates, place, RUN / name, draw)
     cell = place.cell / CELL
     text = cell.read_text()
     cell.write_text(text.replace("[100.0, -100.0, 500.0]", "[100.0, -100.0, 5500.0]"))

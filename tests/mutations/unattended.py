@@ -7,16 +7,14 @@ import random
 from hexacell.config.write_record import RECORDS
 from tests.mutations.attempts import Attempt, Place, attempt
 from tests.mutations.texts import ANY, TOML, mutated
-from tests.mutations.trials import CELL, RUN, Templates, mutated_file
+from tests.mutations.trials import CELL, RUN, Templates, files_of, mutated_file, spoiled
 
 FORMATS = ("html", "html", "xml", "txt", "")
 
 
 def cell_file_scheduled(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A cell file with every section that is scheduled, or whose notices are listed."""
-    place.refill(templates.furnished, templates.small)
-    path = place.cell / CELL
-    path.write_bytes(mutated(path.read_bytes(), TOML, draw))
+    path = spoiled(templates.furnished, templates, place, CELL, draw)
     units = ["--folder", place.cell / "units"]
     command = draw.choice(
         (["notify", path], ["schedule", path, "--daily", _time(draw), *units], ["status", path])
@@ -32,7 +30,7 @@ def _time(draw: random.Random) -> str:
 def earlier_runs_listed(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A cell with an earlier run, in whose folder a file was mutated, or the index of all."""
     place.refill(templates.small, templates.small)
-    files = [path for path in sorted((place.cell / RUN).rglob("*")) if path.is_file()]
+    files = files_of(place.cell / RUN)
     if draw.random() < 0.3:
         files = [place.cell / RUN.parent / "index.sqlite"]
         attempt(["history", place.cell / CELL], place)
@@ -65,7 +63,7 @@ def run_reported(templates: Templates, place: Place, draw: random.Random) -> Att
     """A run, in whose folder a file was mutated, that a report is written of."""
     place.refill(templates.small, templates.small)
     folder = place.cell / RUN
-    files = [path for path in sorted(folder.rglob("*")) if path.is_file()]
+    files = files_of(folder)
     path = draw.choice([*files, *[folder / "journal.jsonl"] * len(files)])
     path.write_bytes(mutated_file(path, draw))
     return attempt(["report", folder, "--output", place.cell / f"report.{draw.choice(FORMATS)}"], place)

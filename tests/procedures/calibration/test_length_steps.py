@@ -33,6 +33,7 @@ from procedures.workflow.length import BESIDE_MM
 from procedures.workflow.preflight import plan_failures
 from tests.procedures.fakes import Approver
 from tests.procedures.rig import Rig
+from tests.procedures.runs.listening import happened
 
 RECORDS = 6
 MOUNTINGS = [SetKey(phase=Phase.LENGTH, point=number) for number in (1, 2, 3)]
@@ -143,11 +144,6 @@ async def test_a_fixture_beside_its_direction_is_found_by_the_first_reading(make
     assert np.abs([sample.deviation_mm for sample in samples[1:]]).max() < 0.1
 
 
-async def test_another_distance_than_certified_looks_like_a_scale(make_length_rig) -> None:
-    found = await stated(make_length_rig(simulation__fixture__distance_mm=299.97))
-    assert found.result.long_um_m == pytest.approx(-100.0, abs=found.result.expanded_um_m)
-
-
 class WarmFixture:
     """A thermometer on the fixture."""
 
@@ -175,18 +171,6 @@ async def test_a_warm_fixture_is_longer_by_its_expansion(make_length_rig) -> Non
     found = await stated(rig)
     assert found.result.distance_mm == pytest.approx(longer)
     assert abs(found.result.long_um_m) <= found.result.expanded_um_m < 40.0
-
-
-async def test_more_mountings_lessen_what_the_seating_does(make_length_rig) -> None:
-    once = await stated(make_length_rig(length_check__seating_um=4.0))
-    rig = make_length_rig(length_check__seating_um=4.0, length_check__repeats=3)
-    rig.folder.journal.unlink()
-    often = await stated(rig)
-    seating = [
-        {s.name: s.um_m for s in one.result.sources}["seating of the gauges"] for one in (once, often)
-    ]
-    assert seating[1] < 0.7 * seating[0]
-    assert len(rig.engine.state.sets) == 7
 
 
 async def test_gauges_the_wrong_way_round_in_the_second_seat_are_told(make_length_rig) -> None:
@@ -286,12 +270,8 @@ async def test_a_mounting_that_is_measured_again_takes_all_with_it(make_length_r
 
     found = await stated(rig, again)
     assert found.verdict is Verdict.PASS
-    placed = [event.at.point for event in rig_events(rig) if isinstance(event, events.GaugesPlaced)]
+    placed = [event.at.point for event in happened(rig, events.GaugesPlaced)]
     assert placed == [1, 2, 1, 2, 3]
-
-
-def rig_events(rig: Rig) -> Any:
-    return read_journal(rig.folder.journal)
 
 
 def test_a_mounting_without_a_record_is_voided_alone(story) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from procedures.run.keys import Phase
 from procedures.run.state import fold
 from procedures.steps import events
 from procedures.steps.close import CloseSet
-from procedures.steps.move import Expectation, Move
+from procedures.steps.move import Move
 from tests.procedures.story import next_step
 
 
@@ -30,15 +29,6 @@ def test_every_chosen_move_has_a_forecast_of_its_gain_and_of_the_remaining_recor
     forecasts = [step.expected.forecast for step, _ in moves(recording) if step.expected]
     assert [forecast.records for forecast in forecasts if forecast] == [*range(17, 9, -1), *range(8, 0, -1)]
     assert all(f and f.end_mm <= f.next_mm <= f.now_mm and f.minutes > 0.0 for f in forecasts)
-
-
-def test_a_journal_from_before_forecasts_is_read(recording) -> None:
-    step, _ = next(iter(moves(recording)))
-    told = json.loads(step.expected.model_dump_json())
-    del told["forecast"]
-    old = Expectation.model_validate_json(json.dumps(told))
-    assert old.forecast is None
-    assert old.gain == step.expected.gain
 
 
 def test_with_the_target_reached_the_set_is_closed_and_the_geometry_identified(

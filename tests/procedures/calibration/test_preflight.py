@@ -119,16 +119,10 @@ async def test_joints_that_are_not_homed_are_no_failure_of_the_encoders(bench) -
     assert await device_failures(bench.devices) == []
 
 
-def test_without_failures_nothing_is_raised() -> None:
+def test_one_failure_is_raised_as_it_is_and_several_in_one_report() -> None:
     raise_all([])
-
-
-def test_one_failure_is_raised_as_it_is() -> None:
     with pytest.raises(ReachError):
         raise_all([ReachError("too far")])
-
-
-def test_several_failures_are_raised_in_one_report() -> None:
     errors = [ReachError("too far"), DeviceError("dead"), AnswerNeeded("nobody")]
     with pytest.raises(SeveralErrors, match=r"(?s)3 problems .*too far.*dead.*nobody") as refusal:
         raise_all([*errors])

@@ -16,10 +16,7 @@ from procedures.journal.journal import read_journal
 from procedures.run.state import fold
 from procedures.steps import events
 from tests.procedures.rig import failure_without_record
-
-
-class PowerCut(BaseException):
-    """Nothing after it is written down."""
+from tests.procedures.runs.listening import PowerCut, cut_power, on
 
 
 @pytest.fixture
@@ -28,34 +25,9 @@ def rig(recording, replayed) -> Any:
     return replayed(recording.until(events.SetClosed, count=1), identification__provisional=True)
 
 
-def at(kind: type[Any], action: Any, count: int = 1) -> Any:
-    """A listener that does something at the ``count``-th event of a kind."""
-    heard: list[events.Event] = []
-
-    def listener(event: events.Event, _: Any) -> None:
-        if isinstance(event, kind):
-            heard.append(event)
-            if len(heard) == count:
-                action()
-
-    return listener
-
-
-def began(kind: str, action: Any) -> Any:
-    def listener(event: events.Event, _: Any) -> None:
-        if isinstance(event, events.StepBegun) and event.step.kind == kind:
-            action()
-
-    return listener
-
-
 def kinds(rig: Any) -> list[str]:
     wanted = {"lent", "taken back", "identified", "committed", "interrupted", "ended"}
     return [event.kind for event in read_journal(rig.folder.journal) if event.kind in wanted]
-
-
-def cut_power() -> None:
-    raise PowerCut
 
 
 async def test_a_provisional_geometry_is_applied_after_the_first_point_and_reverted_before_identification(
@@ -86,7 +58,7 @@ async def test_a_provisional_geometry_is_closer_to_the_truth_than_the_drawing(ri
         rig.engine.command(Abort())
 
     with pytest.raises(Interruption):
-        await rig.run(at(events.ProvisionalApplied, look))
+        await rig.run(on(events.ProvisionalApplied, look))
     truth = rig.physics._truth
     mechanism = rig.calibration.robot.mechanism
     free = [
@@ -117,7 +89,7 @@ async def require_finished(rig: Any) -> None:
 async def test_an_abort_at_a_reference_pose_reverts_the_provisional_geometry(rig) -> None:
     before = rig.config
     with pytest.raises(Interruption):
-        await rig.run(at(events.SetClosed, lambda: rig.engine.command(Abort())))
+        await rig.run(on(events.SetClosed, lambda: rig.engine.command(Abort())))
     assert rig.config == before
     await require_finished(rig)
 
@@ -129,7 +101,7 @@ async def test_an_abort_within_a_set_leaves_the_provisional_geometry_until_the_r
 ) -> None:
     before = rig.config
     with pytest.raises(Interruption):
-        await rig.run(at(events.RecordTaken, lambda: rig.engine.command(Abort()), count))
+        await rig.run(on(events.RecordTaken, lambda: rig.engine.command(Abort()), count))
     assert rig.config != before
     await require_finished(rig)
 
@@ -141,7 +113,7 @@ async def test_a_run_resumes_after_a_power_cut_before_the_provisional_geometry_i
 ) -> None:
     before = rig.config
     with pytest.raises(PowerCut):
-        await rig.run(began(step, cut_power))
+        await rig.run(before(step, cut_power))
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE
     assert kinds(rig)[-3:] == ["identified", "committed", "ended"]

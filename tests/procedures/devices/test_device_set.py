@@ -14,7 +14,6 @@ from hexacell.errors import (
     HexacellError,
     SeveralErrors,
     consists_only_of,
-    flatten_errors,
 )
 from procedures.devices.device_set import gather_errors
 from tests.waiting import until
@@ -37,21 +36,6 @@ async def test_all_devices_that_cannot_be_opened_are_named_at_once(bench) -> Non
     assert all(subject in str(refusal.value) for subject in ("gauge y", "encoders", "controller"))
 
 
-async def test_a_single_failure_is_raised_as_it_is(bench) -> None:
-    bench.gauges[2].dead = GaugeSilent("does not answer", subject="gauge z")
-    with pytest.raises(GaugeSilent):
-        await bench.devices.open()
-
-
-async def test_several_failures_of_one_device_are_all_reported(bench) -> None:
-    both = [DeviceError(f"node {node} is absent", subject="encoders") for node in (2, 5)]
-    bench.encoders.dead = SeveralErrors("encoders do not answer", list(both))
-    bench.gauges[0].dead = GaugeSilent("does not answer", subject="gauge x")
-    with pytest.raises(SeveralErrors) as refusal:
-        await bench.devices.open()
-    assert flatten_errors(refusal.value)[1:] == both
-
-
 async def test_the_others_are_closed_after_a_failure(bench, monkeypatch) -> None:
     async def broken() -> None:
         raise DeviceError("cannot be closed")
@@ -67,10 +51,6 @@ async def answer(value: int | BaseException) -> int:
     if isinstance(value, BaseException):
         raise value
     return value
-
-
-async def test_results_keep_their_order() -> None:
-    assert await gather_errors("no", [answer(3), answer(1), answer(2)]) == [3, 1, 2]
 
 
 async def test_every_call_ends_before_an_error_is_raised() -> None:

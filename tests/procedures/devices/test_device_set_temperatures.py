@@ -72,12 +72,6 @@ async def test_a_failing_thermometer_gives_no_temperature_and_one_warning(
     assert "Records are taken without this temperature" in caplog.records[0].getMessage()
 
 
-async def test_all_thermometers_are_closed() -> None:
-    both = [FakeThermometer("room", 20.5), FakeThermometer("rails", GONE)]
-    await Thermometers(both).close()
-    assert [one.closed for one in both] == [1, 1]
-
-
 async def test_every_record_of_a_run_has_the_temperatures(make_rig, caplog) -> None:
     rig: Any = make_rig(Mode.CHECK)
     room = FakeThermometer("room", 20.5)

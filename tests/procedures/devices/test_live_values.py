@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import math
 from dataclasses import replace
 
 import pytest
@@ -14,9 +13,6 @@ from hexacell.errors import DeviceError
 from procedures.devices.device_set import Devices, LiveValues
 from procedures.devices.settling import settle
 from procedures.guards.guards import Guards
-from procedures.run.state import fold
-from procedures.steps import events
-from procedures.steps.commit import Commit
 
 
 @pytest.fixture
@@ -28,12 +24,6 @@ def live(bench) -> LiveValues:
 def devices(live, bench) -> Devices:
     devices: Devices = bench.devices
     return replace(devices, live=live)
-
-
-async def test_live_values_are_empty_before_the_first_answer(live) -> None:
-    for value in (live.gauge("x"), live.encoders, live.controller, live.stop_reason):
-        assert value.value is None
-        assert math.isinf(value.age_s)
 
 
 async def test_every_answer_is_kept_with_its_age(live, devices, bench) -> None:
@@ -102,12 +92,3 @@ async def test_a_slow_subscriber_gets_the_latest_and_no_older_ones(live, devices
     assert live.encoders.value is not None
     await changes.aclose()
     assert not live._subscribers
-
-
-async def test_a_run_can_be_watched(recording, replayed) -> None:
-    rig = replayed(recording.until(events.Proposed))
-    live = LiveValues(rig.clock.now)
-    object.__setattr__(rig.performer, "devices", replace(rig.bench.devices, live=live))
-    state = fold(recording.until(events.Proposed))
-    await rig.performer.perform(Commit(), state)
-    assert live.encoders.value is not None, "guards watch while the controller reloads"

@@ -13,7 +13,7 @@ from drivers.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady
 from drivers.interfaces import EncoderSample, GaugeReading
 from hexacell.cell.measuring import TimingSettings
 from hexacell.clock import CellClock
-from hexacell.errors import DeviceError, ExitCode, SeveralErrors
+from hexacell.errors import DeviceError, ExitCode, HexacellError, SeveralErrors
 from procedures.devices.settling import LEAST_WINDOWS, read_all, read_series, settle, trimmed_mean
 
 TIMING = TimingSettings.model_validate({"spread_encoder_mm": 0.05})
@@ -27,24 +27,14 @@ def at_end(name: str) -> GaugeAtEnd:
     return GaugeAtEnd("is at an end of its travel", subject=f"gauge {name}")
 
 
-async def test_a_robot_at_rest_is_settled_after_one_window(bench) -> None:
-    settled = await settle(bench.devices, TIMING, bench.clock)
+@pytest.mark.parametrize("interval_s", [TIMING.interval_s, 5.0, 0.01])
+async def test_a_robot_at_rest_is_settled_after_one_window(bench, interval_s: float) -> None:
+    timing = TIMING.model_copy(update={"interval_s": interval_s})
+    settled = await settle(bench.devices, timing, bench.clock)
     times = [look.at_s for look in settled.window]
-    assert len(times) >= TIMING.readings
-    assert times[-1] - times[0] >= TIMING.window_s
-    assert bench.clock.now() < 2 * TIMING.window_s
-
-
-async def test_a_window_has_readings_enough_however_slow_they_come(bench) -> None:
-    timing = TIMING.model_copy(update={"interval_s": 5.0})
-    settled = await settle(bench.devices, timing, bench.clock)
-    assert len(settled.window) == timing.readings
-
-
-async def test_a_window_lasts_long_enough_however_fast_they_come(bench) -> None:
-    timing = TIMING.model_copy(update={"interval_s": 0.01})
-    settled = await settle(bench.devices, timing, bench.clock)
-    assert settled.window[-1].at_s - settled.window[0].at_s >= timing.window_s
+    assert len(times) >= timing.readings
+    assert times[-1] - times[0] >= timing.window_s
+    assert bench.clock.now() < max(2 * timing.window_s, timing.readings * interval_s)
 
 
 @pytest.mark.parametrize("reading_s", [0.0, 0.04, 0.1, 0.25])
@@ -95,39 +85,11 @@ async def test_means_and_ranges_are_those_of_the_window(bench) -> None:
     assert np.ptp(settled.joints, axis=0).tolist() == [0.0] * 6
 
 
-@pytest.mark.parametrize("name", ["x", "y", "z"])
-async def test_a_gauge_that_never_settles_is_named(bench, name: str) -> None:
-    bench.gauges["xyz".index(name)].shown = lambda: math.sin(3.0 * bench.clock.now())
-    with pytest.raises(DeviceError, match=rf"within 20 s: gauge {name} by \d\.\d+ mm\. Look") as refusal:
-        await settle(bench.devices, TIMING, bench.clock)
-    assert refusal.value.exit_code is ExitCode.HARDWARE
-    assert 20.0 < bench.clock.now() < 21.0
-
-
-async def test_a_slider_that_never_settles_is_named(bench) -> None:
-    bench.encoders.shown = lambda: (0.0, 0.0, 0.0, bench.clock.now(), 0.0, 0.0)
-    with pytest.raises(DeviceError, match=r"encoder 4 by 0\.600 mm"):
-        await settle(bench.devices, TIMING, bench.clock)
-
-
-async def test_all_moving_gauges_and_sliders_are_named(bench) -> None:
-    bench.gauges[0].shown = bench.gauges[2].shown = lambda: math.sin(3.0 * bench.clock.now())
-    bench.encoders.shown = lambda: (0.0, -bench.clock.now(), 0.0, 0.0, 0.0, 0.0)
-    with pytest.raises(DeviceError, match=r"gauge x by .*, gauge z by .*, encoder 2 by"):
-        await settle(bench.devices, TIMING, bench.clock)
-
-
 async def test_limits_are_ranges_and_included(bench) -> None:
     values = iter(np.tile([0.0, TIMING.spread_gauge_mm], 200).tolist())
     bench.gauges[0].shown = values.__next__
     settled = await settle(bench.devices, TIMING, bench.clock)
     assert np.ptp(settled.gauges[:, 0]) == TIMING.spread_gauge_mm
-
-
-async def test_an_unsteady_gauge_has_not_settled_yet(bench) -> None:
-    bench.gauges[1].failures = [unsteady("y") for _ in range(30)]
-    settled = await settle(bench.devices, TIMING, bench.clock)
-    assert settled.window[0].at_s >= 30 * TIMING.interval_s - 1e-9
 
 
 async def test_readings_from_before_an_unsteady_one_do_not_count(bench) -> None:
@@ -145,37 +107,56 @@ async def test_readings_from_before_an_unsteady_one_do_not_count(bench) -> None:
     assert settled.window[0].at_s > 0.35
 
 
-async def test_several_unsteady_gauges_have_not_settled_yet(bench) -> None:
-    for gauge in bench.gauges:
-        gauge.failures = [unsteady(gauge.name)] * 3
-    await settle(bench.devices, TIMING, bench.clock)
+@pytest.mark.parametrize(
+    ("gauges", "leg", "named"),
+    [
+        ("x", None, r"gauge x by \d\.\d+ mm\. Look"),
+        ("z", None, r"gauge z by \d\.\d+ mm\. Look"),
+        ("", 4, r"encoder 4 by 0\.600 mm"),
+        ("xz", 2, r"gauge x by .*, gauge z by .*, encoder 2 by"),
+    ],
+)
+async def test_what_never_settles_is_named(bench, gauges: str, leg: int | None, named: str) -> None:
+    for name in gauges:
+        bench.gauges["xyz".index(name)].shown = lambda: math.sin(3.0 * bench.clock.now())
+    bench.encoders.shown = lambda: [bench.clock.now() * (number == leg) for number in range(1, 7)]
+    with pytest.raises(DeviceError, match=f"within 20 s: {named}") as refusal:
+        await settle(bench.devices, TIMING, bench.clock)
+    assert refusal.value.exit_code is ExitCode.HARDWARE
+    assert 20.0 < bench.clock.now() < 21.0
 
 
-async def test_settling_continues_if_an_oscillation_reaches_an_end_of_the_travel(bench) -> None:
-    bench.gauges[0].failures = [unsteady("x")] * 3
-    bench.gauges[1].failures = [at_end("y")] * 3
-    await settle(bench.devices, TIMING, bench.clock)
+@pytest.mark.parametrize(
+    "failures",
+    [
+        [[], [unsteady("y")] * 30, []],
+        [[unsteady(name)] * 3 for name in "xyz"],
+        [[unsteady("x")] * 3, [at_end("y")] * 3, []],
+    ],
+    ids=["one gauge", "all", "an oscillation to an end of the travel"],
+)
+async def test_unsteady_gauges_have_not_settled_yet(bench, failures: list[list[HexacellError]]) -> None:
+    for gauge, errors in zip(bench.gauges, failures, strict=True):
+        gauge.failures = list(errors)
+    settled = await settle(bench.devices, TIMING, bench.clock)
+    assert settled.window[0].at_s >= max(map(len, failures)) * TIMING.interval_s - 1e-9
 
 
 async def test_a_gauge_that_stays_unsteady_is_named(bench) -> None:
     bench.gauges[2].failures = [unsteady("z")] * 1000
     with pytest.raises(DeviceError, match="within 20 s: gauge z: readings do not agree"):
         await settle(bench.devices, TIMING, bench.clock)
-    assert bench.clock.now() < 21.0
 
 
-async def test_an_end_of_the_travel_is_reported_at_once(bench) -> None:
+async def test_ends_of_the_travel_are_all_reported_at_once(bench) -> None:
     bench.gauges[0].shown = lambda: 9.0
     with pytest.raises(GaugeAtEnd):
         await settle(bench.devices, TIMING, bench.clock)
-    assert bench.clock.now() == 0.0
-
-
-async def test_two_ends_of_the_travel_are_both_reported(bench) -> None:
-    bench.gauges[0].shown = bench.gauges[2].shown = lambda: -9.0
+    bench.gauges[2].shown = lambda: -9.0
     with pytest.raises(SeveralErrors) as refusal:
         await settle(bench.devices, TIMING, bench.clock)
     assert [error.subject for error in refusal.value.errors] == ["gauge x", "gauge z"]
+    assert bench.clock.now() == 0.0
 
 
 async def test_other_failures_are_not_waited_out(bench) -> None:
@@ -186,9 +167,6 @@ async def test_other_failures_are_not_waited_out(bench) -> None:
     bench.gauges[1].failures = [unsteady("y")]
     with pytest.raises(SeveralErrors):
         await settle(bench.devices, TIMING, bench.clock)
-
-
-async def test_a_silent_encoder_bus_is_not_waited_out(bench) -> None:
     bench.encoders.failure = DeviceError("no round", subject="encoders")
     with pytest.raises(DeviceError, match="encoders: no round"):
         await settle(bench.devices, TIMING, bench.clock)
@@ -278,12 +256,7 @@ def test_one_damaged_reading_is_not_in_the_mean(count: int, damage_mm: float) ->
         damaged = readings.copy()
         damaged[row, 1] += damage_mm
         assert trimmed_mean(damaged) == pytest.approx([1.0, -2.0, 0.5])
-
-
-@pytest.mark.parametrize("count", [1, 2])
-def test_of_one_or_two_readings_all_count(count: int) -> None:
-    readings = np.arange(3.0 * count).reshape(count, 3)
-    assert trimmed_mean(readings) == pytest.approx(readings.mean(axis=0))
+    assert trimmed_mean(readings[:2]) == pytest.approx(readings[:2].mean(axis=0)), "all of two count"
 
 
 @pytest.mark.parametrize(("count", "more"), [(5, 0.07), (12, 0.03)])

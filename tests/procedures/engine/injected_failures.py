@@ -50,7 +50,3 @@ async def until_closed(rig: Any, *listeners: Any, policy: RecoveryPolicy) -> boo
     with pytest.raises(Interruption):
         await rig.run(*listeners, stop, policy=policy)
     return fold(read_journal(rig.folder.journal)).set(P2).closed
-
-
-def happened(rig: Any, kind: type[Any]) -> list[Any]:
-    return [event for event in read_journal(rig.folder.journal) if isinstance(event, kind)]

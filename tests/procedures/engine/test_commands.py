@@ -12,7 +12,7 @@ import pytest
 
 from hexacell.errors import ExitCode, Interruption
 from procedures.engine.command_loop import Status
-from procedures.engine.commands import Abort, Answer, CommandQueue, MeasureAgain, Pause, Resume, Stop, Undo
+from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resume, Stop, Undo
 from procedures.engine.engine import Engine
 from procedures.journal.journal import Journal, read_journal
 from procedures.run.keys import Phase, SetKey
@@ -172,6 +172,8 @@ async def test_undo_discards_the_last_record_at_the_time_of_the_command(stage: S
     assert events.RecordDiscarded(at=P1, orientation=2) in stage.journal.events
     taken = [sample.orientation for sample in fold(stage.journal.events).set(P1).samples]
     assert taken == [1, 3, 2]
+    sampled = [event.orientation for event in stage.journal.events if isinstance(event, events.RecordTaken)]
+    assert sampled == [1, 2, 3, 2], "what was discarded stays in the journal"
 
 
 async def test_two_undo_commands_discard_two_records(stage: Stage) -> None:
@@ -187,14 +189,6 @@ async def test_two_undo_commands_discard_two_records(stage: Stage) -> None:
     assert undone[0] == events.RecordDiscarded(at=P1, orientation=2)
     assert undone[1] == events.SetInvalidated(at=P1, reason="a person asked for it")
     assert len(fold(stage.journal.events).set(P1).samples) == 3
-
-
-async def test_discarded_records_stay_in_the_journal(stage: Stage) -> None:
-    await stage.held_at("P1/o03/move")
-    stage.engine.command(Undo())
-    await stage.over()
-    sampled = [event.orientation for event in stage.journal.events if isinstance(event, events.RecordTaken)]
-    assert sampled == [1, 2, 2, 3]
 
 
 @pytest.mark.parametrize(
@@ -304,20 +298,6 @@ async def test_a_command_from_another_thread_is_obeyed_at_once(stage: Stage) -> 
     with pytest.raises(Interruption, match="from a thread"):
         await stage.running  # type: ignore[misc]
     thread.join()
-
-
-async def test_a_queue_gives_commands_in_order_and_waits() -> None:
-    queue = CommandQueue()
-    queue.put(Pause())
-    queue.put(Resume())
-    assert [await queue.next(), await queue.next()] == [Pause(), Resume()]
-    waiting = asyncio.create_task(queue.next())
-    with queue.attended():
-        await asyncio.sleep(0)
-        assert not waiting.done()
-        queue.put(Undo())
-        assert await waiting == Undo()
-    assert (queue.is_attended, queue.is_over) == (False, True)
 
 
 Meanwhile = Callable[[events.Event, RunState], None]

@@ -6,33 +6,11 @@ from typing import Any
 
 import pytest
 
-from hexacell.cell.recovery import Action, FailureKind
 from hexacell.errors import ExitCode, FileError, HexacellError
 from procedures.engine.commands import UnattendedOperator
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.steps import events
-from procedures.steps.move import Move
 from tests.procedures.runs.listening import happened, on
-
-
-def attended(rig: Any) -> RecoveryPolicy:
-    return RecoveryPolicy.of(rig.cell.settings.recovery, attended=True)
-
-
-class Undoer:
-    """A person who undoes the edit when the run asks, and retries; before that in vain."""
-
-    def __init__(self) -> None:
-        self.problems: list[str] = []
-        self.undo: Any = None
-
-    async def ask(self, question: Any) -> str | None:
-        if question.kind.value != "decide":
-            return question.default or "a tester"
-        self.problems.append(question.text)
-        if len(self.problems) == 2:
-            self.undo()
-        return Action.RETRY.value
 
 
 def edits(rig: Any, kind: type[Any], count: int) -> Any:
@@ -57,21 +35,6 @@ async def test_an_edit_is_noticed_before_the_next_move_and_the_file_and_line_are
     taken = happened(rig, events.RecordTaken)
     assert len(taken) == 3
     assert len([entry for entry in rig.controller.log if entry.startswith("move")]) == 3
-
-
-@pytest.mark.slow
-async def test_a_person_undoes_the_edit_and_retries(recording, replayed) -> None:
-    person = Undoer()
-    rig = replayed(recording.until(events.SetClosed), operator=person)
-    before = rig.config
-    person.undo = lambda: rig.cell.config_path.write_bytes(before)
-    ended = await rig.run(edits(rig, events.RecordTaken, 3), policy=attended(rig))
-    assert ended.exit_code == ExitCode.DONE
-    assert len(person.problems) == 2, "it was asked again while the edit was there"
-    assert all(str(rig.cell.config_path) in problem for problem in person.problems)
-    failures = happened(rig, events.Failed)
-    assert [failure.failure for failure in failures] == [FailureKind.FILE] * 2
-    assert isinstance(failures[0].step, Move)
 
 
 async def test_an_unattended_run_ends_and_is_resumed_once_the_edit_is_undone(recording, replayed) -> None:

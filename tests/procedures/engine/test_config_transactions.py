@@ -76,7 +76,3 @@ def test_a_change_that_could_not_be_journalled_is_reverted(event: events.Event, 
     assert isinstance(reversal, Reversal)
     assert (reversal.step, reversal.is_recorded) == (step, False)
     assert revert_unrecorded(event, fold([event])) is None, "it is in the journal"
-
-
-def test_other_events_need_no_revert() -> None:
-    assert revert_unrecorded(events.RolledBack(), RunState()) is None

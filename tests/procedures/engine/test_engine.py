@@ -16,7 +16,6 @@ from hexacell.errors import (
     DeviceError,
     ExitCode,
     FileError,
-    HexacellError,
     Interruption,
     LimitError,
     SeveralErrors,
@@ -102,13 +101,6 @@ async def test_a_step_is_journalled_before_it_is_performed_and_its_event_afterwa
     assert kinds == ["begun", "arrived"] * 3 + ["ended"]
 
 
-async def test_the_controller_is_prepared_before_the_first_step(script, journal, bench) -> None:
-    logged: list[list[str]] = []
-    await Engine(script, journal, [lambda event, state: logged.append(list(bench.controller.log))]).run()
-    assert logged[0] == ["prepare"]
-    assert bench.controller.log == ["prepare"]
-
-
 async def test_listeners_receive_events_that_are_on_the_disk(script, journal, path) -> None:
     heard: list[events.Event] = []
 
@@ -122,13 +114,6 @@ async def test_listeners_receive_events_that_are_on_the_disk(script, journal, pa
     assert heard[::2] == heard[1::2] == list(journal.events)
 
 
-async def test_the_state_is_the_fold_of_the_journal(script, journal) -> None:
-    engine = Engine(script, journal)
-    await engine.run()
-    assert engine.state == fold(journal.events)
-    assert Engine(script, journal).state == engine.state
-
-
 @pytest.mark.parametrize(
     ("error", "code"),
     [
@@ -138,42 +123,26 @@ async def test_the_state_is_the_fold_of_the_journal(script, journal) -> None:
         (WriteBackUndone("undone"), ExitCode.WRITE_BACK_UNDONE),
         (FileError("changed"), ExitCode.USAGE),
         (SeveralErrors("two", [LimitError("drifted"), DeviceError("dead")]), ExitCode.HARDWARE),
+        (ZeroDivisionError("division by zero"), ExitCode.FAULT),
     ],
 )
-async def test_an_error_stops_motion_and_is_journalled(
-    script, journal, bench, error: HexacellError, code: ExitCode
+async def test_an_error_stops_motion_before_it_is_journalled(
+    script, journal, bench, error: Exception, code: ExitCode
 ) -> None:
     script.failure = error
+    done: list[str] = []
+
+    def listener(event: events.Event, _: RunState) -> None:
+        if isinstance(event, events.Interrupted):
+            done.extend(bench.controller.log)
+
     with pytest.raises(type(error)) as raised:
-        await Engine(script, journal).run()
+        await Engine(script, journal, [listener]).run()
+    assert done == bench.controller.log
     assert raised.value is error
     assert bench.controller.log == ["prepare", "stop"]
     assert journal.events[-1] == events.Interrupted(reason=str(error), exit_code=int(code))
     assert journal.events[-2] == events.StepBegun(step=MOVES[1])
-
-
-async def test_motion_stops_before_the_journal_is_written(script, journal, bench) -> None:
-    script.failure = DeviceError("dead")
-    log: list[str] = []
-
-    def listener(event: events.Event, _: RunState) -> None:
-        if isinstance(event, events.Interrupted):
-            log.extend(bench.controller.log)
-
-    with pytest.raises(DeviceError):
-        await Engine(script, journal, [listener]).run()
-    assert log == ["prepare", "stop"]
-
-
-async def test_cancelling_stops_motion_and_is_journalled(script, journal, bench) -> None:
-    script.blocks = True
-    task = asyncio.create_task(Engine(script, journal).run())
-    await script.blocked.wait()
-    task.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await task
-    assert bench.controller.log == ["prepare", "stop"]
-    assert journal.events[-1] == events.Interrupted(reason="CancelledError", exit_code=130)
 
 
 async def test_repeated_cancellation_does_not_prevent_the_stop(script, journal, bench) -> None:
@@ -194,14 +163,6 @@ async def test_repeated_cancellation_does_not_prevent_the_stop(script, journal, 
         await task
     assert stopped == [True]
     assert journal.events[-1] == events.Interrupted(reason="CancelledError", exit_code=130)
-
-
-async def test_a_programming_error_stops_motion_too(script, journal, bench) -> None:
-    script.failure = ZeroDivisionError("division by zero")
-    with pytest.raises(ZeroDivisionError):
-        await Engine(script, journal).run()
-    assert bench.controller.log == ["prepare", "stop"]
-    assert journal.events[-1] == events.Interrupted(reason="division by zero", exit_code=70)
 
 
 async def test_an_error_while_deciding_stops_motion_too(script, journal, bench) -> None:
@@ -332,11 +293,6 @@ def test_open_sets_are_invalidated_or_unverified(script, journal, story) -> None
     }
     engine.reopen_sets()
     assert engine.state.invalidated == 2
-
-
-def test_nothing_is_invalidated_in_a_new_run(script, journal) -> None:
-    Engine(script, journal).reopen_sets()
-    assert journal.events == ()
 
 
 def test_after_a_kill_the_position_is_unknown(script, journal, story) -> None:

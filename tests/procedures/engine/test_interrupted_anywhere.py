@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -11,33 +9,19 @@ import pytest
 from hexacell.errors import ExitCode, Interruption
 from procedures.engine.commands import Abort
 from procedures.journal.journal import read_journal
-from procedures.run.state import RunState, fold
+from procedures.run.state import fold
 from procedures.steps import events
+from tests.procedures.engine.test_resume import require_whole_sets
+from tests.procedures.runs.listening import PowerCut, on
 
 TELLING = 125
 """Events of a whole run of the small cell, and a few more."""
 
 
-class PowerCut(BaseException):
-    """Nothing after it is written down: neither a word of farewell nor a stop."""
-
-
-def at(number: int, action: Any) -> Any:
-    """A listener that does something at the ``number``-th event that it hears."""
-    heard = [0]
-
-    def listener(event: events.Event, _: RunState) -> None:
-        heard[0] += 1
-        if heard[0] == number:
-            action()
-
-    return listener
-
-
 async def ended_by_command(rig: Any, number: int) -> bool:
     """Run until somebody aborts at an event; whether it came to that."""
     try:
-        await rig.run(at(number, lambda: rig.engine.command(Abort())))
+        await rig.run(on(object, lambda: rig.engine.command(Abort()), number))
     except Interruption:
         return True
     return False
@@ -54,24 +38,11 @@ async def ended_by_power_cut(rig: Any, number: int) -> bool:
         raise PowerCut
 
     try:
-        await rig.run(at(number, die))
+        await rig.run(on(object, die, number))
     except PowerCut:
         path.write_bytes(kept[0])  # as if the engine had not got to say that it was interrupted
         return True
     return False
-
-
-def require_every_record_once(history: Sequence[events.Event]) -> None:
-    state = fold(history)
-    assert [len(measured.samples) for measured in state.sets.values()] == [9, 9, 3, 3, 5, 5]
-    for measured in state.sets.values():
-        assert measured.closed
-        counted = Counter(sample.orientation for sample in measured.samples)
-        assert set(counted.values()) == {1}
-    in_journal = [event for event in history if isinstance(event, events.RecordTaken)]
-    assert len(in_journal) == len(set(map(id, in_journal)))
-    for measured in state.sets.values():
-        assert all(sample in in_journal for sample in measured.samples)
 
 
 WAYS = {"aborted": ended_by_command, "power cut": ended_by_power_cut}
@@ -85,7 +56,7 @@ async def interrupted_twice(rig: Any, how: str, first: int, second: int) -> None
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE
     history = read_journal(rig.folder.journal)
-    require_every_record_once(history)
+    require_whole_sets(history)
     voided = [event.reason for event in history if isinstance(event, events.SetInvalidated)]
     assert set(voided) <= {"the run was interrupted in this set"}, "no set with a record was measured anew"
 

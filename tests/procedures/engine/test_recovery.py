@@ -12,7 +12,6 @@ from drivers.errors import (
     GaugeSilent,
     ZeroVoid,
 )
-from drivers.interfaces import DeviceIdentity
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.errors import (
     DeviceError,
@@ -20,16 +19,15 @@ from hexacell.errors import (
     HexacellError,
 )
 from procedures.engine.command_loop import Status
-from procedures.journal.journal import read_journal
 from procedures.steps import events
 from tests.procedures.engine.injected_failures import (
     KEY,
     SILENT,
     UNATTENDED,
     failing,
-    happened,
     until_closed,
 )
+from tests.procedures.runs.listening import happened
 
 
 @pytest.mark.parametrize(("times", "reopened", "voided"), [(1, 0, 0), (2, 1, 1), (3, 2, 2)])
@@ -154,29 +152,3 @@ async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(at_s
     with pytest.raises(GaugeSilent):
         await rig.run(failing(KEY, break_down), policy=UNATTENDED)
     assert not happened(rig, events.Failed)
-
-
-async def test_drift_redoes_the_set(at_second_point) -> None:
-    rig = at_second_point
-    real, slipped = rig.gauges[1].shown, [0.0]
-    rig.gauges[1].shown = lambda: real() + slipped[0]
-
-    def slip() -> None:
-        slipped[0] = 0.2
-
-    assert await until_closed(rig, failing("P2/close", slip), policy=UNATTENDED)
-    (failure,) = happened(rig, events.Failed)
-    assert (failure.failure, failure.action) == (FailureKind.DRIFT, Action.REDO_SET)
-    assert [str(event.at) for event in happened(rig, events.SetInvalidated)] == ["P2"]
-
-
-async def test_a_replaced_device_is_refused(at_second_point) -> None:
-    rig = at_second_point
-    known = DeviceIdentity(name="y", protocol="fake", description="a device", serial_number="17")
-    history = list(read_journal(rig.folder.journal))
-    history[0] = history[0].model_copy(update={"devices": (known,)})
-    rig.folder.journal.unlink()
-    rig.write(history)
-    silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT), 2)
-    with pytest.raises(DeviceError, match="where the run was begun with fake a device, serial number 17"):
-        await rig.run(silent, policy=UNATTENDED)

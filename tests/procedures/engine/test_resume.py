@@ -12,7 +12,6 @@ import pytest
 from hexacell.config.change import ConfigChange
 from hexacell.config.write_back import commit
 from hexacell.errors import ExitCode
-from hexacell.kinematics.pose import Pose
 from procedures.journal.journal import read_journal
 from procedures.resources import controller_config as config_changes
 from procedures.run.state import RunState, fold
@@ -124,25 +123,6 @@ async def test_a_run_cancelled_after_any_event_resumes(recording, replayed, numb
     require_whole_sets(history)
 
 
-async def test_a_run_cancelled_several_times_finishes(recording, replayed) -> None:
-    rig = replayed(recording.until(events.SetClosed, count=1))
-    for number in (3, 8, 12):
-        await cancelled_at(rig, number)
-    assert (await rig.run()).exit_code == ExitCode.DONE
-    require_whole_sets(read_journal(rig.folder.journal))
-
-
-async def test_a_move_interrupted_after_its_beginning_is_decided_again(recording, replayed) -> None:
-    """The next move is decided from the located position, not repeated from the journal."""
-    sampled = recording.until(events.RecordTaken, count=5)
-    begun = recording.history[len(sampled)]
-    assert begun.step.key == "P1/o06/move"
-    rig = replayed([*sampled, begun, INTERRUPTED])
-    await cancelled_at(rig, 8)
-    x, y, z = rig.cell.settings.identification.points[0]
-    assert rig.controller.log[1] == f"move {Pose(x, y, z)}"
-
-
 async def test_a_write_back_in_progress_is_completed_despite_cancellation(
     recording, replayed, monkeypatch
 ) -> None:
@@ -176,12 +156,3 @@ async def test_a_config_written_but_not_journalled_is_not_written_twice(recordin
     assert rig.config == recording.config_after
     backup = rig.folder.path / "config-before"
     assert backup.read_bytes() == recording.config_before
-
-
-async def test_the_position_is_unknown_after_an_interruption(recording, replayed) -> None:
-    placed = recording.until(events.GaugesPlaced)
-    rig = replayed(placed)
-    await cancelled_at(rig, 10)
-    again = read_journal(rig.folder.journal)[len(placed) :]
-    keys = [event.step.key for event in again if isinstance(event, events.StepBegun)]
-    assert keys[:4] == ["locate", "P1/o01/move", "P1/place", "P1/o01/sample"]

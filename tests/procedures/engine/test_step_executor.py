@@ -9,15 +9,12 @@ import pytest
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, ZeroVoid
 from hexacell.cell.devices import GaugeAxis
-from hexacell.errors import DeviceError, HexacellError, LimitError, SeveralErrors
-from hexacell.kinematics.pose import Pose
+from hexacell.errors import HexacellError, LimitError, SeveralErrors
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events
 from procedures.steps.close import CloseSet
-from procedures.steps.move import Move
-from procedures.steps.place import Place
 from procedures.steps.sample import Sample
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
@@ -57,12 +54,6 @@ async def zeroed(station: Station) -> RunState:
     """A set with its reference taken at -1, 2 and 3 mm."""
     station.shown[:] = [-1.0, 2.0, 3.0]
     return fold([await station.do(SAMPLE)])
-
-
-async def test_a_move_reports_its_arrival(station: Station) -> None:
-    event = await station.do(Move(at=P1, orientation=3, pose=(100.0, -99.0, 500.0, 1.0, 0.0, 0.0)))
-    assert event == events.Arrived(at=P1, orientation=3, pose=(100.0, -99.0, 500.0, 1.0, 0.0, 0.0))
-    assert station.rig.controller.log == [f"move {Pose(100.0, -99.0, 500.0, 1.0)}"]
 
 
 async def test_the_first_record_of_a_set_is_its_zero(station: Station) -> None:
@@ -120,6 +111,8 @@ async def test_ranges_are_turned_too_and_stay_positive(station: Station) -> None
 @pytest.mark.parametrize("deviation", [-5.001, 5.001])
 async def test_a_ball_outside_the_travel_is_refused(station: Station, axis: int, deviation: float) -> None:
     zero = fold([await station.do(SAMPLE)])
+    station.shown[axis] = round(deviation)
+    assert isinstance(await station.do(SECOND, zero), events.RecordTaken), "the limit is included"
     station.shown[axis] = deviation
     event = await station.do(SECOND, zero)
     assert isinstance(event, events.RecordRejected)
@@ -128,27 +121,12 @@ async def test_a_ball_outside_the_travel_is_refused(station: Station, axis: int,
     assert (event.at, event.orientation) == (P1, 2)
 
 
-async def test_the_limit_of_the_travel_is_included(station: Station) -> None:
-    zero = fold([await station.do(SAMPLE)])
-    station.shown[:] = [5.0, -5.0, 0.0]
-    assert isinstance(await station.do(SECOND, zero), events.RecordTaken)
-    station.shown[1] = -5.000001
-    event = await station.do(SECOND, zero)
-    assert isinstance(event, events.RecordRejected)
-    assert "x +5.000, y -5.000, z +0.000" in event.reason
-
-
-async def test_a_gauge_at_its_end_is_a_refusal(station: Station, zeroed: RunState) -> None:
-    station.shown[2] = 7.0
-    event = await station.do(SECOND, zeroed)
-    assert event == events.RecordRejected(
-        at=P1, orientation=2, reason="gauge z: is at an end of its travel"
-    )
-
-
-async def test_several_gauges_at_their_ends_are_a_refusal_that_names_all(
+async def test_gauges_at_their_ends_are_a_refusal_that_names_all(
     station: Station, zeroed: RunState
 ) -> None:
+    station.shown[2] = 7.0
+    reason = "gauge z: is at an end of its travel"
+    assert await station.do(SECOND, zeroed) == events.RecordRejected(at=P1, orientation=2, reason=reason)
     station.shown[:] = [7.0, 0.0, -7.0]
     event = await station.do(SECOND, zeroed)
     assert isinstance(event, events.RecordRejected)
@@ -198,20 +176,3 @@ async def test_a_gauge_that_was_set_differently_voids_the_set(station: Station, 
     station.rig.gauges[2].void = ZeroVoid("was off", subject="gauge z")
     with pytest.raises(SeveralErrors, match=r"(?s)gauge y.*gauge z"):
         await station.do(CloseSet(at=P1), zeroed)
-
-
-async def test_fixed_gauges_need_no_operator(station: Station) -> None:
-    assert await station.do(Place(at=P1, pose=POSE)) == events.GaugesPlaced(at=P1)
-    assert station.rig.operator.placed == []
-
-
-async def test_gauges_are_placed_by_hand_where_the_cell_file_states_it(make_rig) -> None:
-    rig = make_rig(stations__placement="by-hand")
-    await Station(rig).do(Place(at=SetKey(phase=Phase.AFTER, point=2), pose=POSE))
-    assert rig.operator.placed == [2]
-
-
-async def test_a_failed_move_raises_its_error(station: Station) -> None:
-    station.rig.controller.failures["move"] = DeviceError("stopped on the way", subject="controller")
-    with pytest.raises(DeviceError, match="stopped on the way"):
-        await station.do(Move(at=P1, orientation=1, pose=POSE))

@@ -21,8 +21,8 @@ from procedures.steps import events
 from tests.procedures.engine.injected_failures import (
     UNATTENDED,
     failing,
-    happened,
 )
+from tests.procedures.runs.listening import happened
 
 
 @pytest.fixture
@@ -45,6 +45,7 @@ def slip_farther(rig: Any) -> Any:
 async def test_a_geometry_that_cannot_be_verified_is_rolled_back(
     rig, recording, policy: RecoveryPolicy
 ) -> None:
+    sound = rig.gauges[2].shown
     with pytest.raises(WriteBackUndone, match=r"could not be verified; .* back\. after-V2: ") as undone:
         await rig.run(slip_farther(rig), policy=policy)
     assert undone.value.exit_code is ExitCode.WRITE_BACK_UNDONE
@@ -53,12 +54,8 @@ async def test_a_geometry_that_cannot_be_verified_is_rolled_back(
     last = read_journal(rig.folder.journal)[-2:]
     assert [event.kind for event in last] == ["rolled back", "interrupted"]
     assert last[1] == events.Interrupted(reason=str(undone.value), exit_code=6)
-
-
-async def test_a_geometry_that_was_taken_back_can_be_written_again_by_resuming(rig, recording) -> None:
-    with pytest.raises(WriteBackUndone):
-        await rig.run(slip_farther(rig))
-    assert (await rig.run()).exit_code == ExitCode.DONE
+    rig.gauges[2].shown = sound
+    assert (await rig.run()).exit_code == ExitCode.DONE, "resumed, it is written again"
     assert rig.config == recording.config_after
     assert len(happened(rig, events.Committed)) == 2
 

@@ -170,7 +170,31 @@ def root(error: BaseException) -> GuardTripped:
     return error
 
 
-async def happens(stage: Any, step: Any, fault: Fault) -> None:
+SOME = (
+    [(move_in_a_set, fault) for fault in FAULTS]
+    + [(step, FAULTS[0]) for step in STEPS if step is not move_in_a_set]
+    + [
+        (move_to_a_reference, FAULTS[5]),
+        (move_afterwards, FAULTS[6]),
+        (reload, FAULTS[9]),
+        (close, FAULTS[7]),
+    ]
+)
+THE_REST = [(step, fault) for step in STEPS for fault in FAULTS if (step, fault) not in SOME]
+
+
+def names(cases: list[tuple[Any, Fault]]) -> list[str]:
+    return [f"{fault}-{step.__name__}" for step, fault in cases]
+
+
+@pytest.mark.parametrize(
+    ("step", "fault"),
+    [*SOME, *(pytest.param(*case, marks=pytest.mark.slow) for case in THE_REST)],
+    ids=names([*SOME, *THE_REST]),
+)
+async def test_the_robot_stops_within_the_limit_for_each_guard_and_step(
+    stage: Any, step: Any, fault: Fault
+) -> None:
     scene = stage(step)
     config = scene.rig.config
     doing = await step(scene)
@@ -194,38 +218,6 @@ async def happens(stage: Any, step: Any, fault: Fault) -> None:
         assert not isinstance(ended, BaseException), "nothing that concerns this step"
     if step in {*OUTSIDE, *WITHIN} and step in fault.steps:
         assert scene.rig.physics.progress() < 1.0, "stopped on the way"
-
-
-SOME = (
-    [(move_in_a_set, fault) for fault in FAULTS]
-    + [(step, FAULTS[0]) for step in STEPS if step is not move_in_a_set]
-    + [
-        (move_to_a_reference, FAULTS[5]),
-        (move_afterwards, FAULTS[6]),
-        (reload, FAULTS[9]),
-        (close, FAULTS[7]),
-    ]
-)
-THE_REST = [(step, fault) for step in STEPS for fault in FAULTS if (step, fault) not in SOME]
-
-
-def names(cases: list[tuple[Any, Fault]]) -> list[str]:
-    return [f"{fault}-{step.__name__}" for step, fault in cases]
-
-
-@pytest.mark.parametrize(("step", "fault"), SOME, ids=names(SOME))
-async def test_the_robot_stops_within_the_limit_for_each_guard_and_step(
-    stage: Any, step: Any, fault: Fault
-) -> None:
-    await happens(stage, step, fault)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("step", "fault"), THE_REST, ids=names(THE_REST))
-async def test_the_robot_stops_within_the_limit_for_all_other_guards_and_steps(
-    stage: Any, step: Any, fault: Fault
-) -> None:
-    await happens(stage, step, fault)
 
 
 @pytest.mark.parametrize("step", STEPS, ids=[step.__name__ for step in STEPS])

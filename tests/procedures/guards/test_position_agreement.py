@@ -57,14 +57,30 @@ def test_reports_of_one_place_agree_up_to_rounding_and_the_encoders_zeros(pose: 
     assert mismatch(PositionReports(rounded(pose), None, joints - 0.99)) is None
 
 
-def test_the_pose_of_home_is_odd_where_joints_and_encoders_agree() -> None:
-    found = mismatch(reports(pose=HOME))
+OUT_OF_REACH = Pose(0.0, 0.0, 2000.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "odd"),
+    [
+        ({"pose": HOME}, PositionSource.POSE),
+        ({"pose": OUT_OF_REACH}, PositionSource.POSE),
+        ({"joints": joints_at(HOME)}, PositionSource.JOINTS),
+        ({"pose": HOME, "joints": joints_at(THERE) + 30.0}, None),
+        ({"pose": HOME, "joints": None}, None),
+    ],
+)
+def test_the_report_that_the_two_others_contradict_is_odd(
+    changes: dict[str, Any], odd: PositionSource | None
+) -> None:
+    shown = reports(**changes)
+    found = mismatch(shown)
     assert found is not None
-    assert found.odd is PositionSource.POSE
-    assert not found.is_pose_near
-    leg = found.leg - 1
-    assert found.by_pose == pytest.approx(joints_at(HOME)[leg])
-    assert found.joint == pytest.approx(joints_at(THERE)[leg], abs=1e-6)
+    assert found.odd is odd
+    assert found.is_pose_near is ("pose" not in changes)
+    leg, is_near = found.leg - 1, shown.pose is not OUT_OF_REACH
+    assert found.by_pose == (pytest.approx(joints_at(shown.pose)[leg], abs=1e-4) if is_near else None)
+    assert found.joint == (None if shown.joints is None else shown.joints[leg])
 
 
 @pytest.mark.parametrize("name", ["S1x", "B4y", "l6"])
@@ -94,30 +110,6 @@ def test_an_encoder_that_contradicts_pose_and_joints_is_named(leg: int) -> None:
     assert found.odd is PositionSource.ENCODERS
     assert found.leg == leg
     assert found.encoder == encoders[leg - 1]
-
-
-def test_joints_of_home_are_odd_where_pose_and_encoders_agree() -> None:
-    found = mismatch(reports(joints=joints_at(HOME)))
-    assert found is not None
-    assert found.odd is PositionSource.JOINTS
-
-
-def test_where_no_two_agree_nothing_is_named() -> None:
-    found = mismatch(reports(pose=HOME, joints=joints_at(THERE) + 30.0))
-    assert found is not None
-    assert found.odd is None
-
-
-def test_without_joints_nothing_is_named() -> None:
-    found = mismatch(reports(pose=HOME, joints=None))
-    assert found is not None
-    assert (found.odd, found.joint) == (None, None)
-
-
-def test_a_pose_out_of_reach_is_odd() -> None:
-    found = mismatch(reports(pose=Pose(0.0, 0.0, 2000.0)))
-    assert found is not None
-    assert (found.odd, found.by_pose, found.is_pose_near) == (PositionSource.POSE, None, False)
 
 
 def test_a_servo_that_trembles_by_its_tolerance_is_no_mismatch() -> None:

@@ -277,10 +277,3 @@ def test_a_trip_without_a_stop_asks_for_the_emergency_stop_first() -> None:
     told = events.Tripped.of(error.trip)
     assert told.problem == "the robot could not be stopped: no way to it. Before that: has not answered"
     assert told.action == "Press the emergency stop"
-
-
-def test_a_trip_read_from_the_journal_is_unchanged() -> None:
-    trip = Trip(Guard.PLATE, "gauge z", "the ball is off", "Look at it")
-    event = events.Tripped.of(trip)
-    assert events.Tripped.model_validate_json(event.model_dump_json()) == event
-    assert (event.guard, event.device) == (Guard.PLATE, "gauge z")

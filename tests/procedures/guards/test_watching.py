@@ -92,26 +92,17 @@ async def test_all_devices_that_fail_before_a_move_are_named(scene) -> None:
         await stage.do(move(2))
 
 
-async def test_a_trip_stays_latched_until_it_is_cleared(scene) -> None:
+async def test_a_trip_stays_latched_until_the_controller_is_prepared_again(scene) -> None:
     stage = await reference(scene())
     stage.forbidden = "the button is pressed"
     with pytest.raises(GuardTripped, match="the button"):
         await stage.do(move(2))
+    with pytest.raises(GuardTripped, match="the button"):
+        await stage.rig.performer.prepare(stage.state)
     stage.forbidden = None
     for step in (move(2), sample(1)):
         with pytest.raises(GuardTripped, match="the button"):
             await stage.do(step)
-    stage.rig.performer.guards.supervisor.clear()
-    await stage.do(move(2))
-
-
-async def test_prepare_clears_the_latch_and_evaluates_the_guards_again(scene) -> None:
-    stage = await reference(scene())
-    stage.forbidden = "the button is pressed"
-    for action in (lambda: stage.do(move(2)), lambda: stage.rig.performer.prepare(stage.state)):
-        with pytest.raises(GuardTripped, match="the button"):
-            await action()
-    stage.forbidden = None
     await stage.rig.performer.prepare(stage.state)
     await stage.do(move(2))
 

@@ -7,8 +7,6 @@ import fcntl
 import gc
 import json
 import os
-import subprocess
-import sys
 import time
 import zlib
 from datetime import datetime, timedelta
@@ -27,12 +25,6 @@ from procedures.steps import events
 from tests.procedures.identified import an_identification
 from tests.procedures.journal.told import TOLD, write_told
 from tests.procedures.story import READING
-
-
-def test_a_new_journal_is_empty(path: Path) -> None:
-    with Journal(path) as journal:
-        assert journal.events == ()
-    assert read_journal(path) == ()
 
 
 def test_appended_events_are_read_back(path: Path, written: bytes) -> None:
@@ -92,11 +84,6 @@ def test_the_journals_name_is_forced_to_the_disk_too(path: Path, synced) -> None
         assert str(path.parent) in [name for name, _ in synced]
 
 
-def test_an_empty_file_is_an_empty_journal(path: Path) -> None:
-    path.touch()
-    assert read_journal(path) == ()
-
-
 def test_a_journal_that_is_absent_cannot_be_read(path: Path) -> None:
     with pytest.raises(FileError, match="does not exist"):
         read_journal(path)
@@ -116,16 +103,6 @@ def test_one_writer_at_a_time(path: Path) -> None:
         journal.append(TOLD[1])
     with Journal(path) as journal:
         assert journal.events == TOLD[:2]
-
-
-def test_another_process_is_refused_too(path: Path) -> None:
-    script = "from pathlib import Path; from procedures.journal.journal import Journal; import sys; "
-    script += "Journal(Path(sys.argv[1]))"
-    with Journal(path):
-        refused = subprocess.run(
-            [sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=False
-        )
-    assert "CellBusy" in refused.stderr
 
 
 numbers = st.floats()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,11 @@ import pytest
 from hexacell.cell.fields import Frozen
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.journal import decode
-from procedures.replay.replayer import Aspect, Change, Difference, changes, is_wording
+from procedures.replay.replayer import Change, changes, is_wording
 from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Reading
 from procedures.steps import events
+from tests.procedures.journal.told import checked
 
 KEY = SetKey(phase=Phase.BEFORE, point=2)
 
@@ -85,10 +85,6 @@ def test_a_field_missing_in_the_recorded_event_is_no_difference() -> None:
     assert changes(again, again.model_copy(update={"reading": None}), 1e-9) != []
 
 
-def checked(body: bytes) -> bytes:
-    return body[:-1] + b',"crc":"%08x"}\n' % zlib.crc32(body)
-
-
 def test_sentences_are_recognized_as_wording() -> None:
     gates = [AcceptanceGate(name="n", passed=True, sentence=words) for words in ("One.", "Two.")]
     first, second = (events.Proposed(gates=(gate,), written={}) for gate in gates)
@@ -96,11 +92,3 @@ def test_sentences_are_recognized_as_wording() -> None:
     assert change == Change("gates[0].sentence", "One.", "Two.")
     assert is_wording(change)
     assert not is_wording(Change("reading.line_up", 1, 2))
-
-
-def test_the_text_of_a_difference_is_short_and_names_the_place() -> None:
-    change = Change("held_out[0][0][0]", "x" * 500, 2.0)
-    words = str(Difference(7, "identify", Aspect.RESULT, change))
-    assert words.startswith("line 7, identify: held_out[0][0][0]: recorded xxx")
-    assert words.endswith("..., replayed 2.0")
-    assert len(words) < 160

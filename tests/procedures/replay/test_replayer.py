@@ -139,21 +139,6 @@ def anything(_: events.Event) -> bool:
     return True
 
 
-@pytest.mark.slow
-def test_a_run_that_was_stopped_several_times_is_reproduced(recording, replayed, replay) -> None:
-    rig = replayed(recording.until(events.SetClosed, count=1))
-
-    async def history() -> None:
-        for number in (3, 8, 12):
-            await stopped(rig, anything, count=number)
-        await stopped(rig, lambda event: isinstance(event, events.Identified))
-
-    asyncio.run(history())
-    told = read_journal(rig.folder.journal)
-    assert sum(isinstance(event, events.Interrupted) for event in told) >= 4
-    assert replay(told, rig).differences == []
-
-
 NUMBERS = range(1, 26)
 
 

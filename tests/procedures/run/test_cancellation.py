@@ -17,18 +17,6 @@ async def work(turns: int, done: list[int]) -> int:
     return turns
 
 
-async def test_shielded_work_returns_its_result() -> None:
-    assert await shielded(work(3, [])) == 3
-
-
-async def test_shielded_work_raises_its_error() -> None:
-    async def fail() -> None:
-        raise DeviceError("broken")
-
-    with pytest.raises(DeviceError, match="broken"):
-        await shielded(fail())
-
-
 @pytest.mark.parametrize("times", [1, 2, 4])
 async def test_shielded_work_is_completed_before_the_cancellation_is_raised(times: int) -> None:
     done: list[int] = []

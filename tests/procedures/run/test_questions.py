@@ -27,32 +27,25 @@ def placement_at(point: int) -> Question:
     return ask_placement(SetKey(phase=Phase.IDENTIFY, point=point), Pose(1.0, 2.0, 3.0))
 
 
-async def test_an_unattended_run_places_no_gauges() -> None:
-    with pytest.raises(AnswerNeeded, match=r"point 3 \(X1\.000 .*fixed stations") as refusal:
-        await UnattendedOperator().ask(placement_at(3))
-    assert refusal.value.exit_code is ExitCode.ANSWER_NEEDED
+LARGE = AcceptanceGate(
+    name="small change", passed=False, sentence="The largest change is 9 mm.", needs_person=True
+)
+GOOD = AcceptanceGate(name="converged", passed=True, sentence="The solver ended.")
 
 
-async def test_unattended_approval_is_refused_with_the_reasons() -> None:
-    gates = [
-        AcceptanceGate(
-            name="small change", passed=False, sentence="The largest change is 9 mm.", needs_person=True
-        ),
-        AcceptanceGate(name="converged", passed=True, sentence="The solver ended."),
-    ]
-    with pytest.raises(AnswerNeeded, match=r"approval: The largest change is 9 mm\.$"):
-        await UnattendedOperator().ask(ask_approval(gates, "diff", cell="bench"))
-
-
-async def test_unattended_approval_is_refused_where_the_cell_file_requires_it() -> None:
-    with pytest.raises(AnswerNeeded, match="the cell file says to ask"):
-        await UnattendedOperator().ask(ask_approval([], "diff", cell="bench"))
-
-
-async def test_an_unattended_run_chooses_no_recovery() -> None:
-    question = ask_recovery("It broke.", (Action.RETRY, Action.ABORT))
-    with pytest.raises(AnswerNeeded, match=r"^It broke\. A person must choose: retry, abort"):
+@pytest.mark.parametrize(
+    ("question", "words"),
+    [
+        (placement_at(3), r"point 3 \(X1\.000 .*fixed stations"),
+        (ask_approval([LARGE, GOOD], "diff", cell="bench"), r"approval: The largest change is 9 mm\.$"),
+        (ask_approval([], "diff", cell="bench"), "the cell file says to ask"),
+        (ask_recovery("It broke.", (Action.RETRY, Action.ABORT)), r"^It broke\. A .*: retry, abort"),
+    ],
+)
+async def test_an_unattended_run_says_what_a_person_must_answer(question: Question, words: str) -> None:
+    with pytest.raises(AnswerNeeded, match=words) as refusal:
         await UnattendedOperator().ask(question)
+    assert refusal.value.exit_code is ExitCode.ANSWER_NEEDED
 
 
 async def test_only_a_choice_of_the_question_is_an_answer() -> None:

@@ -6,20 +6,13 @@ from typing import Any
 
 import pytest
 
-from hexacell.verdict.decision import Verdict
 from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Temperature
 from procedures.run.state import RunState, apply, fold
 from procedures.steps import events
-from procedures.steps.close import CloseSet
-from tests.procedures.identified import an_identification
 from tests.procedures.story import located
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
-
-
-def test_the_state_without_events_is_the_initial_one() -> None:
-    assert fold([]) == RunState()
 
 
 def test_a_fold_applies_one_event_at_a_time(recording) -> None:
@@ -38,41 +31,12 @@ def test_applying_an_event_does_not_change_the_former_state(story) -> None:
     assert first == fold([story().arrived(), story().placed()])
 
 
-def test_the_beginning_of_a_step_does_not_change_the_state() -> None:
-    assert fold([events.StepBegun(step=CloseSet(at=P1))]) == RunState()
-
-
-def test_an_arrival_gives_the_position(story) -> None:
-    state = fold([story().arrived(3)])
-    assert state.at_pose == (P1, 3)
-    assert state.target == story().arrived(3).pose
-
-
-def test_placing_belongs_to_its_set(story) -> None:
-    state = fold([story(point=2).placed()])
-    assert state.set(SetKey(phase=Phase.IDENTIFY, point=2)).placed
-    assert not state.set(P1).placed
-
-
-def test_samples_are_kept_in_the_order_taken(story) -> None:
-    told = [story().sampled(1), story().sampled(2, (0.5, 0.0, -0.25))]
-    state = fold(told)
-    assert state.set(P1).samples == tuple(told)
-    assert not state.set(P1).closed
-
-
 def test_a_rejected_record_is_counted_and_voids_the_position(story) -> None:
     state = fold([story().arrived(2), story().refused(), story().arrived(2), story().refused()])
     assert state.set(P1).rejections == 2
     assert not state.left_travel, "it was not the new geometry that took the ball there"
     assert state.at_pose is None
     assert state.target == story().arrived(2).pose
-
-
-def test_closing_records_the_drift(story) -> None:
-    state = fold([story().sampled(), story().closed()])
-    assert state.set(P1).drift_mm == (0.0, 0.0, 0.0)
-    assert state.set(P1).closed
 
 
 def test_an_invalidated_set_is_removed_and_counted(story) -> None:
@@ -129,26 +93,6 @@ def test_held_out_deviations_leave_references_out(story) -> None:
 
 
 @pytest.mark.parametrize(
-    ("event", "attribute"),
-    [
-        (events.Identified(result=an_identification(), held_out=()), "identified"),
-        (events.Proposed(gates=(), written={}), "proposed"),
-        (events.Committed(approved_by="a tester"), "committed"),
-        (events.ResultValidated(verdict=Verdict.PASS, line="pass"), "judged"),
-        (events.Ended(exit_code=0, line="pass"), "ended"),
-    ],
-)
-def test_milestone_events_are_kept_unchanged(event: Any, attribute: str) -> None:
-    state = fold([event])
-    assert getattr(state, attribute) == event
-    assert getattr(RunState(), attribute) is None
-
-
-def test_the_start_event_is_kept(recording) -> None:
-    assert fold(recording.history).started == recording.history[0]
-
-
-@pytest.mark.parametrize(
     "event",
     [
         events.Committed(approved_by="a tester"),
@@ -158,14 +102,6 @@ def test_the_start_event_is_kept(recording) -> None:
 )
 def test_after_these_events_the_position_is_unknown(event: Any, story) -> None:
     assert fold([story().arrived(2), event]).at_pose is None
-
-
-WORSE = events.ResultValidated(verdict=Verdict.FAIL, line="worse")
-
-
-def test_a_rollback_after_a_verdict_is_kept_in_the_state() -> None:
-    assert fold([WORSE, events.RolledBack()]).rolled_back
-    assert not RunState().rolled_back
 
 
 def test_a_rollback_without_a_verdict_returns_to_the_proposal(story) -> None:

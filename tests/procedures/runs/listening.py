@@ -11,20 +11,35 @@ from procedures.run.state import RunState
 from procedures.steps import events
 
 
-def on(kind: type[Any], action: Any, count: int = 1) -> Any:
-    """A listener that does something at the ``count``-th event of a kind."""
+class PowerCut(BaseException):
+    """Nothing after it is written down: neither a word of farewell nor a stop."""
+
+
+def cut_power() -> None:
+    raise PowerCut
+
+
+def on(kind: type[Any], action: Any, count: int | None = 1) -> Any:
+    """A listener that does something at the ``count``-th event of a kind, or at each."""
     seen = [0]
 
     def listener(event: events.Event, _: RunState) -> None:
         if isinstance(event, kind):
             seen[0] += 1
-            if seen[0] == count:
+            if count in {None, seen[0]}:
                 action()
 
     return listener
 
 
-def before_sampling(key: str, action: Any) -> Any:
+def steps_of(rig: Any) -> list[Any]:
+    """The steps that were begun."""
+    return [event.step for event in happened(rig, events.StepBegun)]
+
+
+def before(key: str, action: Any) -> Any:
+    """A listener that does something whenever a step is begun."""
+
     def listener(event: events.Event, _: RunState) -> None:
         if isinstance(event, events.StepBegun) and event.step.key == key:
             action()

@@ -21,16 +21,6 @@ async def test_a_forbidding_gate_ends_the_run_before_anything_is_written(recordi
     assert "reload" not in rig.controller.log
 
 
-async def test_a_geometry_beyond_the_tolerance_waits_for_a_person(recording, replayed) -> None:
-    measured = recording.until(events.SetClosed, count=4)
-    rig = replayed(measured, tolerances__l_mm=2.0)
-    object.__setattr__(rig.performer, "operator", UnattendedOperator())
-    with pytest.raises(AnswerNeeded, match=r"Beyond the drawing's tolerance: .*l"):
-        await rig.run()
-    assert rig.config == recording.config_before
-    assert rig.folder.proposal.exists()
-
-
 async def test_a_gate_that_requires_approval_ends_an_unattended_run(recording, replayed) -> None:
     rig = replayed(proposed(recording, GOOD, DOUBTFUL))
     object.__setattr__(rig.performer, "operator", UnattendedOperator())
@@ -42,13 +32,25 @@ async def test_a_gate_that_requires_approval_ends_an_unattended_run(recording, r
     assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.ANSWER_NEEDED
 
 
-async def test_a_large_change_needs_a_person(recording, replayed) -> None:
-    measured = recording.until(events.SetClosed, count=4)
-    rig = replayed(measured, acceptance__largest_change_mm=3.0)
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"tolerances__l_mm": 2.0}, r"Beyond the drawing's tolerance: .*l"),
+        (
+            {"acceptance__largest_change_mm": 3.0},
+            r"largest change is \d\.\d+ mm, .*apart \(limit .* 3 mm\)",
+        ),
+    ],
+)
+async def test_a_geometry_far_from_the_old_one_waits_for_a_person(
+    recording, replayed, changes, words
+) -> None:
+    rig = replayed(recording.until(events.SetClosed, count=4), **changes)
     object.__setattr__(rig.performer, "operator", UnattendedOperator())
-    with pytest.raises(AnswerNeeded, match=r"largest change is \d\.\d+ mm, .*apart \(limit .* 3 mm\)"):
+    with pytest.raises(AnswerNeeded, match=words):
         await rig.run()
     assert rig.config == recording.config_before
+    assert rig.folder.proposal.exists()
 
 
 @pytest.mark.parametrize(("gates", "approval"), [([GOOD, DOUBTFUL], "automatic"), ([GOOD], "ask")])

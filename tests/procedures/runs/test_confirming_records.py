@@ -8,7 +8,6 @@ import pytest
 
 from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
-from hexacell.text.line_face import event_text
 from hexacell.verdict import model_evidence
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.held_out_poses import HeldOutPoses
@@ -18,13 +17,9 @@ from procedures.run.state import RunState, fold
 from procedures.steps import events
 from procedures.steps.move import Move
 from tests.procedures.fakes import refused
-from tests.procedures.runs.listening import happened
+from tests.procedures.runs.listening import PowerCut, happened
 
 FIRST = SetKey(phase=Phase.CONFIRM, point=1)
-
-
-class PowerCut(BaseException):
-    """Nothing after it is written down."""
 
 
 @pytest.fixture(autouse=True)
@@ -132,10 +127,3 @@ async def test_a_refused_confirming_pose_is_left_out(recording, replayed) -> Non
 def orientations_taken(rig: Any) -> list[int]:
     state = fold(read_journal(rig.folder.journal))
     return [sample.orientation for sample in state.set(FIRST).samples]
-
-
-def test_why_more_is_measured_is_said() -> None:
-    pose = (0.0,) * 6
-    planned = events.ConfirmationPlanned(reason="The residuals are odd", poses=((pose, pose), ()))
-    said = "The residuals are odd: 2 new records show whether by chance"
-    assert event_text(planned, RunState()) == said

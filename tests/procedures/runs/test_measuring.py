@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.errors import GaugeAtEnd, GaugeSilent
+from drivers.errors import GaugeAtEnd
 from hexacell.errors import AnswerNeeded, ExitCode, HexacellError, LimitError
 from hexacell.measurements.csv_file import read_measurements
 from procedures.engine.commands import UnattendedOperator
 from procedures.steps import events
-from tests.procedures.runs.listening import before_sampling, happened, on
+from tests.procedures.runs.listening import before, happened, on
 
 
 async def test_after_a_rejected_record_another_pose_is_measured(make_rig) -> None:
@@ -20,7 +20,7 @@ async def test_after_a_rejected_record_another_pose_is_measured(make_rig) -> Non
         for gauge in rig.gauges[: len(at_ends)]:
             gauge.failures.append(at_ends.pop(0))
 
-    ended = await rig.run(before_sampling("P1/o03/sample", once))
+    ended = await rig.run(before("P1/o03/sample", once))
     assert ended.exit_code == ExitCode.DONE
     (refused,) = happened(rig, events.RecordRejected)
     assert (str(refused.at), refused.orientation) == ("P1", 3)
@@ -45,17 +45,6 @@ async def test_a_slipped_gauge_stops_the_run_and_the_point_is_measured_again(rec
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE
     assert [str(event.at) for event in happened(rig, events.SetInvalidated)] == ["P2"]
-
-
-async def test_a_gauge_that_falls_silent_stops_the_run(recording, replayed) -> None:
-    rig = replayed(recording.until(events.SetClosed, count=1))
-    silent = GaugeSilent("does not answer", subject="gauge z")
-    with pytest.raises(GaugeSilent):
-        await rig.run(before_sampling("P2/o03/sample", lambda: rig.gauges[2].failures.append(silent)))
-    assert rig.controller.log[-1] == "stop"
-    assert happened(rig, events.Interrupted)[-1] == events.Interrupted(
-        reason="gauge z: does not answer", exit_code=3
-    )
 
 
 async def test_gauges_placed_by_hand_are_requested_at_every_point(recording, replayed) -> None:

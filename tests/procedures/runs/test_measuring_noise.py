@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,6 @@ from hexacell.config.change import Receipt
 from hexacell.errors import ExitCode, Interruption
 from hexacell.kinematics.pose import Pose
 from hexacell.services.run.calibration_run import calibration_of_run
-from hexacell.text.line_face import event_text
 from procedures.calibration.calibration import Mode
 from procedures.engine.commands import Abort, Stop
 from procedures.engine.recovery import RecoveryPolicy
@@ -37,7 +35,7 @@ from procedures.steps.repeat import Repeat
 from procedures.steps.standstill import Standstill
 from tests.procedures.replay.test_replayer import numbered
 from tests.procedures.rig import MakeRig, Rig, new_rig
-from tests.procedures.runs.listening import happened, on
+from tests.procedures.runs.listening import PowerCut, happened, on, steps_of
 from tests.small_cell import choose_among_few
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
@@ -69,10 +67,6 @@ def noisy(rig: Rig, gauge: int, sigma_mm: float) -> None:
     rig.gauges[gauge].shown = lambda: shown() + sigma_mm * random.standard_normal()
 
 
-def steps_of(history: Sequence[events.Event]) -> list[Any]:
-    return [event.step for event in history if isinstance(event, events.StepBegun)]
-
-
 @pytest.fixture
 def well_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """The robot is known so well that no pilot poses are wanted."""
@@ -83,7 +77,7 @@ async def test_it_is_read_at_rest_left_in_all_directions_and_evaluated(
     asked: Rig, well_known: None
 ) -> None:
     await measure_noise(asked)
-    steps = steps_of(read_journal(asked.folder.journal))
+    steps = steps_of(asked)
     (first,) = (place for place, step in enumerate(steps) if isinstance(step, Standstill))
     (last,) = (place for place, step in enumerate(steps) if step == AssessNoise())
     reference = np.array(steps[first - 1].pose)
@@ -117,8 +111,7 @@ async def test_the_reference_is_left_for_pilot_poses(asked: Rig) -> None:
     travel = asked.cell.settings.limits.gauge_travel_mm
     assert max(np.abs(one.deviation).max() for one in state.pilots) < travel
     assert {one.orientation for one in state.measurements().records} == {1, 2}
-    (found,) = happened(asked, events.NoiseMeasured)
-    assert f"meanwhile {len(pilots)} pilot poses were read" in (event_text(found, state) or "")
+    assert len(happened(asked, events.NoiseMeasured)) == 1
     assert len(visits) == 6
 
 
@@ -164,10 +157,6 @@ async def test_a_noisy_gauge_is_named_and_weighted_down(asked: Rig) -> None:
     assert noise.gauges_mm[1] == pytest.approx(0.012 / np.sqrt(5.0), rel=0.6)
     assert noise.gauges_mm[[0, 2]] == pytest.approx([0.0012, 0.0012])
     assert asked.calibration.robot.noise.gauges_mm == pytest.approx(np.full(3, 0.0012))
-    text = event_text(found, state)
-    assert text is not None
-    assert re.search(r"gauge y: its readings scatter by [\d.]+ um without moving", text)
-    assert "state it in [noise]" in text
 
 
 async def test_a_drifting_gauge_is_named_and_is_no_noise(asked: Rig) -> None:
@@ -179,10 +168,6 @@ async def test_a_drifting_gauge_is_named_and_is_no_noise(asked: Rig) -> None:
     (series,) = happened(asked, events.StandstillRead)
     assert drifting.drift == pytest.approx(series.gauges_mm[-1][2] - series.gauges_mm[0][2], rel=0.2)
     assert not drifting.is_noisier
-    text = event_text(found, RunState())
-    assert text is not None
-    assert "gauge z: it drifted by +" in text
-    assert "let it warm up" in " ".join(text.split())
 
 
 async def test_encoders_that_show_other_places_each_time_are_told(make_rig: MakeRig) -> None:
@@ -191,8 +176,8 @@ async def test_encoders_that_show_other_places_each_time_are_told(make_rig: Make
     ball, shift = rig.physics.encoder_positions, np.zeros(6)
     random = np.random.default_rng(9)
     rig.bench.encoders.shown = lambda: [*(ball() + shift)]
-    moved = on_every(
-        events.Arrived, lambda: shift.__setitem__(slice(None), 0.03 * random.standard_normal(6))
+    moved = on(
+        events.Arrived, lambda: shift.__setitem__(slice(None), 0.03 * random.standard_normal(6)), None
     )
     with pytest.raises(Interruption):
         await rig.run(moved, on(events.NoiseMeasured, lambda: rig.engine.command(Stop())))
@@ -200,21 +185,10 @@ async def test_encoders_that_show_other_places_each_time_are_told(make_rig: Make
     assert len(happened(rig, events.PilotTaken)) == 6, "until three visits show it"
     assert found.noise.approaches.source == "encoders"
     assert found.noise.approaches.excess == pytest.approx(0.03, rel=0.6)
-    text = event_text(found, RunState())
-    assert text is not None
-    assert "Look at reading heads" in " ".join(text.split())
     informed = rig.calibration.known(fold(read_journal(rig.folder.journal)))
     assert informed.settings.uncertainty == rig.cell.settings.uncertainty
     assert informed.robot.noise.encoders == pytest.approx(np.full(6, 0.03), rel=0.6)
     assert informed.robot.noise.gauges_mm == pytest.approx(np.full(3, 0.0012))
-
-
-def on_every(kind: type[Any], action: Any) -> Any:
-    def listener(event: events.Event, _: RunState) -> None:
-        if isinstance(event, kind):
-            action()
-
-    return listener
 
 
 AVERAGED = ASKED | {
@@ -289,7 +263,7 @@ def test_the_run_is_reproduced(whole: Rig, few_candidates: None, tmp_path: Path)
 
 @pytest.mark.parametrize(
     ("command", "step"),
-    [(Abort(), 9), *(pytest.param(one, 3, marks=pytest.mark.slow) for one in (Abort(), None))],
+    [(Abort(), 27), *(pytest.param(one, 3, marks=pytest.mark.slow) for one in (Abort(), None))],
 )
 async def test_interrupted_anywhere_it_is_measured_once(
     make_rig: MakeRig, few_candidates: None, tmp_path: Path, command: Abort | None, step: int
@@ -306,10 +280,6 @@ async def test_interrupted_anywhere_it_is_measured_once(
         assert state.noise is not None
         assert state.noise.noise.approaches is not None
         assert state.noise.noise.approaches.visits == 7
-
-
-class PowerCut(BaseException):
-    """Nothing after it is written down."""
 
 
 async def interrupted(rig: Rig, number: int, command: Abort | None) -> None:

@@ -44,13 +44,6 @@ async def test_a_worse_result_is_recorded_with_its_rollback(recording, replayed)
     assert back.largest.change == pytest.approx(-written.largest.change)
 
 
-async def test_a_result_that_nobody_keeps_is_recorded_so(recording, replayed) -> None:
-    rig = replayed(recording.until(events.Proposed), acceptance__position_mm=0.0001)
-    rig.operator.name = None
-    await rig.run()
-    assert recorded(rig)[-1].why.startswith("nobody kept it: ")
-
-
 async def test_a_controller_that_does_not_take_it_is_the_reason(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
     rig.controller.failures["reload"] = DeviceError("does not come back", subject="controller")

@@ -1,4 +1,4 @@
-"""The fault matrix has every kind of step, and counts only the cases that were tried."""
+"""Runs are broken at every kind of step, and at the instants that are meant."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from procedures.steps import events
 from procedures.steps.base import StepWithoutMotion
 from procedures.steps.registry import STEPS as STEPS_OF_RUNS
 from tests.faults.killing import KILLED
-from tests.faults.matrix import STEPS, Case, step_of, table
+from tests.faults.steps import STEPS, step_of
 from tests.faults.test_killed_at_random import killed
 
 WITHOUT_MOTION: list[Any] = [step for step in STEPS_OF_RUNS if issubclass(step, StepWithoutMotion)]
@@ -20,11 +20,6 @@ WITHOUT_MOTION: list[Any] = [step for step in STEPS_OF_RUNS if issubclass(step, 
 @pytest.mark.parametrize("step", WITHOUT_MOTION)
 def test_every_computation_is_a_step_of_the_matrix(step: Any) -> None:
     assert step_of([events.StepBegun(step=step())]) in STEPS
-
-
-def test_all_cases_are_counted() -> None:
-    tried = [Case("killed", "sampling", "resumed"), Case("killed", "ending", "over")]
-    assert table([*tried, tried[0]]).splitlines()[-1] == "3 cases"
 
 
 def test_a_run_that_ended_before_the_kill_is_tried_again_earlier() -> None:

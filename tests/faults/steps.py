@@ -1,11 +1,8 @@
-"""The fault matrix: what was broken at which step, what came of it, and how often it was tried."""
+"""Kinds of steps, at each of which runs are broken."""
 
 from __future__ import annotations
 
-import json
-from collections import Counter
 from collections.abc import Iterable
-from dataclasses import astuple, dataclass
 
 from procedures.run.keys import Phase
 from procedures.steps import events
@@ -22,7 +19,6 @@ from procedures.steps.sample import Sample
 from procedures.steps.standstill import Standstill
 from procedures.steps.try_gauges import Try
 
-PROPERTY = "fault-matrix"
 STEPS = (
     "beginning",
     "locating",
@@ -62,18 +58,6 @@ COMPUTING = {
 
 
 OF_PHASES = {Phase.BEFORE: "held-out", Phase.AFTER: "after", Phase.LENGTH: "length"}
-
-
-@dataclass(frozen=True)
-class Case:
-    """One fault at one step, and what became of the run."""
-
-    fault: str
-    step: str
-    outcome: str
-
-    def to_json(self) -> str:
-        return json.dumps(astuple(self))
 
 
 def step_of(history: Iterable[events.Event]) -> str:
@@ -118,46 +102,3 @@ def _of_a_set(step: Step) -> str:  # noqa: PLR0911 - a case a step
             return "revisiting"
         case _:
             return "closing"
-
-
-def table(cases: Iterable[Case]) -> str:
-    """A line for each fault and outcome: how many cases at which step."""
-    counts = Counter(cases)
-    used = [step for step in STEPS if any(case.step == step for case in counts)]
-    used += sorted({case.step for case in counts} - set(STEPS))
-    rows = sorted({(case.fault, case.outcome) for case in counts})
-    width = max((len(fault) for fault, _ in rows), default=0)
-    heads = [_short(step) for step in used]
-    lines = [f"{'fault':{width}} {' '.join(f'{head:>6}' for head in heads)}    all  outcome"]
-    for fault, outcome in rows:
-        numbers = [counts[Case(fault, step, outcome)] for step in used]
-        cells = " ".join(f"{number or '.':>6}" for number in numbers)
-        lines.append(f"{fault:{width}} {cells} {sum(numbers):6}  {outcome}")
-    lines.append(f"{counts.total()} cases")
-    return "\n".join(lines)
-
-
-def _short(step: str) -> str:
-    shorter = {
-        "beginning": "begin",
-        "locating": "locate",
-        "revisiting": "revist",
-        "to reference": "to ref",
-        "placing": "place",
-        "zeroing": "zero",
-        "trying gauges": "try",
-        "to orientation": "move",
-        "sampling": "sample",
-        "closing": "close",
-        "measuring noise": "noise",
-        "lending": "lend",
-        "taking back": "take b",
-        "identifying": "identf",
-        "held-out": "before",
-        "proposing": "propos",
-        "committing": "commit",
-        "judging": "judge",
-        "rolling back": "roll b",
-        "ending": "end",
-    }
-    return shorter.get(step, step[:6])

@@ -30,7 +30,7 @@ from tests.procedures.engine.injected_failures import (
 from tests.procedures.runs.listening import happened
 
 
-@pytest.mark.parametrize(("times", "reopened", "voided"), [(1, 0, 0), (2, 1, 1), (3, 2, 2)])
+@pytest.mark.parametrize(("times", "reopened", "voided"), [(1, 0, 0), (3, 2, 2)])
 async def test_an_unattended_run_retries_a_silent_gauge_and_then_redoes_its_set(
     at_second_point, times: int, reopened: int, voided: int
 ) -> None:

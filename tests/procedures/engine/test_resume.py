@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import pytest
@@ -14,8 +15,9 @@ from hexacell.config.write_back import commit
 from hexacell.errors import ExitCode
 from procedures.journal.journal import read_journal
 from procedures.resources import controller_config as config_changes
-from procedures.run.state import RunState, fold
+from procedures.run.state import fold
 from procedures.steps import events
+from tests.procedures.runs.listening import cancelled, on
 
 INTERRUPTED = events.Interrupted(reason="a power cut", exit_code=130)
 
@@ -86,32 +88,12 @@ def require_whole_sets(history: Sequence[events.Event]) -> None:
                 assert event.at not in doubted
 
 
-def cancelling(number: int) -> tuple[Any, list[asyncio.Task[Any]]]:
-    """A listener that cancels a task, put into the list later, at the ``number``-th event it hears."""
-    tasks: list[asyncio.Task[Any]] = []
-    heard = 0
-
-    def listener(event: events.Event, _: RunState) -> None:
-        nonlocal heard
-        heard += 1
-        if heard == number:
-            tasks[0].cancel()
-
-    return listener, tasks
-
-
-async def cancelled_at(rig: Any, number: int) -> None:
-    listener, tasks = cancelling(number)
-    tasks.append(asyncio.create_task(rig.run(listener)))
-    with pytest.raises(asyncio.CancelledError):
-        await tasks[0]
-
-
+@pytest.mark.sample("6", "25")
 @pytest.mark.parametrize("number", [1, 6, 22, 25, 28])
 async def test_a_run_cancelled_after_any_event_resumes(recording, replayed, number: int) -> None:
     rig = replayed(recording.until(events.SetClosed, count=3))
     begun = len(read_journal(rig.folder.journal))
-    await cancelled_at(rig, number)
+    await cancelled(rig, partial(on, object, count=number))
     first = read_journal(rig.folder.journal)
     assert first[-1] == events.Interrupted(reason="CancelledError", exit_code=130)
     assert len(first) - begun in {number + 1, number + 2}, "a step that was being done may have ended"

@@ -8,6 +8,7 @@ import random
 import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +24,9 @@ from procedures.journal.journal import Entry, read_journal
 from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Aspect, Replayer, ReplayReport, Scope
 from procedures.run.keys import Phase, SetKey
-from procedures.run.state import RunState
 from procedures.steps import events
+from tests.procedures.engine.injected_failures import failing
+from tests.procedures.runs.listening import before, cancelled, on
 
 Replay = Callable[..., ReplayReport]
 
@@ -78,27 +80,6 @@ def test_a_check_is_reproduced(make_rig, replay) -> None:
     assert report.results > 10
 
 
-def after(happened: Callable[[events.Event], bool], action: Callable[[], object], count: int = 1) -> Any:
-    """A listener that does something after the ``count``-th event of a kind."""
-    seen = []
-
-    def listener(event: events.Event, _: RunState) -> None:
-        if happened(event):
-            seen.append(event)
-            if len(seen) == count:
-                action()
-
-    return listener
-
-
-def begun(key: str) -> Callable[[events.Event], bool]:
-    return lambda event: isinstance(event, events.StepBegun) and event.step.key == key
-
-
-def refusal(event: events.Event) -> bool:
-    return isinstance(event, events.RecordRejected)
-
-
 def test_rejected_records_are_reproduced(make_rig, replay) -> None:
     """One whose plungers were at their ends, and one farther away than the travel allows."""
     rig = make_rig()
@@ -108,35 +89,15 @@ def test_rejected_records_are_reproduced(make_rig, replay) -> None:
         for gauge in rig.gauges[:2]:
             gauge.failures.append(GaugeAtEnd("is at an end of its travel", subject=f"gauge {gauge.name}"))
 
-    listeners = [
-        after(begun("P1/o03/sample"), at_ends),
-        after(begun("P1/o05/sample"), lambda: setattr(rig.gauges[1], "shown", lambda: 6.1)),
-        after(refusal, lambda: setattr(rig.gauges[1], "shown", shown), count=2),
-    ]
-    asyncio.run(stopped(rig, begun("P1/close"), listeners))
+    at_third = failing("P1/o03/sample", at_ends)
+    at_fifth = failing("P1/o05/sample", lambda: setattr(rig.gauges[1], "shown", lambda: 6.1))
+    inside = on(events.RecordRejected, lambda: setattr(rig.gauges[1], "shown", shown), 2)
+    asyncio.run(cancelled(rig, partial(before, "P1/close"), at_third, at_fifth, inside))
     history = read_journal(rig.folder.journal)
     readings = [event.reading for event in history if isinstance(event, events.RecordRejected)]
     assert [reading is None for reading in readings] == [True, False]
     report = replay(history, rig)
     assert report.differences == []
-
-
-async def stopped(
-    rig: Any, when: Callable[[events.Event], bool], listeners: Sequence[Any] = (), count: int = 1
-) -> None:
-    """A run that a person stops after the ``count``-th event of a kind."""
-    running: list[asyncio.Task[Any]] = []
-
-    def stop() -> None:
-        running[0].cancel()
-
-    running.append(asyncio.create_task(rig.run(*listeners, after(when, stop, count))))
-    with pytest.raises(asyncio.CancelledError):
-        await running[0]
-
-
-def anything(_: events.Event) -> bool:
-    return True
 
 
 NUMBERS = range(1, 26)
@@ -150,7 +111,7 @@ def test_a_check_stopped_after_any_event_is_reproduced(make_rig, replay, number:
     rig = make_rig(Mode.CHECK)
 
     async def history() -> None:
-        await stopped(rig, anything, count=number)
+        await cancelled(rig, partial(on, object, count=number))
         await rig.run()
 
     asyncio.run(history())
@@ -182,7 +143,7 @@ def test_answers_of_a_person_are_repeated(recording, replayed, replay) -> None:
     with pytest.raises(LimitError, match="declined"):
         asyncio.run(rig.run())
     rig.operator.name = "somebody else"
-    asyncio.run(stopped(rig, lambda event: isinstance(event, events.Committed)))
+    asyncio.run(cancelled(rig, partial(on, events.Committed)))
     history = read_journal(rig.folder.journal)
     assert "somebody else" in {
         event.approved_by for event in history if isinstance(event, events.Committed)
@@ -264,13 +225,14 @@ def test_a_manipulated_event_is_reported_with_its_line(recording, replay, what: 
 @pytest.mark.parametrize("changes", [{"spread_mm": (0.0, 1.0, 0.0)}, {"counts": ((0,) * 6,)}])
 def test_a_reading_that_had_not_settled_is_reported(recording, replay, changes: dict[str, Any]) -> None:
     changes = {f"reading.{key}": value for key, value in changes.items()}
-    history = changed(recording.history, events.RecordTaken, changes, 3)
+    history = changed(recording.until(events.RecordTaken, count=3), events.RecordTaken, changes, 3)
     [first, *_] = replay(history, scope=Scope.RESULTS).differences
     assert "had not settled" in str(first)
 
 
 def test_one_manipulated_event_gives_one_difference(recording, replay) -> None:
-    history = changed(recording.history, events.Arrived, {"pose": (100.0, -100.0, 500.0, 1.0, 0.0, 0.0)}, 2)
+    whole = recording.until(events.SetClosed)
+    history = changed(whole, events.Arrived, {"pose": (100.0, -100.0, 500.0, 1.0, 0.0, 0.0)}, 2)
     [line] = (n for n, event in enumerate(history, 1) if event != recording.history[n - 1])
     assert {difference.line for difference in replay(history, scope=Scope.RESULTS).differences} == {line}
 
@@ -305,7 +267,7 @@ def test_decisions_do_not_depend_on_time_or_random_numbers(recording, replay, mo
     monkeypatch.setattr(time, "time", lambda: 3600.0 * next(hours))
     monkeypatch.setattr(random, "random", lambda: pytest.fail("chance"))
     np.random.seed(next(hours) % 1000)  # noqa: NPY002 - the one that everybody shares is meant
-    assert replay(recording.history[:60], scope=Scope.DECISIONS).differences == []
+    assert replay(recording.history[:30], scope=Scope.DECISIONS).differences == []
 
 
 def test_an_error_of_the_program_is_reproduced(recording, replay, monkeypatch) -> None:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Callable
 from typing import Any
+
+import pytest
 
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.journal import read_journal
@@ -45,6 +49,18 @@ def before(key: str, action: Any) -> Any:
             action()
 
     return listener
+
+
+async def cancelled(rig: Any, when: Callable[..., Any], *listeners: Any) -> None:
+    """A run whose task is cancelled; ``when`` makes the listener that does it at its moment."""
+    tasks: list[asyncio.Task[Any]] = []
+
+    def cancel() -> None:
+        tasks[0].cancel()
+
+    tasks.append(asyncio.create_task(rig.run(*listeners, when(action=cancel))))
+    with pytest.raises(asyncio.CancelledError):
+        await tasks[0]
 
 
 def happened(rig: Any, kind: type[Any]) -> list[Any]:

@@ -16,7 +16,7 @@ from procedures.journal.journal import read_journal
 from procedures.run.state import fold
 from procedures.steps import events
 from tests.procedures.rig import failure_without_record
-from tests.procedures.runs.listening import PowerCut, cut_power, on
+from tests.procedures.runs.listening import PowerCut, at_step, cut_power, on
 
 
 @pytest.fixture
@@ -113,7 +113,7 @@ async def test_a_run_resumes_after_a_power_cut_before_the_provisional_geometry_i
 ) -> None:
     before = rig.config
     with pytest.raises(PowerCut):
-        await rig.run(before(step, cut_power))
+        await rig.run(at_step(step, cut_power))
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE
     assert kinds(rig)[-3:] == ["identified", "committed", "ended"]

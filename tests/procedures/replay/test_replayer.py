@@ -26,7 +26,7 @@ from procedures.replay.replayer import Aspect, Replayer, ReplayReport, Scope
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
 from tests.procedures.engine.injected_failures import failing
-from tests.procedures.runs.listening import before, cancelled, on
+from tests.procedures.runs.listening import at_step, cancelled, on
 
 Replay = Callable[..., ReplayReport]
 
@@ -92,7 +92,7 @@ def test_rejected_records_are_reproduced(make_rig, replay) -> None:
     at_third = failing("P1/o03/sample", at_ends)
     at_fifth = failing("P1/o05/sample", lambda: setattr(rig.gauges[1], "shown", lambda: 6.1))
     inside = on(events.RecordRejected, lambda: setattr(rig.gauges[1], "shown", shown), 2)
-    asyncio.run(cancelled(rig, partial(before, "P1/close"), at_third, at_fifth, inside))
+    asyncio.run(cancelled(rig, partial(at_step, "P1/close"), at_third, at_fifth, inside))
     history = read_journal(rig.folder.journal)
     readings = [event.reading for event in history if isinstance(event, events.RecordRejected)]
     assert [reading is None for reading in readings] == [True, False]

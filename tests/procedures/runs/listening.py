@@ -41,7 +41,7 @@ def steps_of(rig: Any) -> list[Any]:
     return [event.step for event in happened(rig, events.StepBegun)]
 
 
-def before(key: str, action: Any) -> Any:
+def at_step(key: str, action: Any) -> Any:
     """A listener that does something whenever a step is begun."""
 
     def listener(event: events.Event, _: RunState) -> None:

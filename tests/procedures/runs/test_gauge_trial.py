@@ -14,7 +14,7 @@ from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
 from procedures.steps.move import Move
 from tests.procedures.runs.gauge_mistakes import MISTAKES, corrected, make_mistake
-from tests.procedures.runs.listening import before, happened, on, steps_of
+from tests.procedures.runs.listening import at_step, happened, on, steps_of
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 
@@ -75,7 +75,7 @@ async def test_a_gauge_that_was_connected_again_is_tried_again(make_rig) -> None
 
     policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=False)
     with pytest.raises(HexacellError, match="gauge z: counts the wrong way"):
-        await rig.run(before("P1/o03/sample", turned_round), policy=policy)
+        await rig.run(at_step("P1/o03/sample", turned_round), policy=policy)
     assert [str(event.at) for event in happened(rig, events.GaugesTried)] == ["P1"]
     assert happened(rig, events.SetInvalidated), "its zero was void"
 
@@ -89,7 +89,7 @@ async def test_after_an_interruption_the_gauges_are_tried_again_before_the_set_c
         raise LimitError("stop here")
 
     with pytest.raises(LimitError, match="stop here"):
-        await rig.run(before("P1/o04/sample", stop))
+        await rig.run(at_step("P1/o04/sample", stop))
     await rig.run()
     history = read_journal(rig.folder.journal)
     confirmed = next(n for n, event in enumerate(history) if isinstance(event, events.ReferenceConfirmed))

@@ -9,7 +9,7 @@ from hexacell.errors import AnswerNeeded, ExitCode, HexacellError, LimitError
 from hexacell.measurements.csv_file import read_measurements
 from procedures.engine.commands import UnattendedOperator
 from procedures.steps import events
-from tests.procedures.runs.listening import before, happened, on
+from tests.procedures.runs.listening import at_step, happened, on
 
 
 async def test_after_a_rejected_record_another_pose_is_measured(make_rig) -> None:
@@ -20,7 +20,7 @@ async def test_after_a_rejected_record_another_pose_is_measured(make_rig) -> Non
         for gauge in rig.gauges[: len(at_ends)]:
             gauge.failures.append(at_ends.pop(0))
 
-    ended = await rig.run(before("P1/o03/sample", once))
+    ended = await rig.run(at_step("P1/o03/sample", once))
     assert ended.exit_code == ExitCode.DONE
     (refused,) = happened(rig, events.RecordRejected)
     assert (str(refused.at), refused.orientation) == ("P1", 3)

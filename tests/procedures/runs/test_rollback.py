@@ -13,7 +13,7 @@ from procedures.engine.commands import UnattendedOperator
 from procedures.run.state import fold
 from procedures.steps import events
 from tests.procedures.runs.listening import (
-    before,
+    at_step,
     commanding,
     happened,
     on,
@@ -102,7 +102,7 @@ async def test_a_ball_outside_the_travel_twice_at_verification_causes_a_rollback
 ) -> None:
     rig = replayed(recording.until(events.Proposed))
     at_end = GaugeAtEnd("is at an end of its travel", subject="gauge x")
-    fault = before(key, lambda: rig.gauges[0].failures.append(at_end))
+    fault = at_step(key, lambda: rig.gauges[0].failures.append(at_end))
     assert (await rig.run(fault)).exit_code == ExitCode.OUT_OF_LIMITS
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
     assert happened(rig, events.RolledBack)
@@ -119,7 +119,7 @@ async def test_a_reading_that_could_not_be_taken_once_is_taken_again(recording, 
         rig.gauges[0].failures.extend(at_ends)
         at_ends.clear()
 
-    assert (await rig.run(before(key, once))).exit_code == ExitCode.DONE
+    assert (await rig.run(at_step(key, once))).exit_code == ExitCode.DONE
     (refused,) = happened(rig, events.RecordRejected)
     assert f"{refused.at}/o{refused.orientation:02d}/sample" == key
     assert [event.at for event in happened(rig, events.ReferenceConfirmed)] == [refused.at]
@@ -130,7 +130,7 @@ async def test_a_reading_that_could_not_be_taken_once_is_taken_again(recording, 
 async def test_gauges_that_cannot_be_zeroed_are_no_verdict_on_the_new_geometry(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
     at_end = GaugeAtEnd("is at an end of its travel", subject="gauge x")
-    fault = before("after-V1/o01/sample", lambda: rig.gauges[0].failures.append(at_end))
+    fault = at_step("after-V1/o01/sample", lambda: rig.gauges[0].failures.append(at_end))
     with pytest.raises(WriteBackUndone, match="cannot be zeroed"):
         await rig.run(fault)
     assert not happened(rig, events.ResultValidated)

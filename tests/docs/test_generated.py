@@ -46,7 +46,9 @@ def test_messages_have_their_own_advice_and_gaps_for_what_differs():
     assert "| the three gauges must measure x, y and z, one each | Correct their axis |" in made
 
 
-@pytest.mark.parametrize("page", ["commands.md", "cell-file.md", "messages.md", "journal.md", "device-faults.md"])
+@pytest.mark.parametrize(
+    "page", ["commands.md", "cell-file.md", "messages.md", "journal.md", "device-faults.md"]
+)
 def test_each_page_gets_its_part(page):
     text = (DOCS / page).read_text(encoding="utf-8")
     assert len(generated.page_with_generated_parts(text)) > len(text) + 8000

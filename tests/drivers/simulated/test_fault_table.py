@@ -1,4 +1,4 @@
-"""Every fault of every device, what becomes of it, and what is told: the table in ``fault_table.md``, which docs show.
+"""Every fault of every device, what becomes of it, and what is told: ``fault_table.md``, which docs show.
 
 ``HEXACELL_UPDATE_TABLES=1`` writes the table anew; a difference is then to be looked at before it is kept.
 """

@@ -36,9 +36,6 @@ def bundled_names() -> tuple[str, ...]:
 
 
 def _configs() -> dict[str, Path]:
-    configs = sorted(path for path in _folder().iterdir() if not path.name.startswith("."))
+    folder = _IN_THE_WHEEL if _IN_THE_WHEEL.is_dir() else _IN_A_CHECKOUT
+    configs = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
     return {path.stem: path for path in configs if not path.name.endswith(CONTROLLER)}
-
-
-def _folder() -> Path:
-    return _IN_THE_WHEEL if _IN_THE_WHEEL.is_dir() else _IN_A_CHECKOUT

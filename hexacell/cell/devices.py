@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -136,7 +136,9 @@ OF_CONTROLLER = "controller"
 
 
 class EncoderSettings(Section, ABC):
-    """The bank of six joint encoders, but for what a count is."""
+    """The bank of six joint encoders, but for what a count is; ``unit`` is that of the joint variables."""
+
+    unit: ClassVar[JointUnit]
 
     protocol: Text = key(
         "cia406", "protocol of the encoders: cia406, controller, dbc, modbus, or one that a plug-in adds"
@@ -190,11 +192,6 @@ class EncoderSettings(Section, ABC):
 
     @property
     @abstractmethod
-    def unit(self) -> JointUnit:
-        """The unit of the joint variables."""
-
-    @property
-    @abstractmethod
     def step(self) -> float:
         """What one count is of the joint variable, in its unit."""
 
@@ -202,15 +199,12 @@ class EncoderSettings(Section, ABC):
 class LinearEncoderSettings(EncoderSettings):
     """The bank of six encoders of joints that slide, or of legs."""
 
+    unit: ClassVar[JointUnit] = JointUnit.MM
+
     measuring_step_nm: Positive = key(1000, "one count, nm, as the device must report it")
     step_object: Literal["any", "6005h", "6501h"] = key(
         "any", "object with the measuring step, where a device has both and they differ"
     )
-
-    @property
-    def unit(self) -> JointUnit:
-        """Millimetres."""
-        return JointUnit.MM
 
     @property
     def step(self) -> float:
@@ -221,14 +215,11 @@ class LinearEncoderSettings(EncoderSettings):
 class RotaryEncoderSettings(EncoderSettings):
     """The bank of six encoders of joints that turn."""
 
+    unit: ClassVar[JointUnit] = JointUnit.DEG
+
     counts_per_turn: int = key(
         1 << 20, "counts in a turn of the joint, as the device must report them", ge=1, le=0xFFFF_FFFF
     )
-
-    @property
-    def unit(self) -> JointUnit:
-        """Degrees."""
-        return JointUnit.DEG
 
     @property
     def step(self) -> float:

@@ -26,6 +26,7 @@ LARGEST_NUMBER = 1e6
 SMALLEST_NUMBER = 1e-9
 """Smallest number that must not be zero: a millionth of a nanometre."""
 
+SHORTEST_DIRECTION = 1e-6
 LARGEST_SEED = 2**32 - 1
 LONGEST_TEXT = 1000
 LONGEST_NAME = 64
@@ -99,6 +100,12 @@ def _a_day(value: object) -> date:
         raise outside('a day, as "2027-03-31"') from error
 
 
+def _a_direction(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    if max(map(abs, vector)) < SHORTEST_DIRECTION:
+        raise broken_rule("a vector of length zero is no direction", "Write where it points, as [1, 0, 0]")
+    return vector
+
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 InRange = Annotated[
     float,
@@ -129,6 +136,7 @@ Six = tuple[Item, Item, Item, Item, Item, Item]
 """One each of the six legs or axes."""
 SixNumbers = Six[Finite]
 PointInRange = tuple[InRange, InRange, InRange]
+Direction = Annotated[PointInRange, AfterValidator(_a_direction)]
 SixInRange = Six[InRange]
 
 

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Self
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from hexacell.cell.fields import (
+    Direction,
     InRange,
     NotNegative,
-    PointInRange,
     Positive,
     Section,
     Six,
@@ -21,8 +21,6 @@ from hexacell.cell.fields import (
 )
 from hexacell.kinematics.commanded_motion import RefusedCommand
 from hexacell.kinematics.parameters import LEGS
-
-SHORTEST_AXIS = 1e-6
 
 MOST_EXCLUSIONS = 100
 
@@ -38,12 +36,6 @@ def _ordered(limits: tuple[float, float]) -> tuple[float, float]:
     return limits
 
 
-def _has_direction(axis: tuple[float, float, float]) -> tuple[float, float, float]:
-    if max(map(abs, axis)) < SHORTEST_AXIS:
-        raise broken_rule("an axis of length zero has no direction", "State where the joint points")
-    return axis
-
-
 def _of_all_or_of_each(given: Any) -> Any:  # noqa: ANN401 - what pydantic hands on
     each = given if isinstance(given, list | tuple) else [given] * LEGS
     if len(each) != LEGS or not all(type(one) in {int, float} and 0 < one <= 180 for one in each):
@@ -54,7 +46,6 @@ def _of_all_or_of_each(given: Any) -> Any:  # noqa: ANN401 - what pydantic hands
 MinMax = Annotated[tuple[InRange, InRange], AfterValidator(_ordered)]
 Cone = Annotated[float, Field(gt=0, le=180)]
 Cones = Annotated[Cone | Six[Cone], BeforeValidator(_of_all_or_of_each)]
-JointAxis = Annotated[PointInRange, AfterValidator(_has_direction)]
 
 
 class AxisLimitSettings(Section):
@@ -82,13 +73,13 @@ class PassiveJointSettings(Section):
     platform_cone_deg: Cones = key(
         180.0, "half angle of the cone at the platform, deg; one for all legs or a list; 180: any"
     )
-    base_axes: Six[JointAxis] | None = key(
+    base_axes: Six[Direction] | None = key(
         None,
         "axes of the cones in the base frame of the drawing, from the platform to the base; by default "
         "each leg's direction at the middle of all points, untilted. On a crank: in its own frame, x "
         "along the crank and z along its axis",
     )
-    platform_axes: Six[JointAxis] | None = key(
+    platform_axes: Six[Direction] | None = key(
         None,
         "axes of the cones at the platform, in the platform frame of the drawing; by default as base_axes",
     )

@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from datetime import date
 from typing import Literal, Self, TypeVar
 
 from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from hexacell.cell.devices import (
-    EncoderSettings,
-    GaugeSettings,
-    ThermometerSettings,
-)
-from hexacell.cell.fields import (
-    CertificateSettings,
-    Name,
-    Section,
-    broken_rule,
-    key,
-)
+from hexacell.cell.devices import EncoderSettings, GaugeSettings, ThermometerSettings
+from hexacell.cell.fields import CertificateSettings, Name, Section, broken_rule, key
 from hexacell.cell.limits import MOST_EXCLUSIONS, ExclusionSettings, LimitSettings, SpeedSettings
 from hexacell.cell.measuring import (
     AcceptanceSettings,
@@ -44,10 +35,7 @@ from hexacell.cell.operation import (
 from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.robot import ControllerSettings, RobotSettings
 from hexacell.cell.simulation import SimulationSettings
-from hexacell.cell.uncertainty import (
-    CommonUncertaintySettings,
-    LengthCheckSettings,
-)
+from hexacell.cell.uncertainty import CommonUncertaintySettings, LengthCheckSettings
 from hexacell.kinematics.commanded_motion import RefusedCommands
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import JointUnit
@@ -59,6 +47,8 @@ FEWEST_POINTS = 2
 """Fewest points to measure: one alone does not identify the geometry."""
 
 Named = TypeVar("Named", bound="tuple[GaugeSettings | ThermometerSettings | NotificationSettings, ...]")
+
+Refusals = Iterator[tuple[KeyPath, PydanticCustomError]]
 
 
 class ToleranceSettings(Section):
@@ -146,25 +136,6 @@ class CellSettings(Section):
             raise broken_rule("two gauges have the same port and channel", "Correct one of them")
         return gauges
 
-    @model_validator(mode="after")
-    def _plungers_may_move(self) -> Self:
-        plate, mounting = self.limits.gauge_travel_mm, self.stations.mounting_mm
-        refusals = [
-            (
-                ("gauges", n, "travel_mm"),
-                broken_rule(
-                    f"mounting_mm = {mounting:g} leaves the plunger no room to move: it has "
-                    f"{min(plate, gauge.travel_mm / 2):g} mm on either side of the middle",
-                    "Lower mounting_mm in [stations], or correct travel_mm",
-                ),
-            )
-            for n, gauge in enumerate(self.gauges)
-            if min(plate, gauge.travel_mm / 2) <= mounting
-        ]
-        if refusals:
-            raise self._refused(*refusals)
-        return self
-
     @field_validator("gauges", "thermometers", "notifications")
     @classmethod
     def _names_differ(cls, named: Named, info: ValidationInfo) -> Named:
@@ -183,71 +154,67 @@ class CellSettings(Section):
         return thermometers
 
     @model_validator(mode="after")
-    def _exclusions_leave_enough(self) -> Self:
+    def _sections_fit_together(self) -> Self:
+        """Each refusal is at its own place, which gives it its line."""
+        rules = (self._plungers, self._excluded, self._length_check, self._connections)
+        found = [InitErrorDetails(type=error, loc=at, input=None) for rule in rules for at, error in rule()]
+        if found:
+            raise ValidationError.from_exception_data(self.name, found)
+        return self
+
+    def _plungers(self) -> Refusals:
+        plate, mounting = self.limits.gauge_travel_mm, self.stations.mounting_mm
+        for n, gauge in enumerate(self.gauges):
+            if (room := min(plate, gauge.travel_mm / 2)) <= mounting:
+                yield (
+                    ("gauges", n, "travel_mm"),
+                    broken_rule(
+                        f"mounting_mm = {mounting:g} leaves the plunger no room to move: it has "
+                        f"{room:g} mm on either side of the middle",
+                        "Lower mounting_mm in [stations], or correct travel_mm",
+                    ),
+                )
+
+    def _excluded(self) -> Refusals:
         """Points exist, enough of them are left, and no reference of a measured point is excluded."""
         points, excluded = self.identification.points, self.excluded_points
         references = [point for n, point in enumerate(points, start=1) if n not in excluded]
+        levels = [(*at, 0.0, 0.0, 0.0) for at in (*references, *self.verification.points)]
         for n, one in enumerate(self.exclusions):
-            refusal = None
             if one.point is not None and one.point > len(points):
-                refusal = broken_rule(
-                    f"there is no point {one.point}", f"Name one of the {len(points)} points"
-                )
+                problem, action = f"there is no point {one.point}", f"Name one of the {len(points)} points"
             elif one.point is not None and len(references) < FEWEST_POINTS:
-                refusal = broken_rule(
-                    f"{len(references)} of {len(points)} points would be left, and the geometry needs "
-                    f"{FEWEST_POINTS}",
-                    "Remove an exclusion",
-                )
-            elif one.refused is not None and not all(
-                RefusedCommands((one.refused,)).allows((*at, 0.0, 0.0, 0.0))
-                for at in (*references, *self.verification.points)
-            ):
-                refusal = broken_rule(
-                    "this excludes the reference of a point, from which its gauges measure",
-                    "Lower within_deg, or exclude the whole point: point = ...",
-                )
-            if refusal is not None:
-                raise self._refused((("exclusions", n), refusal))
-        return self
+                left = f"{len(references)} of {len(points)} points would be left"
+                problem, action = f"{left}, and the geometry needs {FEWEST_POINTS}", "Remove an exclusion"
+            elif one.refused is not None and not all(map(RefusedCommands((one.refused,)).allows, levels)):
+                problem = "this excludes the reference of a point, from which its gauges measure"
+                action = "Lower within_deg, or exclude the whole point: point = ..."
+            else:
+                continue
+            yield ("exclusions", n), broken_rule(problem, action)
+            return
 
-    @model_validator(mode="after")
-    def _the_length_check_is_possible(self) -> Self:
+    def _length_check(self) -> Refusals:
         named = self.length_check and self.length_check.thermometer
         if named and named not in {thermometer.name for thermometer in self.thermometers}:
-            refusal = broken_rule(
-                f"the cell has no thermometer '{named}'",
-                "Write the name of one of [[thermometers]], or remove it and write temperature_c",
-            )
-            raise self._refused((("length_check", "thermometer"), refusal))
-        if self.length_check is not None and self.mechanism.words.joint_unit is JointUnit.DEG:
-            refusal = broken_rule(
+            problem = f"the cell has no thermometer '{named}'"
+            action = "Write the name of one of [[thermometers]], or remove it and write temperature_c"
+            yield ("length_check", "thermometer"), broken_rule(problem, action)
+        elif self.length_check is not None and self.mechanism.words.joint_unit is JointUnit.DEG:
+            problem = (
                 "a length check finds what is wrong with the scale of encoders of lengths; those of this "
-                "mechanism are of angles",
-                "Remove [length_check]",
+                "mechanism are of angles"
             )
-            raise self._refused((("length_check",), refusal))
-        return self
+            yield ("length_check",), broken_rule(problem, "Remove [length_check]")
 
-    @model_validator(mode="after")
-    def _real_devices_can_be_reached(self) -> Self:
-        if self.simulation is not None:
-            return self
+    def _connections(self) -> Refusals:
+        """Real devices have an address."""
         connections: list[tuple[KeyPath, str, object]] = [
             *((("gauges", n), "the gauge has no port", gauge.port) for n, gauge in enumerate(self.gauges)),
             (("encoders",), "the encoders have no bus", self.encoders.address),
             (("controller",), "the controller has no port", self.controller.port),
         ]
-        refusals = [
-            (place, broken_rule(f"{problem}; only a cell with a [simulation] may leave it away", "Add it"))
-            for place, problem, given in connections
-            if given is None
-        ]
-        if refusals:
-            raise self._refused(*refusals)
-        return self
-
-    def _refused(self, *refusals: tuple[KeyPath, PydanticCustomError]) -> ValidationError:
-        """The error with each refusal at its own place, which gives it its line."""
-        details = [InitErrorDetails(type=rule, loc=place, input=None) for place, rule in refusals]
-        return ValidationError.from_exception_data(self.name, details)
+        for place, problem, given in connections:
+            if given is None and self.simulation is None:
+                text = f"{problem}; only a cell with a [simulation] may leave it away"
+                yield place, broken_rule(text, "Add it")

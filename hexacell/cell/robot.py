@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import AfterValidator, SecretStr, model_validator
+from pydantic import SecretStr, model_validator
 
 from hexacell.cell.fields import (
+    Direction,
     GeometrySettings,
     InRange,
     Password,
@@ -32,15 +33,6 @@ STARTUP_WORDS: tuple[StartupWord, ...] = ("reset-estop", "switch-on", "home")
 
 DEFAULT_MECHANISM = "hexaglide"
 SCREW_MECHANISM = "gough-stewart"
-
-
-def _a_direction(vector: PointInRange) -> PointInRange:
-    if not any(vector):
-        raise broken_rule("0, 0, 0 is no direction", "Write the direction of the joint's axis")
-    return vector
-
-
-Direction = Annotated[PointInRange, AfterValidator(_a_direction)]
 
 
 class ScrewSettings(Section):

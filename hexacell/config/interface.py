@@ -75,7 +75,6 @@ class ConfigFormat(Protocol):
         Raises:
             FileError: with file and line: absent, unreadable, or not a config that :meth:`rewrite` accepts.
         """
-        ...
 
     def rewrite(self, text: str, geometry: Geometry) -> str:
         """``text`` with the values of ``geometry``; every other character is kept.
@@ -83,7 +82,6 @@ class ConfigFormat(Protocol):
         Raises:
             FileError: ``text`` is not such a config, or cannot hold ``geometry``.
         """
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +113,6 @@ class PartFormat(Protocol):
         Raises:
             FileError: one of them is there twice, or no number.
         """
-        ...
 
     def rewrite_part(self, text: str, values: Mapping[str, float]) -> str:
         """``text`` with other values of parameters that it has; every other character is kept.
@@ -123,7 +120,6 @@ class PartFormat(Protocol):
         Raises:
             FileError: it has one of them not, or cannot hold its value.
         """
-        ...
 
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

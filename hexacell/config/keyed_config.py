@@ -49,11 +49,9 @@ class NumberLookup(Protocol):
 
     def number(self, key: str) -> NumberToken:
         """The number of a key; raises ``FileError`` if there is none, or more than one."""
-        ...
 
     def has(self, key: str) -> bool:
         """Whether there is a number of that key."""
-        ...
 
 
 OpenText = Callable[[str, Path | None], NumberLookup]

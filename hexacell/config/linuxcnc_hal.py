@@ -18,7 +18,7 @@ from typing import Any
 from pydantic import Field
 
 from hexacell.cell.fields import Text
-from hexacell.config.interface import NumberToken
+from hexacell.config.interface import NumberToken, token_error
 from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, NumberKeys, options_of
 from hexacell.errors import FileError
 from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
@@ -77,14 +77,11 @@ class HalText:
             )
         if len(tokens) > 1:
             problem = f"{key} is set a second time, after line {tokens[0].line}"
-            raise FileError(problem, subject=self.source, line=tokens[1].line, action="Remove one")
+            raise token_error(tokens[1], problem, self.source, "Remove one")
         if tokens[0].text.startswith(VARIABLE):
-            raise FileError(
-                f"{key} is set to {tokens[0].text}, a variable of the INI file",
-                subject=self.source,
-                line=tokens[0].line,
-                action='Name the INI file as the config, with config_format = "linuxcnc-ini"',
-            )
+            problem = f"{key} is set to {tokens[0].text}, a variable of the INI file"
+            action = 'Name the INI file as the config, with config_format = "linuxcnc-ini"'
+            raise token_error(tokens[0], problem, self.source, action)
         return tokens[0]
 
     def has(self, key: str) -> bool:

@@ -114,17 +114,11 @@ class IniText:
         if not seen:
             raise self._missing(section, name, found)
         if len(seen) > 1:
-            raise self._error(
-                seen[1],
-                f"[{section}] has {name} a second time; LinuxCNC takes the one of line {seen[0].line}",
-                "Remove one",
-            )
+            problem = f"[{section}] has {name} a second time; LinuxCNC takes the one of line {seen[0].line}"
+            raise token_error(seen[1], problem, self.source, "Remove one")
         if more := _NUMBER_AND_MORE.fullmatch(seen[0].text):
-            raise self._error(
-                seen[0],
-                f"behind {name} stands {more['more']!r}, which LinuxCNC takes for a part of the value",
-                "Put it into a line of its own",
-            )
+            problem = f"behind {name} stands {more['more']!r}, which LinuxCNC takes for a part of the value"
+            raise token_error(seen[0], problem, self.source, "Put it into a line of its own")
         return seen[0]
 
     def has(self, key: str) -> bool:
@@ -137,20 +131,14 @@ class IniText:
         return any(one.section == name for one in self._variables)
 
     def _missing(self, section: str, name: str, found: list[_Variable]) -> FileError:
-        for one in found:
-            if one.hidden is not None:
-                problem, action = one.hidden
-                return self._error(
-                    one.token, f"LinuxCNC does not see [{section}] {name}: {problem}", action
-                )
+        for token, (why, action) in ((one.token, one.hidden) for one in found if one.hidden):
+            problem = f"LinuxCNC does not see [{section}] {name}: {why}"
+            return token_error(token, problem, self.source, action)
         return FileError(
             f"there is no {name} in a section [{section}]",
             subject=self.source,
             action="Name the file that holds it, or correct [controller.config_options]",
         )
-
-    def _error(self, token: NumberToken, problem: str, action: str) -> FileError:
-        return FileError(problem, subject=self.source, line=token.line, action=action)
 
     @cached_property
     def _variables(self) -> tuple[_Variable, ...]:

@@ -73,12 +73,30 @@ def assembly_mode(pose_jacobian: Array) -> Array:
 
 
 def modes_of(mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array) -> Array:
-    """:func:`assembly_mode` (n,) of n poses with joint variables (n, 6), mm."""
+    """:func:`assembly_mode` of n poses.
+
+    Args:
+        mechanism: of the robot.
+        geometry: one for all poses, or one for each.
+        poses: n poses.
+        joints: joint variables (n, 6), in their unit.
+
+    Returns:
+        Signs (n,).
+    """
     return assembly_mode(mechanism.residual_and_jacobian(geometry, poses, joints)[1])
 
 
 def apply_twist(poses: PoseBatch, step: Array) -> PoseBatch:
-    """Poses displaced by twists (n, 6): translations, mm, then rotation vectors in the base frame, rad."""
+    """Poses displaced by twists.
+
+    Args:
+        poses: n poses.
+        step: twists (n, 6): translations, mm, then rotation vectors in the base frame, rad.
+
+    Returns:
+        The displaced poses (n).
+    """
     return PoseBatch(
         poses.positions + step[..., :3], rotations.from_vector(step[..., 3:]) @ poses.rotations
     )

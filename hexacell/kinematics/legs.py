@@ -78,7 +78,17 @@ class Legs:
 
 
 def segment_distances(start: Array, end: Array, other_start: Array, other_end: Array) -> Array:
-    """The smallest distances (...,) of segments from others; each end is (..., 3)."""
+    """The smallest distances of segments from others.
+
+    Args:
+        start: one end of each segment (..., 3), mm.
+        end: its other end.
+        other_start: one end of each other segment (..., 3), mm.
+        other_end: its other end.
+
+    Returns:
+        Distances (...,), mm.
+    """
     along, other, between = end - start, other_end - other_start, start - other_start
     a, e, b = _dot(along, along), _dot(other, other), _dot(along, other)
     c, f = _dot(along, between), _dot(other, between)
@@ -95,7 +105,15 @@ def segment_distances(start: Array, end: Array, other_start: Array, other_end: A
 
 
 def angles_between(vectors: Array, axes: Array) -> Array:
-    """Angles (...,), rad, between unit vectors (..., 3) and unit ``axes`` (..., 3)."""
+    """Angles between directions.
+
+    Args:
+        vectors: unit vectors (..., 3).
+        axes: unit vectors (..., 3).
+
+    Returns:
+        Angles (...,), rad, from 0 to pi.
+    """
     return np.arccos(np.clip(_dot(vectors, axes), -1.0, 1.0))
 
 
@@ -105,11 +123,14 @@ def _dot(one: Array, other: Array) -> Array:
 
 
 def by_pose(b: Array, n: Array) -> Array:
-    """Derivatives (n, 6, 6) of the legs' lengths by the pose: ``[n, b x n]``.
+    """Derivatives of the legs' lengths by the pose.
 
     Args:
         b: (n, 6, 3) from the ball to the platform joints, in the base frame, mm.
         n: (n, 6, 3) direction of each leg towards the platform, of length 1 where the leg closes.
+
+    Returns:
+        ``[n, b x n]`` (n, 6, 6), by the ball's position, mm, then by the rotation vector, rad.
     """
     jacobian = np.empty((*n.shape[:-1], 6))
     jacobian[..., :3] = n
@@ -123,9 +144,16 @@ def by_pose(b: Array, n: Array) -> Array:
 
 
 def axes_through(first: Array, second: Array, third: Array, part: str) -> Array:
-    """The axes (3, 3), in rows, that three joints of a ``part`` fix.
+    """The axes that three joints fix.
 
-    x from the first to the second, z normal to the plane of all three, y toward the third.
+    Args:
+        first: the joint (3,), mm, from which x points to the second.
+        second: (3,), mm.
+        third: the joint (3,), mm, toward which y points; z is normal to the plane of all three.
+        part: base or platform, for messages.
+
+    Returns:
+        The axes (3, 3), in rows.
 
     Raises:
         UsageError: the joints are in one line, or two of them at one place.

@@ -227,11 +227,9 @@ class Mechanism(Protocol):
             The length errors of the legs (n, 6), mm, zero where they close, and their derivatives
             (n, 6, 6) by the ball's position, mm, and the rotation vector, rad.
         """
-        ...
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """All derivatives of the constraints, off closed poses as well."""
-        ...
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
         """The inverse kinematics in closed form.
@@ -245,19 +243,15 @@ class Mechanism(Protocol):
         Returns:
             Joint variables (n, 6), in their unit; NaN where a pose is out of a leg's reach.
         """
-        ...
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
         """The inverse solution that each leg is on (n, 6): -1 or 1; 1 where it has only one."""
-        ...
 
     def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
         """The machine in the frames of :attr:`convention`, and the change of frames."""
-        ...
 
     def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
         """The machine in other frames."""
-        ...
 
     def encoder_zeros(self, geometry: Geometry) -> Array:
         """Changes (P, 6) of the parameters that an encoder does too, which shows 1 less on each leg.
@@ -265,19 +259,15 @@ class Mechanism(Protocol):
         They are in the unit of the joint variables: with the change of a leg and 1 less on its encoder the
         legs close as before, at all poses.
         """
-        ...
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         """The guides on which sliders move; None for a mechanism whose words have no guide."""
-        ...
 
     def legs(self, geometry: Geometries, poses: PoseBatch, joints: Array) -> Legs:
         """The legs in space at n poses."""
-        ...
 
     def platform_radius(self, geometry: Geometries) -> Array:
         """Mean distance of the platform joints from the ball, mm; (n,) for a batch. It scales rotations."""
-        ...
 
 
 def joint_zeros(mechanism: Mechanism, geometry: Geometry) -> Array:
@@ -285,6 +275,10 @@ def joint_zeros(mechanism: Mechanism, geometry: Geometry) -> Array:
 
     A joint variable and the zero together are what does not depend on the encoder: the whole length of a
     Gough-Stewart platform's leg, the place of a slider in the base frame.
+
+    Args:
+        mechanism: of the robot.
+        geometry: of the robot, in any frames.
 
     Returns:
         The zeros (6,), in the unit of the joint variables.
@@ -319,6 +313,10 @@ def free_parameter_derivatives(mechanism: Mechanism, geometry: Geometry) -> Arra
     """Derivatives of the free parameters by all parameters of a geometry in frames of its own.
 
     A parameter that the frame convention fixes moves the frames, and with them the others.
+
+    Args:
+        mechanism: of the robot.
+        geometry: of the robot, in any frames.
 
     Returns:
         Derivatives (P, p), in the units of both.

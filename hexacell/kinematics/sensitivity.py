@@ -75,6 +75,9 @@ def pose_sensitivity(
         joints: joint variables (n, 6), in their unit.
         coordinates: ``POSITION`` or ``POSE``.
 
+    Returns:
+        Derivatives (n, m, 6) and (n, m, P), in mm and rad a unit of what they are by.
+
     Raises:
         LinAlgError: a pose is exactly at a singularity.
     """
@@ -105,6 +108,9 @@ def free_sensitivity(
         joints: joint variables (n, 6), in their unit.
         coordinates: ``POSITION`` or ``POSE``.
 
+    Returns:
+        Derivatives (n, m, 6) and (n, m, p), in mm and rad a unit of what they are by, and modes (n,).
+
     Raises:
         LinAlgError: a pose is exactly at a singularity.
     """
@@ -125,6 +131,17 @@ def sensitivity_and_margin(
 
     One inverse of the pose Jacobian serves both. Exactly at a singularity, where there is no margin, the
     derivatives mean nothing.
+
+    Args:
+        mechanism: of the robot.
+        geometry: of the robot, in the frames of the convention.
+        poses: n poses.
+        joints: joint variables (n, 6), in their unit.
+        coordinates: ``POSITION`` or ``POSE``.
+        margin: least singular value, dimensionless.
+
+    Returns:
+        The derivatives, and a mask (n,).
     """
     linear = mechanism.derivatives(geometry, poses, joints)
     is_regular = np.ones(len(joints), dtype=bool)
@@ -166,6 +183,9 @@ def singularity_margin(
         geometry: one for all poses, or one for each.
         poses: n poses.
         joints: joint variables (n, 6), in their unit.
+
+    Returns:
+        Singular values (n,), dimensionless.
     """
     jacobian = _dimensionless(mechanism, geometry, poses, joints)
     return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[..., -1])
@@ -174,14 +194,29 @@ def singularity_margin(
 def has_singularity_margin(
     mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array, margin: float
 ) -> Mask:
-    """Whether :func:`singularity_margin` is at least ``margin`` at each of n poses, computed faster."""
+    """Whether :func:`singularity_margin` is at least a margin, computed faster.
+
+    Args:
+        mechanism: of the robot.
+        geometry: one for all poses, or one for each.
+        poses: n poses.
+        joints: joint variables (n, 6), in their unit.
+        margin: least singular value, dimensionless.
+
+    Returns:
+        A mask (n,).
+    """
     return _has_margin(_dimensionless(mechanism, geometry, poses, joints), margin)
 
 
 def margin_and_mode(
     mechanism: Mechanism, geometry: Geometries, poses: PoseBatch, joints: Array, margin: float
 ) -> tuple[Mask, Array]:
-    """:func:`has_singularity_margin`, and the :func:`assembly_mode` of each of n poses."""
+    """:func:`has_singularity_margin`, which has the same arguments, and the assembly modes.
+
+    Returns:
+        A mask (n,), and the :func:`assembly_mode` (n,) of each of n poses.
+    """
     jacobian = _dimensionless(mechanism, geometry, poses, joints)
     return _has_margin(jacobian, margin), assembly_mode(jacobian)
 

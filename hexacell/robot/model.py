@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
-from hexacell.config.interface import ControllerGeometry, ControllerLimits
+from hexacell.config.interface import ControllerGeometry
 from hexacell.config.layout import ConfigLayout, FormatOfFile
 from hexacell.config.linuxcnc_ini import limits_of_ini
 from hexacell.errors import FileError, UsageError
@@ -324,19 +323,6 @@ def _require_same_robot(cell: Cell, drawing: Geometry, controller: Geometry) -> 
             line=cell.document.line_of(("robot", "nominal")),
             action="Correct [robot.nominal], or the config",
         )
-
-
-def robot_of_start(
-    settings: CellSettings,
-    controller: GeometryDocument,
-    branch: Branch,
-    taught: GeometryDocument,
-    limits: ControllerLimits,
-) -> Robot:
-    """The robot of a cell's settings and of what its controller had at the start of a run."""
-    parameters = settings.mechanism.parameters
-    commanding = ControllerGeometry(Geometry.of(parameters, controller), branch, limits)
-    return make_robot(settings, commanding, taught=Geometry.of(parameters, taught))
 
 
 def noise_of(settings: CellSettings) -> Noise:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from hexacell.cell.model import CellSettings
+from hexacell.config.interface import ControllerGeometry
 from hexacell.errors import HexacellError
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.kinematics.geometry import Geometry
 from hexacell.noise.measured_noise import MeasuredNoise
-from hexacell.robot.model import Robot, robot_of_start
+from hexacell.robot.model import Robot, make_robot
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.recorded.journal_soundness import read_sound
 from procedures.run.state import RunState
@@ -16,7 +17,10 @@ from procedures.steps.events import RunStarted
 
 def started_robot(settings: CellSettings, started: RunStarted) -> Robot:
     """The robot by a cell's settings, which may be newer, and its controller when a run began."""
-    return robot_of_start(settings, started.controller, started.branch, started.taught, started.limits)
+    parameters = settings.mechanism.parameters
+    geometry = Geometry.of(parameters, started.controller)
+    commanding = ControllerGeometry(geometry, started.branch, started.limits)
+    return make_robot(settings, commanding, taught=Geometry.of(parameters, started.taught))
 
 
 def geometry_before(settings: CellSettings, started: RunStarted) -> Geometry:

@@ -61,7 +61,7 @@ def test_a_direction_is_one_whatever_its_length(load_fixture) -> None:
         ("300.012", "300012.0", "must be 5000 or less"),
         ("0.002", "2.0", "uncertainty_mm is 2, more than 0.300012 (0.1 % of distance_mm)"),
         ("0.002", "0.0", "must be more than 0"),
-        ("0.002\n", "0.002\ndirection = [0.0, 0.0, 0.0]\n", "direction has no length"),
+        ("0.002\n", "0.002\ndirection = [0.0, 0.0, 0.0]\n", "length zero is no direction"),
         ("0.002\n", "0.002\nrepeats = 0\n", "must be 1 or more"),
         ("0.002\n", "0.002\norientations = 26\n", "must be 25 or less"),
         ("0.002\n", "0.002\ntilt_deg = 60.0\n", "must be 45 or less"),

@@ -34,9 +34,13 @@ test: venv
 test-full: venv
 	$(RUN) pytest $(FOUR_AT_A_TIME) $(ELSEWHERE) -m "not benchmark and not linuxcnc" $(ARGS)
 
+# One pass over all benchmarks, half an hour on two cores, that goes on where one fails or misses its target. The
+# figures go into build/figures.json. FULL=1 takes the samples of the targets, for hours (tests/benchmarks/samples.py).
 bench:
 	@.ci/venv "$(PYTHON)" bench
-	$(RUN) pytest tests/benchmarks -s --timeout=0 $(ARGS)
+	@.ci/venv "$(PYTHON)" peers
+	HEXACELL_FIGURES="$(CURDIR)/build/figures.json" \
+		$(RUN) pytest tests/benchmarks -s --timeout=$(if $(FULL),0,600) --durations=10 $(ARGS)
 
 # Other methods and libraries on the same robots: a table, and build/peers.json. ARGS="--robots 100" for more.
 bench-peers:

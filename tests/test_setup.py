@@ -223,6 +223,7 @@ def test_python_environment_variables_are_not_passed_on(settled: Newcomer, name:
     assert set(settled.printed) == {"[]"}
 
 
+SLOWEST = "--durations=10"
 NOT_RUN = "LinuxCNC could not be installed: make test-linuxcnc was not run"
 
 
@@ -260,14 +261,14 @@ def test_ci_lints_and_tests_even_if_lint_fails(settled: Newcomer) -> None:
     status, said = ci(settled, lint=1)
     assert status != 0
     assert "true -m ruff check" in said
-    assert said[-3:] == [f"true {THE_TESTS}", "make lint failed, see above", NOT_RUN]
+    assert said[-3:] == [f"true {THE_TESTS} {SLOWEST}", "make lint failed, see above", NOT_RUN]
 
 
 @pytest.mark.parametrize("status", [0, 1])
 def test_ci_runs_the_tests_at_linuxcnc_last_and_fails_if_they_do(settled: Newcomer, status: int) -> None:
     found, said = ci(settled, linuxcnc=status)
     tests = [line for line in said if line.startswith("true -m pytest")]
-    assert tests == [f"true {THE_TESTS}", f"true {AT_LINUXCNC}"]
+    assert tests == [f"true {THE_TESTS} {SLOWEST}", f"true {AT_LINUXCNC} {SLOWEST}"]
     assert (found != 0, NOT_RUN in said) == (status != 0, False)
 
 

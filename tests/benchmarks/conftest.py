@@ -1,9 +1,9 @@
-"""What all benchmarks share: the cell of Table 1, and a line for each figure."""
+"""What all benchmarks share: the cell of Table 1, and the figures that they give."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from pathlib import Path
@@ -11,14 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot, robot_of
-from tests.geometries import hexaglide_geometry
+from tests.benchmarks.figures import DID_NOT_END, Figures
+from tests.benchmarks.machines import bundled, geometry_of_table_one
 
-Say = Callable[[str, str, str], None]
+MISSED = pytest.StashKey[Figures]()
 
 
 @dataclass(frozen=True)
@@ -32,24 +31,43 @@ class TableOne:
 
 @pytest.fixture(scope="session")
 def table_one() -> TableOne:
-    cell = load_cell(Path(bundled_config("simulated-hexaglide")))
-    assert cell.settings.simulation is not None
-    values = cell.settings.simulation.geometry.model_dump()
-    return TableOne(
-        robot_of(cell),
-        hexaglide_geometry(values["S"], values["B"], values["l"]),
-        np.array(cell.settings.identification.points),
-    )
+    cell = bundled()
+    points = np.array(cell.settings.identification.points)
+    return TableOne(robot_of(cell), geometry_of_table_one(cell), points)
 
 
-@pytest.fixture(scope="session")
-def say() -> Say:
-    """Prints a figure beside what it must reach."""
+@pytest.fixture
+def figure(request: pytest.FixtureRequest) -> Figures:
+    """Prints and keeps a figure beside what it must reach."""
+    figures: Figures = request.node.stash[MISSED]
+    return figures
 
-    def line(figure: str, measured: str, target: str) -> None:
-        print(f"\n  {figure:<58} {measured:>22}   ({target})", end="")
 
-    return line
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    file = Path(os.environ["HEXACELL_FIGURES"]) if "HEXACELL_FIGURES" in os.environ else None
+    item.stash[MISSED] = Figures(item.nodeid, item.path.stem.removeprefix("test_"), [], file)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None]:
+    """Targets are judged when a benchmark is over, so that one that is missed hides no other figure."""
+    yield
+    if missed := item.stash[MISSED].missed:
+        pytest.fail("missed: " + "; ".join(missed), pytrace=False)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """A benchmark that ends otherwise is no figure less: the file says so."""
+    report = yield
+    figures = item.stash[MISSED]
+    if report.failed and call.excinfo is not None and figures.file is not None and not figures.missed:
+        words = " ".join(f"{call.excinfo.typename}: {call.excinfo.value}".split())
+        figures(DID_NOT_END, words[:120])
+    return report
 
 
 @pytest.fixture(scope="session", autouse=True)

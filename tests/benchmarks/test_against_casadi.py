@@ -16,6 +16,7 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import measurement_model
 from hexacell.study import data_sets
+from tests.benchmarks.figures import at_least, at_most
 
 
 @pytest.fixture
@@ -63,7 +64,7 @@ def _rotation(casadi, turn):
     return casadi.SX.eye(3) + casadi.sin(angle) / angle * k + (1 - casadi.cos(angle)) / square * (k @ k)
 
 
-def test_no_slower_than_the_compiled_peer(casadi, table_one, say) -> None:
+def test_no_slower_than_the_compiled_peer(casadi, table_one, figure) -> None:
     random = np.random.default_rng(20)
     campaign = data_sets.unlimited_travel(
         table_one.robot, table_one.truth, table_one.points, 20, np.radians(20), random
@@ -82,7 +83,5 @@ def test_no_slower_than_the_compiled_peer(casadi, table_one, say) -> None:
         ours.append(time.process_time() - begun)
     apart = np.abs(np.asarray(solution["x"]).ravel()[:35] - found.free).max()
     ratio = min(theirs) / min(ours)
-    say("CasADi and IPOPT, compiled, exact derivatives, 5x20", f"{ratio:.1f} times as long", "at least 1")
-    say("  its solution differs from ours by", f"{apart:.1e} mm", "the same minimum")
-    assert apart < 1e-4
-    assert ratio >= 1.0
+    figure("CasADi and IPOPT, compiled, exact derivatives, 5x20: times as long", ratio, "", at_least(1.0))
+    figure("  its solution differs from ours by", apart, "mm", at_most(1e-4))

@@ -27,10 +27,9 @@ from procedures.steps.identify import Identify
 from procedures.steps.judge import Judge
 from procedures.steps.move import Move
 from procedures.steps.sample import Sample
+from tests.benchmarks.figures import at_most
 from tests.cli.test_host import hosts_of
 from tests.waiting import until
-
-pytestmark = pytest.mark.benchmark
 
 QUIT_S = 0.5
 """What leaving may take until nothing is left."""
@@ -73,7 +72,7 @@ STAGES: dict[str, Callable[[HostMessage], bool]] = {
 
 
 @pytest.mark.parametrize("stage", STAGES)
-async def test_leaving_leaves_nothing_within_half_a_second(cell, say, stage: str) -> None:
+async def test_leaving_leaves_nothing_within_half_a_second(cell, figure, stage: str) -> None:
     connection = await begun(cell)
     async for message in connection.messages():
         if STAGES[stage](message):
@@ -83,11 +82,11 @@ async def test_leaving_leaves_nothing_within_half_a_second(cell, say, stage: str
     returned = time.perf_counter() - begin
     await until(lambda: not hosts_of(cell) and not socket_path(cell).exists())
     gone = time.perf_counter() - begin
-    say(f"leaving while {stage}: back after, nothing left after", f"{returned:.2f}, {gone:.2f} s", "0.5 s")
-    assert returned < QUIT_S
+    figure(f"leaving while {stage}: back after", returned, "s", at_most(QUIT_S))
+    figure("  nothing is left after", gone, "s")
 
 
-async def test_attaching_shows_a_running_run_at_once(cell, say) -> None:
+async def test_attaching_shows_a_running_run_at_once(cell, figure) -> None:
     first = await begun(cell)
     async for message in first.messages():
         if is_step(Identify)(message):
@@ -103,10 +102,11 @@ async def test_attaching_shows_a_running_run_at_once(cell, say) -> None:
         if isinstance(message, LiveSnapshot):
             break
     shown = time.perf_counter() - begin
-    say(f"attaching: {told} events told after, live after", f"{caught_up:.2f}, {shown:.2f} s", "")
+    figure("attaching: events told", told)
+    figure("  caught up after", caught_up, "s", at_most(1.0))
+    figure("  live after", shown, "s")
     await second.leave(keep_running=True)
     await first.leave(keep_running=False)
-    assert caught_up < 1.0
 
 
 def pace(cell: Cell) -> float:
@@ -121,7 +121,7 @@ def pace(cell: Cell) -> float:
 
 
 @pytest.mark.parametrize("watched", [False, True], ids=["alone", "watched"])
-async def test_watchers_do_not_delay_the_recorder(cell, say, watched: bool) -> None:
+async def test_watchers_do_not_delay_the_recorder(cell, figure, watched: bool) -> None:
     connection = await begun(cell)
     stuck: list[socket.socket] = []
     watchers: list[asyncio.Future[int]] = []
@@ -139,7 +139,8 @@ async def test_watchers_do_not_delay_the_recorder(cell, say, watched: bool) -> N
         one.close()
     counts = [await one for one in watchers]
     name = "with 5 watchers and 5 stuck ones" if watched else "alone"
-    say(f"{name}: events; from an arrival to the next step", f"{told}; {1e3 * pace(cell):.1f} ms", "")
+    figure(f"{name}: events told", told)
+    figure(f"{name}: from an arrival to the next step", 1e3 * pace(cell), "ms")
     assert counts == [told] * len(counts), "events are lost by nobody"
 
 

@@ -3,17 +3,12 @@
 Table 1's robot is calibrated once (0.01 mm noise on joint variables and deviations). Its true geometry is
 drawn about the result by the result's covariance; then nothing changes, or the length of one leg does. The
 poses are those that a check chooses. The same through a day of +-7 K: legs of steel follow the room, each
-in its own time, and a thermometer on each tells its temperature to 0.05 K. ``RUNS`` in the environment says
-how many robots there are of each.
+in its own time, and a thermometer on each tells its temperature to 0.05 K.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -22,17 +17,14 @@ from hexacell.checks.change_alarm import ChangeAlarm, change_alarm, leg_expansio
 from hexacell.checks.check import Check
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot
-from tests.benchmarks.test_check import Calibrated, calibrated
+from tests.benchmarks.figures import at_least, at_most
+from tests.benchmarks.machines import Calibrated, calibrated, on_all_cores
+from tests.benchmarks.samples import sample
 
-Say = Callable[[str, str, str], None]
-
-pytestmark = pytest.mark.benchmark
-
-RUNS = int(os.environ.get("RUNS", "60"))
+RUNS = sample(__name__, "RUNS")
 CHANGE_MM = 0.05
 RECORDS = (8, 12, 16)
 ALLOWANCE = 1.5 / np.sqrt(RUNS)
@@ -103,10 +95,8 @@ def records_of(
 
 
 def by_length(known: Calibrated, leg: int) -> Array:
-    mechanism = known.robot.mechanism
-    row: Array = free_parameter_derivatives(mechanism, known.robot.commanding)[
-        mechanism.parameters.names.index(f"l{leg}")
-    ]
+    names = known.robot.mechanism.parameters.names
+    row: Array = known.by_every[names.index(f"l{leg}")]
     return row
 
 
@@ -114,28 +104,20 @@ def by_length(known: Calibrated, leg: int) -> Array:
 def robots(request: pytest.FixtureRequest) -> list[Robot]:
     calibrated()  # once, before there are more processes
     legs = [0] * RUNS + [number % 6 + 1 for number in range(RUNS)]
-    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
-        return list(pool.map(checked, [(leg, number, request.param) for number, leg in enumerate(legs)]))
+    return on_all_cores(checked, [(leg, number, request.param) for number, leg in enumerate(legs)])
 
 
-def share(values: list[bool]) -> float:
-    return sum(values) / len(values)
-
-
-def test_a_leg_that_changed_is_noticed_and_named(robots, say):
+def test_a_leg_that_changed_is_noticed_and_named(robots, figure):
     changed = [one for one in robots if one.leg]
-    noticed = share([one.alarms[8].is_raised for one in changed])
-    say(
-        f"first 8 records notice {CHANGE_MM} mm of one leg, {RUNS} robots", f"{100 * noticed:.1f} %", "95 %"
-    )
-    for number, target in zip(RECORDS, ("90 %", "-", "-"), strict=True):
-        named = share([one.alarms[number].leg == one.leg for one in changed])
-        say(f"  {number} records name the leg", f"{100 * named:.1f} %", target)
-    assert noticed >= 0.95 - ALLOWANCE
-    assert share([one.alarms[8].leg == one.leg for one in changed]) >= 0.9 - ALLOWANCE
+    noticed = np.mean([one.alarms[8].is_raised for one in changed])
+    words = f"first 8 records notice {CHANGE_MM} mm of one leg, {RUNS} robots"
+    figure(words, noticed, "", at_least(0.95 - ALLOWANCE))
+    for number in RECORDS:
+        named = np.mean([one.alarms[number].leg == one.leg for one in changed])
+        target = at_least(0.9 - ALLOWANCE) if number == min(RECORDS) else None
+        figure(f"  {number} records name the leg", named, "", target)
 
 
-def test_unchanged_robots_raise_few_alarms(robots, say):
-    raised = share([one.alarms[8].is_raised for one in robots if not one.leg])
-    say(f"unchanged robots raise an alarm, {RUNS}", f"{100 * raised:.1f} %", "at most 1 %")
-    assert raised <= 0.01 + ALLOWANCE / 5
+def test_unchanged_robots_raise_few_alarms(robots, figure):
+    raised = np.mean([one.alarms[8].is_raised for one in robots if not one.leg])
+    figure(f"unchanged robots raise an alarm, {RUNS}", raised, "", at_most(0.01 + ALLOWANCE / 5))

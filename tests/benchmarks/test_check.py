@@ -2,47 +2,28 @@
 
 Table 1's robot is calibrated once. Its true geometry is then drawn about the result by the result's
 covariance, and changed: not at all, by drifts of the stated size and of 3 and 10 times that, and in the
-directions that a check sees least. ``RUNS`` in the environment says how many robots are checked in each
-case; the targets are for 100 and more. All cores are used.
+directions that a check sees least.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
 
-from hexacell.campaign.planner import Plan
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
-from hexacell.checks.check import Check, identified_before
-from hexacell.design.search_effort import SearchEffort
+from hexacell.checks.check import Check
 from hexacell.dry_run.campaign import VirtualCampaign
-from hexacell.identification.estimator import identify
-from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.kinematics.rotations import Array
-from hexacell.robot.model import Robot, robot_of
 from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.verdict.decision import ErrorLimits, Verdict
+from hexacell.verdict.decision import Verdict
+from tests.benchmarks.figures import NEVER, at_least, at_most, between
+from tests.benchmarks.machines import Calibrated, bundled, calibrated, on_all_cores
+from tests.benchmarks.samples import sample
 
-Say = Callable[[str, str, str], None]
-
-pytestmark = pytest.mark.benchmark
-
-RUNS = int(os.environ.get("RUNS", "8"))
-LIMITS = ErrorLimits.of(load_cell(bundled_config("simulated-hexaglide")).settings.acceptance)
-LIMIT_MM = LIMITS.position_mm
-DRIFT_MM = 0.02
-BUDGET = 40
+RUNS = sample(__name__, "RUNS")
+LIMIT_MM = bundled().settings.acceptance.position_mm
 SIGMAS = 3.0
-EFFORT = SearchEffort(candidates=128)
 DIRECTIONS = 8
 ALLOWANCE = 1.5 / RUNS
 """Of every share: one robot more or less is no finding."""
@@ -52,19 +33,6 @@ SHOWN = (Verdict.PASS, Verdict.FAIL, Verdict.NOT_EVALUATED)
 UNCHANGED, LEAST_FAVOURABLE = "unchanged", "off by limit + U, least favourable"
 CHANGED, CHANGE_MM = "every parameter changed by up to 0.1 mm", 0.1
 DRIFTED = {1.0: "drift as stated", 3.0: "3 times the drift", 10.0: "10 times the drift"}
-
-
-@dataclass(frozen=True, eq=False)
-class Calibrated:
-    """A robot whose controller has an identified geometry, with its covariance (P, P), mm^2."""
-
-    robot: Robot
-    covariance: Array
-
-    def check(self) -> Check:
-        settings = load_cell(bundled_config("simulated-hexaglide")).settings
-        before = identified_before(self.robot, self.covariance, DRIFT_MM)
-        return Check(settings, self.robot, before, LIMITS, BUDGET, effort=EFFORT)
 
 
 @dataclass(frozen=True)
@@ -81,30 +49,10 @@ class Outcome:
         return abs(self.value_mm - self.true_mm) <= self.expanded_mm
 
 
-@lru_cache
-def calibrated() -> Calibrated:
-    cell = load_cell(bundled_config("simulated-hexaglide"))
-    robot = robot_of(cell)
-    assert cell.settings.simulation is not None
-    actual = Geometry.of(robot.mechanism.parameters, cell.settings.simulation.geometry.model_dump())
-    truth = robot.mechanism.normalize_frames(actual)[0]
-    plan = Plan(cell.settings, robot, effort=EFFORT, with_forecast=False)
-    campaign = VirtualCampaign(plan, VirtualRobot(robot, truth, np.random.default_rng(1)))
-    campaign.carry_out()
-    found = identify(robot.problem(campaign.measurements))
-    frames = robot.mechanism.normalize_frames(found.geometry)[1]
-    # The cell is ideal, and effects cannot be sent to another process.
-    known = replace(robot, controller=found.geometry, frames=frames, effects=())
-    return Calibrated(known, found.covariance)
-
-
-def campaign_of(check: Check, change: Array, number: int) -> VirtualCampaign:
+def campaign_of(known: Calibrated, check: Check, change: Array, number: int) -> VirtualCampaign:
     """A check of a robot whose free parameters differ by (p,) from its controller's, carried out."""
-    robot = check.robot
-    convention = robot.mechanism.convention
-    truth = convention.geometry(convention.free_parameters(robot.commanding) + change)
-    plan = replace(check.plan, with_forecast=False)
-    campaign = VirtualCampaign(plan, VirtualRobot(robot, truth, np.random.default_rng([6, number])))
+    plan, random = replace(check.plan, with_forecast=False), np.random.default_rng([6, number])
+    campaign = VirtualCampaign(plan, VirtualRobot(check.robot, known.built(change), random))
     campaign.carry_out()
     return campaign
 
@@ -112,7 +60,7 @@ def campaign_of(check: Check, change: Array, number: int) -> VirtualCampaign:
 def checked(job: tuple[Calibrated, Array, int]) -> Outcome:
     known, change, number = job
     check = known.check()
-    campaign = campaign_of(check, change, number)
+    campaign = campaign_of(known, check, change, number)
     stated = check.final_statement(campaign.measurements)
     assert stated is not None
     value, expanded = stated.errors.position.value, stated.errors.position.expanded
@@ -139,8 +87,7 @@ def changes(known: Calibrated, scale: float) -> list[Array]:
 
 def random_changes(known: Calibrated) -> list[Array]:
     """Changes of all parameters, those that the frame convention fixes as well."""
-    random, robot = np.random.default_rng(5), known.robot
-    to_free = free_parameter_derivatives(robot.mechanism, robot.commanding)
+    random, to_free = np.random.default_rng(5), known.by_every
     return [random.uniform(-CHANGE_MM, CHANGE_MM, len(to_free)) @ to_free for _ in range(RUNS)]
 
 
@@ -153,7 +100,7 @@ def hidden_changes(known: Calibrated) -> list[Array]:
     """
     check = known.check()
     assert check.before is not None
-    unchanged = campaign_of(check, np.zeros(len(check.before.covariance)), 0)
+    unchanged = campaign_of(known, check, np.zeros(len(check.before.covariance)), 0)
     stated = check.statement(unchanged.measurements)
     assert stated is not None
     belief = check.plan.estimate(unchanged.state).belief
@@ -199,70 +146,45 @@ def outcomes() -> dict[str, list[Outcome]]:
     cases[CHANGED] = random_changes(known)
     cases |= {name: changes(known, scale) for scale, name in DRIFTED.items()}
     jobs = [(known, change, number) for case in cases.values() for number, change in enumerate(case)]
-    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
-        done = list(pool.map(checked, jobs))
+    done = on_all_cores(checked, jobs)
     return {name: done[row * RUNS : (row + 1) * RUNS] for row, name in enumerate(cases)}
 
 
-def share(values: list[bool]) -> float:
-    return sum(values) / len(values)
-
-
 def passes(found: list[Outcome]) -> float:
-    return share([one.verdict is Verdict.PASS for one in found])
+    return float(np.mean([one.verdict is Verdict.PASS for one in found]))
 
 
-def covered(found: list[Outcome]) -> float:
-    return share([one.is_covered for one in found])
+@pytest.mark.parametrize("name", [UNCHANGED, LEAST_FAVOURABLE, CHANGED, *DRIFTED.values()])
+def test_verdicts(outcomes, figure, name):
+    found = outcomes[name]
+    for verdict in SHOWN:
+        figure(f"checks of robots, {name}: {verdict.value}", sum(one.verdict is verdict for one in found))
+    for words, kind, unit in (
+        ("records", "records", ""),
+        ("U", "expanded_mm", "mm"),
+        ("true error", "true_mm", "mm"),
+    ):
+        figure(f"  {words}, median", np.median([getattr(one, kind) for one in found]), unit)
+    false = sum(one.verdict is Verdict.PASS and one.true_mm > LIMIT_MM for one in found)
+    figure("  false passes", false, "", at_most((0.01 + ALLOWANCE) * RUNS) if name == CHANGED else None)
+    figure("  records outside the travel", sum(one.outside for one in found), "", NEVER)
 
 
-def test_table(outcomes, say):
-    say("", "pass, fail, open; records; U; covered", "all checks")
-    for name, found in outcomes.items():
-        counts = [sum(one.verdict is verdict for one in found) for verdict in SHOWN]
-        records, expanded = (np.median([(one.records, one.expanded_mm) for one in found], axis=0)).tolist()
-        false = sum(one.verdict is Verdict.PASS and one.true_mm > LIMIT_MM for one in found)
-        line = f"{counts}; {records:.0f}; {expanded:.3f} mm; {100 * covered(found):.0f} %"
-        say(
-            name,
-            line,
-            f"true error {np.median([one.true_mm for one in found]):.3f} mm, false passes {false}",
-        )
-    assert all(len(found) == RUNS for found in outcomes.values())
-
-
-def test_unchanged_robots_pass_after_few_records(outcomes, say):
+def test_unchanged_robots_pass_after_few_records(outcomes, figure):
     found = outcomes[UNCHANGED]
-    records = float(np.median([one.records for one in found]))
-    say("unchanged robots pass", f"{100 * passes(found):.1f} %", "at least 98 %")
-    say("  records, median", f"{records:.0f}", "at most 20")
-    assert passes(found) >= 0.98 - ALLOWANCE
-    assert records <= 20
+    figure("unchanged robots pass", passes(found), "", at_least(0.98 - ALLOWANCE))
+    figure("  records, median", np.median([one.records for one in found]), "", at_most(20))
 
 
-def test_robots_beyond_limit_and_uncertainty_do_not_pass(outcomes, say):
-    found = outcomes[LEAST_FAVOURABLE]
-    say("robots off by limit + U pass", f"{100 * passes(found):.1f} %", "at most 1 %")
-    assert passes(found) <= 0.01 + ALLOWANCE
-
-
-def test_robots_that_changed_beyond_the_limit_do_not_pass(outcomes, say):
-    found = outcomes[CHANGED]
-    false = [one for one in found if one.verdict is Verdict.PASS and one.true_mm > LIMIT_MM]
-    say("robots changed by up to 0.1 mm pass falsely", f"{len(false)} of {len(found)}", "at most 1 %")
-    assert len(false) <= (0.01 + ALLOWANCE) * len(found)
+def test_robots_beyond_limit_and_uncertainty_do_not_pass(outcomes, figure):
+    figure(
+        "robots off by limit + U pass", passes(outcomes[LEAST_FAVOURABLE]), "", at_most(0.01 + ALLOWANCE)
+    )
 
 
 @pytest.mark.parametrize(
     ("scale", "least", "most"), [(1.0, 0.93, 0.98), (3.0, 0.85, 1.0), (10.0, 0.85, 1.0)]
 )
-def test_uncertainty_covers(outcomes, say, scale, least, most):
-    found = covered(outcomes[DRIFTED[scale]])
-    say(f"U covers, {DRIFTED[scale]}", f"{100 * found:.1f} %", f"{100 * least:.0f} to {100 * most:.0f} %")
-    assert least - ALLOWANCE <= found <= most + ALLOWANCE
-
-
-def test_the_ball_stays_inside_the_travel(outcomes, say):
-    outside = sum(one.outside for found in outcomes.values() for one in found)
-    say("records outside the travel", f"{outside}", "none")
-    assert outside == 0
+def test_uncertainty_covers(outcomes, figure, scale, least, most):
+    found = np.mean([one.is_covered for one in outcomes[DRIFTED[scale]]])
+    figure(f"U covers, {DRIFTED[scale]}", found, "", between(least - ALLOWANCE, most + ALLOWANCE))

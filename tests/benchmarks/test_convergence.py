@@ -7,13 +7,15 @@ import numpy as np
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import identify
 from hexacell.robot.virtual_robot import random_robot
+from tests.benchmarks.figures import NEVER
+from tests.benchmarks.samples import sample
 from tests.records_within_travel import within_travel
 
-ROBOTS = 1000
+ROBOTS = sample(__name__, "ROBOTS")
 SIGMAS = 6.0
 
 
-def test_every_robot_is_found(table_one, say) -> None:
+def test_every_robot_is_found(table_one, figure) -> None:
     robot = table_one.robot
     unreachable, failed, wrong, short = 0, 0, 0, 0
     for seed in range(ROBOTS):
@@ -29,14 +31,7 @@ def test_every_robot_is_found(table_one, say) -> None:
         failed += not found.converged
         wrong += bool((error > SIGMAS * np.sqrt(np.diag(found.free_covariance))).any())
         short += found.records < len(campaign.joints)
-    tried = ROBOTS - unreachable
-    say(
-        "robots with +-7 mm errors: points out of reach, left out",
-        f"{unreachable} of {ROBOTS}",
-        "to be said",
-    )
-    say("  of the others converged from the drawing", f"{tried - failed} of {tried}", "all")
-    say("  farther than 6 sigma from the truth (a wrong mode)", f"{wrong}", "none")
-    say("  identified without one or two records next to a singularity", f"{short}", "to be said")
-    assert failed == 0
-    assert wrong == 0
+    figure(f"of {ROBOTS} robots with +-7 mm errors: points out of reach, left out", unreachable)
+    figure("  of the others did not converge from the drawing", failed, "", NEVER)
+    figure("  farther than 6 sigma from the truth (a wrong mode)", wrong, "", NEVER)
+    figure("  identified without one or two records next to a singularity", short)

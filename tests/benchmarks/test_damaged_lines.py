@@ -1,7 +1,6 @@
 """A million answers of each protocol over lines that damage one byte in a hundred: what gets through?
 
 Three gauges are read as a run reads them, until their readings settle, each time at another place.
-``FRAMES`` in the environment says how many answers each protocol has to give.
 """
 
 from __future__ import annotations
@@ -33,9 +32,11 @@ from hexacell.plugins import Group, load
 from hexacell.services.devices.device_setup import gauge_with_agreement
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.devices.settling import settle, trimmed_mean
+from tests.benchmarks.figures import NEVER, at_least, at_most
 from tests.benchmarks.line_in_process import Damage, InstrumentLine, have_lines
+from tests.benchmarks.samples import sample
 
-FRAMES = int(os.environ.get("FRAMES", "20000"))
+FRAMES = sample(__name__, "FRAMES")
 SHARE = 0.01
 CHECKED_EVERY = 20
 """After so many records the settings are compared, as a run does at every reference."""
@@ -233,7 +234,7 @@ PROTOCOLS = (
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-async def test_no_damage_becomes_a_record(protocol: str, say, monkeypatch) -> None:
+async def test_no_damage_becomes_a_record(protocol: str, figure, monkeypatch) -> None:
     async with opened(protocol, monkeypatch) as cell:
         outcome, memory = cell.outcome, [0.0]
         while cell.damage.answers < FRAMES:
@@ -242,19 +243,16 @@ async def test_no_damage_becomes_a_record(protocol: str, say, monkeypatch) -> No
                 memory[0] = resident_mib()
         grown = resident_mib() - memory[0]
         damage = cell.damage
-    say(f"{protocol}: answers; damaged", f"{damage.answers}; {damage.damaged}", f"{FRAMES}")
-    say("  records; wrong", f"{outcome.records}; {outcome.wrong_records}", "below 1 in 100,000")
-    say(
-        "  readings off by more than two may differ; of them with a true one",
-        f"{outcome.wrong_readings} of {outcome.readings}; {outcome.shown_by_another}",
-        "none with a true one",
-    )
-    say("  refused", ", ".join(f"{n} {name}" for name, n in outcome.refused.items()) or "none", "")
-    say("  memory grown in the second half", f"{grown:.1f} MiB", f"at most {MEMORY_MIB:g}")
-    assert not outcome.foreign
-    assert outcome.shown_by_another == 0
-    assert outcome.wrong_records <= outcome.records / ONE_IN
-    assert grown <= MEMORY_MIB
+    figure(f"{protocol}: answers", damage.answers)
+    figure("  damaged", damage.damaged)
+    figure("  records", outcome.records)
+    figure("  wrong records", outcome.wrong_records, "", at_most(outcome.records / ONE_IN))
+    figure("  readings off by more than two may differ", outcome.wrong_readings)
+    figure("    of them with a true one", outcome.shown_by_another, "", NEVER)
+    refused = ", ".join(f"{n} {name}" for name, n in outcome.refused.items())
+    figure("  refused", refused or "none")
+    figure("  exceptions of other kinds", len(outcome.foreign), "", NEVER)
+    figure("  memory grown in the second half", grown, "MiB", at_most(MEMORY_MIB))
 
 
 class HundredthsDamage(Damage):
@@ -293,11 +291,9 @@ async def wrong_of(alike_share: float, monkeypatch: pytest.MonkeyPatch) -> tuple
     return cell.outcome.wrong_records, cell.outcome.records
 
 
-async def test_the_same_bit_of_two_readings_of_five_is_no_record(say, monkeypatch) -> None:
+async def test_the_same_bit_of_two_readings_of_five_is_no_record(figure, monkeypatch) -> None:
     """The cause of the only wrong record of a million: two such readings outlast the trimmed mean."""
     two, of_two = await wrong_of(1.0, monkeypatch)
     three, of_three = await wrong_of(USUAL_SHARE, monkeypatch)
-    say("hundredths damaged, any two readings that agree: records; wrong", f"{of_two}; {two}", "")
-    say("  the middle one of three", f"{of_three}; {three}", "a tenth")
-    assert two > 0
-    assert three * of_two <= 0.1 * two * of_three
+    figure("hundredths damaged, any two readings that agree: wrong", two, f"of {of_two}", at_least(1))
+    figure("  the middle one of three", three, f"of {of_three}", at_most(0.1 * two * of_three / of_two))

@@ -1,19 +1,14 @@
 """The watch over nights: false alarms of unchanged robots, how soon a step is found, and where.
 
 The information of a calibration and of a night is that of Table 1's robot: 55 records, then a check of 16
-(0.01 mm noise on joint variables and deviations). Each night's evidence is drawn with it. ``CELLS`` in the
-environment says how many cells are watched for ten years without a change, ``STEPS`` how many steps of one
-sigma are tried.
+(0.01 mm noise on joint variables and deviations). Each night's evidence is drawn with it.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from multiprocessing import get_context
 from typing import TypeVar
 
 import numpy as np
@@ -25,16 +20,14 @@ from hexacell.drift.run_evidence import CarriedPosterior, Causes, RunEvidence
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.virtual_robot import VirtualRobot
-from tests.benchmarks.test_check import calibrated
+from tests.benchmarks.figures import at_least, at_most
+from tests.benchmarks.machines import calibrated, on_all_cores
+from tests.benchmarks.samples import sample
 
 Job = TypeVar("Job")
 Outcome = TypeVar("Outcome")
-Say = Callable[[str, str, str], None]
-
-pytestmark = pytest.mark.benchmark
-
-CELLS = int(os.environ.get("CELLS", "6"))
-STEPS = int(os.environ.get("STEPS", "60"))
+CELLS = sample(__name__, "CELLS")
+STEPS = sample(__name__, "STEPS")
 YEARS, NIGHTS = 10, 3650
 RECORDS = 16
 BEFORE = (30, 90, 365)
@@ -122,34 +115,32 @@ def crash(seed: int) -> tuple[int, StepAlarm | None]:
     return leg, alarms[0] if alarms else None
 
 
-def on_all_cores(act: Callable[[Job], Outcome], jobs: Iterable[Job]) -> list[Outcome]:
-    machine()  # once, before there are more processes
-    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
-        return list(pool.map(act, jobs))
+@pytest.fixture(autouse=True)
+def _before_there_are_more_processes() -> None:
+    machine()
 
 
-def test_unchanged_cells_raise_few_alarms(say):
+def test_unchanged_cells_raise_few_alarms(figure):
     found = sum(on_all_cores(false_alarms, range(CELLS)))
-    years = CELLS * YEARS
-    say(f"false alarms of all parameters in {years} cell-years", f"{found}", f"at most {years / 10:g}")
-    assert found <= CELLS + 3.0 * np.sqrt(CELLS)
+    most = at_most(CELLS + 3.0 * np.sqrt(CELLS))
+    figure(f"false alarms of all parameters in {CELLS * YEARS} cell-years", found, "", most)
 
 
 @pytest.mark.parametrize("before", BEFORE)
-def test_a_step_of_one_sigma_is_found(say, before):
+def test_a_step_of_one_sigma_is_found(figure, before):
     found = on_all_cores(nights_to_alarm, [(before, seed) for seed in range(STEPS)])
     median, most = np.quantile(found, [0.5, 0.9], method="nearest")
-    target = "22" if before == max(BEFORE) else "-"
-    say(f"a step of one sigma after {before} nights: found after, median", f"{median:.0f} nights", target)
-    say("  after nine of ten", f"{most:.0f} nights", "-")
-    assert median <= 22 + ALLOWANCE or before < max(BEFORE)
+    target = at_most(22 + ALLOWANCE) if before == max(BEFORE) else None
+    figure(f"a step of one sigma after {before} nights: found after, median", median, "nights", target)
+    figure("  after nine of ten", most, "nights")
 
 
-def test_a_crash_is_located(say):
+def test_a_crash_is_located(figure):
     found = on_all_cores(crash, range(STEPS))
     same_night = sum(alarm is not None and (alarm.first, alarm.last) == (91, 91) for _, alarm in found)
     named = sum(alarm is not None and alarm.leg == leg for leg, alarm in found)
     alone = sum(alarm is not None and not alarm.other_legs for _, alarm in found)
-    say(f"a leg {CRASH_MM} mm longer after 90 nights, {STEPS}: the night is known", f"{same_night}", "-")
-    say("  the leg is named; no other is", f"{named}; {alone}", "-")
-    assert min(same_night, named, alone) >= 0.95 * STEPS - 1
+    of, least = f"of {STEPS}", at_least(0.95 * STEPS - 1)
+    figure(f"a leg {CRASH_MM} mm longer after 90 nights: the night is known", same_night, of, least)
+    figure("  the leg is named", named, of, least)
+    figure("  no other is", alone, of, least)

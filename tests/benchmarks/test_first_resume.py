@@ -1,8 +1,7 @@
 """A first resume must do: killed at random instants, runs of the bundled, noisy cell are resumed once.
 
-The program runs as it is installed, in processes of its own. ``KILLS`` in the environment says how many
-runs there are; the target is for 200. A sample on a small cell without noise is in ``make test``
-(``tests/faults/test_killed_at_random.py``).
+The program runs as it is installed, in processes of its own. A sample on a small cell without noise
+is in ``make test`` (``tests/faults/test_killed_at_random.py``).
 """
 
 from __future__ import annotations
@@ -20,16 +19,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-import pytest
-
 from hexacell.cell.bundled import bundled_config
 from procedures.journal.journal import read_journal
+from tests.benchmarks.figures import NEVER
+from tests.benchmarks.samples import sample
 from tests.faults.steps import step_of
 from tests.faults.test_killed_at_random import instants
 
-pytestmark = pytest.mark.benchmark
-
-KILLS = int(os.environ.get("KILLS", "10"))
+KILLS = sample(__name__, "KILLS")
 
 AT_ONCE = os.cpu_count() or 1
 """Runs that are killed and resumed beside each other; each needs one core."""
@@ -120,7 +117,7 @@ def resumed(folder: Path, seed: int, share: float, duration_s: float) -> Resumed
     return Resumed(share, step, ended)
 
 
-def test_a_first_resume_ends_every_killed_run_with_a_pass(say, tmp_path) -> None:
+def test_a_first_resume_ends_every_killed_run_with_a_pass(figure, tmp_path) -> None:
     chance = random.Random(9)
     with ThreadPoolExecutor(AT_ONCE) as pool:
         undisturbed = list(
@@ -139,8 +136,8 @@ def test_a_first_resume_ends_every_killed_run_with_a_pass(say, tmp_path) -> None
         if not one.ended.passed
     ]
     steps = Counter(one.step for one in done)
-    say("killed runs that the first resume ends with a pass", f"{KILLS - len(others)} of {KILLS}", "all")
-    say("killed in", ", ".join(f"{step} {count}" for step, count in steps.most_common(6)), "")
+    figure("killed runs that the first resume does not end with a pass", len(others), f"of {KILLS}", NEVER)
+    figure("killed in", ", ".join(f"{step} {count}" for step, count in steps.most_common(6)))
     confirmed = sum("new records show whether by chance" in one.ended.words for one in done)
-    say("of these with confirming records after a test that failed narrowly", f"{confirmed}", "")
+    figure("of these with confirming records after a test that failed narrowly", confirmed)
     assert not others, "\n".join(others)

@@ -8,31 +8,29 @@ in ``make test`` (``tests/procedures/runs/test_gauge_trial.py``). The time is th
 from __future__ import annotations
 
 import asyncio
-import os
 from collections.abc import Iterator
 from itertools import cycle, islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from hexacell.errors import HexacellError
 from procedures.journal.journal import read_journal
 from procedures.steps import events
 from procedures.steps.place import MountingError
+from tests.benchmarks.figures import NEVER, at_least, at_most
+from tests.benchmarks.samples import sample
 from tests.procedures.rig import new_rig
 from tests.procedures.runs.gauge_mistakes import MISTAKES, drawn_robots, make_mistake
 from tests.small_cell import choose_among_few
 
-pytestmark = pytest.mark.benchmark
-
-TRIALS = int(os.environ.get("TRIALS", "100"))
+TRIALS = sample(__name__, "TRIALS")
 
 
 def rigs(folder: Path, seed: int) -> Iterator[Any]:
     """Runs of drawn robots, with gauges and encoders as noisy as the bundled cell states."""
-    noise: dict[str, Any] = {f"simulation__{one}__noise_mm": 0.01 for one in ("gauges", "encoders")}
+    noise: dict[str, Any] = {f"simulation__{one}": 0.01 for one in ("gauges__noise_mm", "encoders__noise")}
     noise |= {"noise__gauge_mm": 0.01, "noise__encoder": 0.01, "stations__trial_mm": 1.0}
     first = new_rig(folder)
     for number, geometry in enumerate(drawn_robots(first.cell.settings, seed)):
@@ -52,7 +50,7 @@ def carried_out(rig: Any, *listeners: Any) -> tuple[str, list[events.Event]]:
     return "", list(read_journal(rig.folder.journal))
 
 
-def test_every_mistake_is_named_before_the_second_station(say, tmp_path, monkeypatch) -> None:
+def test_every_mistake_is_named_before_the_second_station(figure, tmp_path, monkeypatch) -> None:
     choose_among_few(monkeypatch)
     named = right = 0
     for rig, mistake in zip(islice(rigs(tmp_path, 21), TRIALS), cycle(MISTAKES), strict=False):
@@ -61,13 +59,11 @@ def test_every_mistake_is_named_before_the_second_station(say, tmp_path, monkeyp
         stations = {event.at for event in history if isinstance(event, events.RecordTaken)}
         named += bool(problem) and len(stations) == 1
         right += MISTAKES[mistake] in problem
-    say("mistakes named at the first station", f"{named} of {TRIALS}", "all")
-    say("of these by their right name", f"{right} of {TRIALS}", "0.99")
-    assert named == TRIALS
-    assert right >= 0.99 * TRIALS
+    figure("mistakes named at the first station", named, f"of {TRIALS}", at_least(TRIALS))
+    figure("of these by their right name", right, f"of {TRIALS}", at_least(0.99 * TRIALS))
 
 
-def test_no_healthy_gauge_is_blamed(say, tmp_path, monkeypatch) -> None:
+def test_no_healthy_gauge_is_blamed(figure, tmp_path, monkeypatch) -> None:
     choose_among_few(monkeypatch)
     blamed, seconds = [], []
     for rig in islice(rigs(tmp_path, 22), TRIALS):
@@ -81,13 +77,7 @@ def test_no_healthy_gauge_is_blamed(say, tmp_path, monkeypatch) -> None:
 
         problem, _ = carried_out(rig, timed)
         blamed += [problem] if problem else []
-    say("healthy runs in which a gauge is blamed", f"{len(blamed)} of {TRIALS}", "none")
-    say("stations at which gauges were tried in these", str(len(seconds)), "")
-    say(
-        "a trial takes, s of the cell's time: median, most",
-        f"{np.median(seconds):.1f}, {max(seconds):.1f}",
-        "median, most",
-    )
-    assert not blamed
-    assert len(seconds) >= 3 * TRIALS
-    assert np.median(seconds) < 10.0
+    figure("healthy runs in which a gauge is blamed", len(blamed), f"of {TRIALS}", NEVER)
+    figure("stations at which gauges were tried in these", len(seconds), "", at_least(3 * TRIALS))
+    figure("a trial takes, of the cell's time: median", np.median(seconds), "s", at_most(10.0))
+    figure("  most", max(seconds), "s")

@@ -37,6 +37,7 @@ from procedures.run.readings import Reading
 from procedures.run.state import RunState, fold
 from procedures.run.trips import Guard, GuardTripped, WatchedSet
 from procedures.steps import events
+from tests.benchmarks.figures import Figures, at_most
 from tests.injection_times import injection_times
 from tests.native_config import NATIVE
 
@@ -199,9 +200,8 @@ async def stopping_s(folder: Path, protocol: str, kind: FaultKind, device: str) 
 
 @pytest.mark.parametrize("protocol", ["sylvac", "mux10", "cdi"])
 async def test_the_robot_stops_within_the_limit_after_each_fault(
-    tmp_path: Path, say: Any, protocol: str
+    tmp_path: Path, figure: Figures, protocol: str
 ) -> None:
-    late = {}
     for kind, device, guards in EVENTS:
         if protocol == "mux10" and kind == "unplugged" and device == "x":
             continue  # the plug is that of all three
@@ -209,12 +209,12 @@ async def test_the_robot_stops_within_the_limit_after_each_fault(
         for time in range(TIMES):
             folder = tmp_path / f"{kind}-{device}-{time}"
             taken.append(await in_its_turn(folder, protocol, kind, device, guards))
-        late[kind, device] = max(taken)
-        say(f"{protocol}: {kind} {device}", f"{1e3 * max(taken):.0f} ms", f"{1e3 * MUST_S:.0f} ms")
-    assert max(late.values()) <= MUST_S
+        figure(
+            f"{protocol}: stands still after {kind} {device}", 1e3 * max(taken), "ms", at_most(1e3 * MUST_S)
+        )
 
 
-async def test_readings_after_a_watched_move_are_not_slower(tmp_path: Path, say: Any) -> None:
+async def test_readings_after_a_watched_move_are_not_slower(tmp_path: Path, figure: Figures) -> None:
     """Readings after a watched move take as long as without it."""
     async with watched(tmp_path, "mux10") as cell:
         for gauge in cell.devices.gauges:
@@ -222,8 +222,8 @@ async def test_readings_after_a_watched_move_are_not_slower(tmp_path: Path, say:
         before = await seconds_of_reading(cell)
         await cell.slow_move(2)
         after = await seconds_of_reading(cell)
-    say("mux10: three readings before and after a watched move", f"{before:.3f}, {after:.3f} s", "alike")
-    assert after < before + 0.15
+    figure("mux10: three readings before a watched move", before, "s")
+    figure("  after it", after, "s", at_most(before + 0.15))
 
 
 async def seconds_of_reading(cell: Watched) -> float:

@@ -3,35 +3,29 @@
 A robot is healthy if it can stand at all points as its controller sends it there: clear of singularities,
 and with its passive joints and legs within their limits. Of those that cannot, before they are calibrated,
 the figures are printed beside them. Each is measured as a run measures it, identified, written and
-verified; its true error at the task poses is known. ``ROBOTS`` in the environment says how many there are;
-the targets are for 1,000. All cores are used.
+verified; its true error at the task poses is known.
 """
 
 from __future__ import annotations
 
-import os
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
 
 import numpy as np
-import pytest
 
 from hexacell.campaign.task_accuracy import Task
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.errors import HexacellError
 from hexacell.robot.model import robot_of
 from hexacell.verdict.decision import Verdict
+from tests.benchmarks.figures import NEVER, Figures, at_least, at_most
+from tests.benchmarks.machines import bundled, on_all_cores
+from tests.benchmarks.samples import sample
 from tests.benchmarks.virtual_calibration import calibrate, robot_that_reaches, stands_at
 from tests.benchmarks.worlds.effects import Effect
 from tests.benchmarks.worlds.table import least_by_chance, most_by_chance
 from tests.benchmarks.worlds.world import World
 
-pytestmark = pytest.mark.benchmark
-
-ROBOTS = int(os.environ.get("ROBOTS", "100"))
+ROBOTS = sample(__name__, "ROBOTS")
 """A tenth of what the target is for."""
 
 
@@ -67,7 +61,7 @@ class Outcome:
 
 def outcome(number: int) -> Outcome:
     """Of one robot."""
-    cell = load_cell(bundled_config("simulated-hexaglide"))
+    cell = bundled()
     robot = robot_of(cell)
     random = np.random.default_rng([11, number])
     truth = robot_that_reaches(cell, robot, random)
@@ -100,35 +94,39 @@ def outcome(number: int) -> Outcome:
     )
 
 
-def test_healthy_robots_pass(say):
-    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
-        every = list(pool.map(outcome, range(ROBOTS)))
+def test_healthy_robots_pass(figure):
+    every = on_all_cores(outcome, range(ROBOTS))
     healthy = [one for one in every if one.stands]
     judged = [one for one in every if np.isfinite(one.true_mm)]
     for one in every:
         if not one.is_accepted:
-            figures = f"{one.true_mm:.3f}; {one.value_mm:.3f} +- {one.u_mm:.3f} mm"
-            say(f"  robot {one.number}: {one.verdict}, stands {one.stands}", figures, one.reason)
-    _say_verdicts(say, "healthy robots", healthy, "at most 1 %")
-    _say_verdicts(say, "robots that cannot stand at all points", [one for one in every if not one.stands])
+            words = (
+                f"  robot {one.number}: {one.verdict}, stands {one.stands}, U {one.u_mm:.3f}; {one.reason}"
+            )
+            figure(words, one.true_mm, "mm")
+    _say_verdicts(figure, "healthy robots", healthy)
+    refused = sum(not one.is_accepted for one in healthy)
+    most = at_most(most_by_chance(0.01, len(healthy)))
+    figure("  healthy, anything but a pass without a person", refused, f"of {len(healthy)}", most)
+    _say_verdicts(
+        figure, "robots that cannot stand at all points", [one for one in every if not one.stands]
+    )
     covered = sum(one.is_covered for one in judged)
     false = sum(one.verdict is Verdict.PASS and one.true_mm > one.limit_mm for one in judged)
-    say("of both: |stated - true| <= U", f"{100 * covered / len(judged):.1f} %", "93 to 98 %")
-    say("  passes though the true error is above the limit", f"{false}", "none")
-    say("  records left out as false", f"{sum(one.named for one in judged)}", "none")
-    assert sum(not one.is_accepted for one in healthy) <= most_by_chance(0.01, len(healthy))
-    assert covered >= least_by_chance(0.93, len(judged))
-    assert not false
+    least = at_least(least_by_chance(0.93, len(judged)))
+    figure("of both: |stated - true| <= U", covered, f"of {len(judged)}", least)
+    figure("  passes though the true error is above the limit", false, "", NEVER)
+    figure("  records left out as false", sum(one.named for one in judged))
 
 
-def _say_verdicts(say, who: str, outcomes: list[Outcome], target: str = "") -> None:
+def _say_verdicts(figure: Figures, who: str, outcomes: list[Outcome]) -> None:
     verdicts = Counter(str(one.verdict) for one in outcomes)
     judged = [one for one in outcomes if np.isfinite(one.true_mm)]
-    not_accepted = sum(not one.is_accepted for one in outcomes)
-    say(f"{who}: verdicts", ", ".join(f"{n} {name}" for name, n in verdicts.items()), "")
-    say("  anything but a pass without a person", f"{not_accepted} of {len(outcomes)}", target)
-    say("  true error, U; medians", f"{_median(judged, 'true_mm')}, {_median(judged, 'u_mm')} mm", "")
-
-
-def _median(outcomes: list[Outcome], name: str) -> str:
-    return f"{np.median([getattr(one, name) for one in outcomes]):.3f}"
+    figure(f"{who}: verdicts", ", ".join(f"{n} {name}" for name, n in verdicts.items()))
+    figure(
+        f"  {who}: anything but a pass", sum(not one.is_accepted for one in outcomes), f"of {len(outcomes)}"
+    )
+    figure(
+        f"  {who}: true error, median", np.median([one.true_mm for one in judged]) if judged else None, "mm"
+    )
+    figure(f"  {who}: U, median", np.median([one.u_mm for one in judged]) if judged else None, "mm")

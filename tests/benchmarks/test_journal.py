@@ -17,6 +17,7 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Reading
 from procedures.run.state import fold
 from procedures.steps import events
+from tests.benchmarks.figures import at_most
 
 RECORDS = 10_000
 APPENDED = 400
@@ -52,7 +53,7 @@ def timed(work: Callable[[], object]) -> float:
     return time.perf_counter() - begun
 
 
-def test_a_record_against_the_bare_disk(tmp_path: Path, say) -> None:
+def test_a_record_against_the_bare_disk(tmp_path: Path, figure) -> None:
     """Taken in turns, so that whatever else keeps the disk busy counts for both."""
     line = encode(Entry(1, *line_format.now(), sampled(1, 20)))
     descriptor = os.open(tmp_path / "bare", os.O_CREAT | os.O_WRONLY | os.O_APPEND)
@@ -68,18 +69,13 @@ def test_a_record_against_the_bare_disk(tmp_path: Path, say) -> None:
             disk.append(timed(bare))
     os.close(descriptor)
     cost, least = 1e3 * median(ours), 1e3 * median(disk)
-    say("a record on the disk, median", f"{cost:.2f} ms", "below 2 ms")
-    say(
-        "  the same bytes written and forced out, nothing else",
-        f"{least:.2f} ms",
-        f"{cost / least:.2f} times",
-    )
     # Where the disk itself is slower than that, the journal must not add as much again.
-    assert cost < max(2.0, 2.0 * least)
+    figure("a record on the disk, median", cost, "ms", at_most(max(2.0, 2.0 * least)))
+    figure("  the same bytes written and forced out, nothing else", least, "ms")
 
 
 @pytest.mark.parametrize("per_set", [20, RECORDS])
-def test_a_long_journal_opens_quickly(tmp_path: Path, say, per_set: int) -> None:
+def test_a_long_journal_opens_quickly(tmp_path: Path, figure, per_set: int) -> None:
     path = tmp_path / "journal.jsonl"
     when = line_format.now()
     path.write_bytes(b"".join(encode(Entry(n + 1, *when, sampled(n, per_set))) for n in range(RECORDS)))
@@ -91,11 +87,12 @@ def test_a_long_journal_opens_quickly(tmp_path: Path, say, per_set: int) -> None
     wall = time.perf_counter() - begun_on_the_wall
     assert len(state.samples(Phase.IDENTIFY)) == RECORDS
     words = f"{RECORDS:,} records, {per_set:,} a set: opened and folded in"
-    say(words, f"{folded - begun:.2f} s", f"below 1 s; folding {folded - opened:.2f} s, wall {wall:.2f} s")
-    assert folded - begun < 1.0
+    figure(words, folded - begun, "s", at_most(1.0))
+    figure("  folding", folded - opened, "s")
+    figure("  on the wall", wall, "s")
 
 
-def test_reading_is_linear_in_the_records(tmp_path: Path, say) -> None:
+def test_reading_is_linear_in_the_records(tmp_path: Path, figure) -> None:
     path = tmp_path / "journal.jsonl"
     when = line_format.now()
     lines = [encode(Entry(n + 1, *when, sampled(n, 20))) for n in range(RECORDS)]
@@ -104,8 +101,7 @@ def test_reading_is_linear_in_the_records(tmp_path: Path, say) -> None:
         path.write_bytes(b"".join(lines[:size]))
         quickest.append(min(_processor_seconds(lambda: fold(read_journal(path))) for _ in range(3)))
     growth = quickest[1] / quickest[0]
-    say("four times the records take", f"{growth:.1f} times as long", "at most 6")
-    assert growth < 6.0
+    figure("four times the records take, times as long", growth, "", at_most(6.0))
 
 
 def _processor_seconds(work: Callable[[], object]) -> float:

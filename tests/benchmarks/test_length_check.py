@@ -7,33 +7,26 @@ scale must hold the true scale.
 
 from __future__ import annotations
 
-import os
-from dataclasses import dataclass, replace
-
 import numpy as np
 import pytest
 
-from hexacell.campaign.planner import Plan
-from hexacell.campaign.task_accuracy import Task
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
-from hexacell.cell.uncertainty import UncertaintySettings
-from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import RecordPlacement
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import MeasurementSet
-from hexacell.robot.model import Robot
 from hexacell.robot.stated import stated_effects
-from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_records import JudgedGeometry, LengthRecords, LengthStandard
-from tests.benchmarks.imperfect_machine import ImperfectMachine
+from tests.benchmarks.figures import at_least
+from tests.benchmarks.samples import sample
+from tests.benchmarks.worlds.budgets import drawn, machine, settings_of
+from tests.benchmarks.worlds.campaigns import setting
+from tests.benchmarks.worlds.effects import Several
+from tests.benchmarks.worlds.encoders import Scale
+from tests.benchmarks.worlds.world import World
 
-MACHINES = int(os.environ.get("ROBOTS", "100"))
+MACHINES = sample(__name__, "MACHINES")
 COMMON_UM_M = 300.0
 """One standard deviation of the scale that all encoders have alike: ten to twenty times that of a grade."""
 
@@ -45,32 +38,7 @@ SEATS = {
 POSES = ((0.0, 0.0), (10.0, 0.0), (-10.0, 0.0), (0.0, 10.0), (0.0, -10.0))
 
 
-@dataclass(frozen=True, eq=False)
-class Calibrated:
-    """The robot, its records as they are planned, and what was found of it."""
-
-    robot: Robot
-    truth: Geometry
-    measurements: MeasurementSet
-    found: Identification
-    task: Task
-
-
-@pytest.fixture(scope="module")
-def calibrated(table_one) -> Calibrated:
-    settings = load_cell(bundled_config("simulated-hexaglide")).settings
-    robot, truth = table_one.robot, table_one.truth
-    plan = Plan(settings, robot, with_forecast=False)
-    campaign = VirtualCampaign(plan, VirtualRobot(robot, truth, np.random.default_rng(1)))
-    campaign.carry_out()
-    found = identify(robot.problem(campaign.measurements), find_outliers=False)
-    task = Task.of(settings, robot, robot.belief(found))
-    return Calibrated(robot, truth, campaign.measurements, found, task)
-
-
-def two_seats(
-    machine: ImperfectMachine, found: Identification, name: str, random: np.random.Generator
-) -> LengthRecords:
+def two_seats(world: World, found: Identification, name: str, random: np.random.Generator) -> LengthRecords:
     """The records of three mountings of a machine that is commanded with what was found of it."""
     start, direction = (np.array(one) for one in SEATS[name])
     rows = [(number, tilt) for number in (1, 2, 3) for tilt in POSES]
@@ -79,11 +47,8 @@ def two_seats(
     commands = PoseBatch.of(
         _pose(start + offset, *tilt) for offset, (_, tilt) in zip(offsets, rows, strict=True)
     )
-    robot, noise = machine.robot, machine.robot.noise
-    shown = robot.mechanism.inverse(found.geometry, robot.branch, commands)
-    missed = machine._missed(len(rows), random)
-    poses = machine._poses(shown, commands, np.zeros(len(rows)), np.zeros(3), missed)
-    balls = poses.positions + machine._oval(poses.rotations)
+    robot, noise = world.robot, world.robot.noise
+    shown, balls = world.touched(commands, found.geometry)
     seated = SEATING_MM * random.standard_normal((3, 3))[mountings - 1]
     true = DISTANCE_MM + CERTIFICATE_MM * random.standard_normal()
     seats = balls[0] + offsets * true / DISTANCE_MM + seated
@@ -100,48 +65,42 @@ def _pose(position: Array, a: float, b: float) -> Pose:
 
 @pytest.mark.parametrize("grade", ["precision", "ordinary"])
 @pytest.mark.parametrize("name", SEATS)
-def test_what_is_stated_after_a_length_check_holds(calibrated: Calibrated, grade, name, say) -> None:
-    robot, task = calibrated.robot, calibrated.task
-    sizes = UncertaintySettings(grade=grade, common_encoder_scale_um_m=COMMON_UM_M)
-    settings = load_cell(bundled_config("simulated-hexaglide")).settings
-    effects = stated_effects(settings.model_copy(update={"uncertainty": sizes}))
+def test_what_is_stated_after_a_length_check_holds(grade, name, figure) -> None:
+    own = setting(0)
+    robot, task = own.robot, own.task
+    stated = settings_of(grade)
+    sizes = stated.uncertainty.model_copy(update={"common_encoder_scale_um_m": COMMON_UM_M})
+    effects = stated_effects(stated.model_copy(update={"uncertainty": sizes}))
+    others = [effect for effect in machine(grade) if effect.name != "scale common to all encoders"]
     standard = LengthStandard(DISTANCE_MM, CERTIFICATE_MM, seating_mm=SEATING_MM)
     random = np.random.default_rng(21)
     scale_held, held, agreed, expanded = 0, 0, 0, []
-    for _ in range(MACHINES):
-        machine = ImperfectMachine.drawn(robot, calibrated.truth, _without_common(sizes), random)
+    for number in range(MACHINES):
         common = COMMON_UM_M * float(random.standard_normal())
-        machine = replace(machine, scales=machine.scales + 1e-6 * common)
-        records = machine.records(calibrated.measurements, calibrated.found.poses, random)
-        found = identify(robot.problem(records), find_outliers=False)
+        effect = Several((drawn(others, 1.0, random), Scale(1e-6 * common * np.ones(6))))
+        world = World(robot, own.truth, effect, number)
+        found = identify(robot.problem(world.records(own.commands, robot.commanding)), find_outliers=False)
         belief = robot.belief(found)
         budget = task.budget(found, belief, effects)
         assert budget is not None
         covariance = found.free_covariance * found.goodness.noise_factor**2
         judged = JudgedGeometry(covariance, budget.parameter_columns)
-        measured = two_seats(machine, found, name, random)
-        check = LengthCheck.of(measured, standard, robot.noise, judged, effects)
+        check = LengthCheck.of(
+            two_seats(world, found, name, random), standard, robot.noise, judged, effects
+        )
         after = task.budget(found, belief, effects, scale=check.observation)
         assert after is not None
-        stated = after.errors_of(np.zeros(len(found.free))).position
-        true = machine.largest_error(found, task, random)
-        scale_held += abs(check.encoders_long_um_m + common) <= check.expanded_um_m
-        held += abs(stated.value - true) <= stated.expanded
+        stated_error = after.errors_of(np.zeros(len(found.free))).position
+        reached = task.reachable(belief)
+        true = world.errors(found.geometry, reached.poses, reached.workspace).largest_once_mm
+        scale_held += abs(check.encoders_long_um_m - common) <= check.expanded_um_m
+        held += abs(stated_error.value - true) <= stated_error.expanded
         agreed += check.agreement.probability >= 1e-3
-        expanded.append((check.expanded_um_m, budget.expanded_mm, stated.expanded))
+        expanded.append((check.expanded_um_m, budget.expanded_mm, stated_error.expanded))
     scale_um_m, before, left = np.mean(expanded, axis=0)
-    say(
-        f"true scale within U ({scale_um_m:.0f} um/m), {name}, {grade}",
-        f"{scale_held / MACHINES:.1%}",
-        "93 to 98 %",
-    )
-    say("  the largest error within U of what is stated", f"{held / MACHINES:.1%}", "93 to 98 %")
-    say("  U of that, mm, without the check and with it", f"{before:.3f}, {left:.3f}", "")
-    say("  checks whose records agree", f"{agreed / MACHINES:.1%}", "99.9 %")
-    assert scale_held / MACHINES > 0.85
-    assert held / MACHINES > 0.9
-    assert agreed / MACHINES > 0.97
-
-
-def _without_common(sizes: UncertaintySettings) -> UncertaintySettings:
-    return sizes.model_copy(update={"common_encoder_scale_um_m": 0.0})
+    words = f"true scale within U ({scale_um_m:.0f} um/m), {name}, {grade}"
+    figure(words, scale_held / MACHINES, "", at_least(0.85))
+    figure("  the largest error within U of what is stated", held / MACHINES, "", at_least(0.9))
+    figure("  U of that without the check", before, "mm")
+    figure("  U of that with it", left, "mm")
+    figure("  checks whose records agree", agreed / MACHINES, "", at_least(0.97))

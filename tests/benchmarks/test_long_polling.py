@@ -3,7 +3,7 @@
 Every half second three gauges and six encoders are read; five readings and a comparison of the gauges'
 settings are a record. Faults begin in the middle of a record, last for some records and end; devices that
 failed are opened again, as a run does. Faults that no driver can see by itself (docs/device-faults.md) are
-left out. ``HOURS`` in the environment says how long it lasts.
+left out.
 """
 
 from __future__ import annotations
@@ -21,8 +21,10 @@ import numpy as np
 from hexacell.errors import DeviceError, HexacellError, flatten_errors
 from procedures.devices.settling import trimmed_mean
 from tests.benchmarks.faulty_cell import Fault, FaultyCell
+from tests.benchmarks.figures import NEVER, at_most
+from tests.benchmarks.samples import sample
 
-HOURS = float(os.environ.get("HOURS", "1"))
+HOURS = sample(__name__, "HOURS")
 POLL_S = 0.5
 READINGS = 5
 QUIET_RECORDS = 60
@@ -140,7 +142,7 @@ class Day:
         self._cell.stand_at(plungers, self._joints)
 
 
-async def test_a_day_of_polling_with_random_faults(say, monkeypatch) -> None:
+async def test_a_day_of_polling_with_random_faults(figure, monkeypatch) -> None:
     cell = FaultyCell(monkeypatch)
     day = Day(cell, Random(24))
     await cell.open()
@@ -152,19 +154,14 @@ async def test_a_day_of_polling_with_random_faults(say, monkeypatch) -> None:
     after, outcome = Resources.now(), day.outcome
     await cell.close()
     assert before is not None
-    faults = sum(outcome.injected.values())
-    say("simulated hours; records; wrong", f"{hours:.2f}; {outcome.records}; {len(outcome.wrong)}", "none")
-    say("faults; not told", f"{faults}; {sum(outcome.untold.values())}", "none")
-    say("errors without a fault", f"{sum(outcome.false_alarms.values())}", "none")
+    figure("simulated hours", hours)
+    figure("records", outcome.records)
+    figure("  wrong", len(outcome.wrong), "", NEVER)
+    figure("faults", sum(outcome.injected.values()))
+    figure("  not told", sum(outcome.untold.values()), "", NEVER)
+    figure("errors without a fault", sum(outcome.false_alarms.values()), "", NEVER)
     grown = after.memory_mib - before.memory_mib
-    say("memory grown in the last three quarters", f"{grown:.1f} MiB", f"at most {MEMORY_MIB:g}")
-    say("threads, descriptors more", f"{_more(before, after)}", "none")
-    assert not outcome.wrong, outcome.wrong
-    assert not outcome.untold, outcome.untold
-    assert not outcome.false_alarms, outcome.false_alarms
-    assert grown <= MEMORY_MIB
-    assert (after.threads, after.descriptors) <= (before.threads, before.descriptors)
-
-
-def _more(before: Resources, after: Resources) -> str:
-    return f"{after.threads - before.threads}, {after.descriptors - before.descriptors}"
+    figure("memory grown in the last three quarters", grown, "MiB", at_most(MEMORY_MIB))
+    figure("threads more", after.threads - before.threads, "", at_most(0))
+    figure("descriptors more", after.descriptors - before.descriptors, "", at_most(0))
+    assert not [*outcome.wrong, *outcome.untold, *outcome.false_alarms], outcome

@@ -2,20 +2,17 @@
 
 The demo's robot, points and orientations, on fake devices. With the noise measured at the first reference
 the residuals agree with it, and the verdict stands; with the stated noise the evidence fails. The limit is
-0.3 mm, as twice the noise of the sliders is a larger U. ``RUNS`` in the environment says how many runs
-there are of each.
+0.3 mm, as twice the noise of the sliders is a larger U.
 """
 
 from __future__ import annotations
 
 import asyncio
-import os
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
@@ -23,11 +20,11 @@ from hexacell.errors import HexacellError
 from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import read_journal
 from procedures.run.state import RunState, fold
+from tests.benchmarks.figures import NEVER, Figures, at_least, between
+from tests.benchmarks.samples import sample
 from tests.procedures.rig import new_rig
 
-pytestmark = pytest.mark.benchmark
-
-RUNS = int(os.environ.get("RUNS", "2"))
+RUNS = sample(__name__, "RUNS")
 MEASURED = {"noise__standstill_readings": 40, "noise__revisits": 6}
 STATED = {"noise__standstill_readings": 0, "noise__revisits": 0}
 
@@ -67,7 +64,7 @@ def passes(states: list[RunState]) -> int:
     return sum(state.judged is not None and state.judged.verdict is Verdict.PASS for state in states)
 
 
-def test_noisier_encoders_than_stated(tmp_path: Path, say: Any) -> None:
+def test_noisier_encoders_than_stated(tmp_path: Path, figure: Figures) -> None:
     states: dict[str, list[RunState]] = {}
     for name, how in (("measured", MEASURED), ("stated", STATED)):
         states[name] = []
@@ -77,12 +74,12 @@ def test_noisier_encoders_than_stated(tmp_path: Path, say: Any) -> None:
             states[name].append(whole_run(folder, seed, how))
     for name, found in states.items():
         ratios = [ratio_of(state) for state in found]
-        say(f"residuals over {name} noise, median of {RUNS} runs", f"{np.nanmedian(ratios):.2f}", "")
+        figure(f"residuals over {name} noise, median of {RUNS} runs", np.nanmedian(ratios))
     told = [state.noise for state in states["measured"] if state.noise is not None]
     sizes = [event.noise.encoders[0].record for event in told]
-    say("noise of the encoders, 0.03 mm, as measured, median", f"{np.median(sizes):.3f} mm", "0.02 to 0.04")
-    say("runs that pass with measured noise", f"{passes(states['measured'])} of {RUNS}", "more than half")
-    say("runs that pass with stated noise", f"{passes(states['stated'])} of {RUNS}", "none")
-    assert 0.02 < np.median(sizes) < 0.04
-    assert 2 * passes(states["measured"]) > RUNS
-    assert passes(states["stated"]) == 0
+    figure(
+        "noise of the encoders, 0.03 mm, as measured, median", np.median(sizes), "mm", between(0.02, 0.04)
+    )
+    least = at_least(RUNS // 2 + 1)
+    figure("runs that pass with measured noise", passes(states["measured"]), f"of {RUNS}", least)
+    figure("runs that pass with stated noise", passes(states["stated"]), f"of {RUNS}", NEVER)

@@ -1,7 +1,6 @@
 """Every mechanism that comes with the package: robots drawn within the tolerances of its bundled cell.
 
 Each is calibrated as a run does it, with the limits and the noise of the cell, and its result is verified.
-``ROBOTS`` in the environment says how many of each, ``MECHANISMS`` which bundled cells.
 """
 
 from __future__ import annotations
@@ -28,12 +27,12 @@ from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, make_robot, robot_of
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.verdict.decision import Verdict
+from tests.benchmarks.figures import NEVER, at_least, between
+from tests.benchmarks.samples import sample
 from tests.benchmarks.tolerance_bound import largest_chances
 from tests.benchmarks.virtual_calibration import robot_that_stands, verification_of
 
-pytestmark = pytest.mark.benchmark
-
-ROBOTS = int(os.environ.get("ROBOTS", "10"))
+ROBOTS = sample(__name__, "ROBOTS")
 CELLS = os.environ.get("MECHANISMS", "simulated-hexaglide gough-stewart linapod rotary-cranks").split()
 FAULTY = 100
 """Robots with one number out by twice its tolerance."""
@@ -107,52 +106,46 @@ def robots_of(name: str) -> tuple[Robot, tuple[Calibrated, ...]]:
 
 
 @pytest.mark.parametrize("name", CELLS)
-def test_robots_within_the_tolerances_are_identified_and_none_is_wrong(say, name: str) -> None:
+def test_robots_within_the_tolerances_are_identified_and_none_is_wrong(figure, name: str) -> None:
     _, every = robots_of(name)
     judged = [one for one in every if np.isfinite(one.true_mm)]
     for number, one in enumerate(every):
         if one.verdict is not Verdict.PASS:
-            say(f"  robot {number}", f"{one.true_mm:.3f}; {one.value_mm:.3f} +- {one.u_mm:.3f}", one.reason)
+            figure(f"  robot {number}: U {one.u_mm:.3f} mm; {one.reason}", one.true_mm, "mm")
     passed = sum(one.verdict is Verdict.PASS for one in every)
     wrong = sum(one.verdict is Verdict.PASS and not one.true_mm <= one.limit_mm for one in every)
     covered = sum(abs(one.value_mm - one.true_mm) <= one.u_mm for one in judged)
-    say(f"{name}: identified", f"{sum(one.found is not None for one in every)} of {ROBOTS}", "all")
-    say(f"{name}: pass", f"{passed} of {ROBOTS}", "reported")
-    say(f"{name}: pass though the error is above the limit", f"{wrong}", "none")
-    say(f"{name}: true error within U of the stated one", f"{covered} of {len(judged)}", "reported")
-    say(
-        f"{name}: largest true error at the task",
-        f"{max(one.true_mm for one in judged):.3f} mm",
-        "reported",
-    )
-    assert all(one.found is not None for one in every)
-    assert not wrong
+    identified = sum(one.found is not None for one in every)
+    figure(f"{name}: identified", identified, f"of {ROBOTS}", at_least(ROBOTS))
+    figure(f"{name}: pass", passed, f"of {ROBOTS}")
+    figure(f"{name}: pass though the error is above the limit", wrong, "", NEVER)
+    figure(f"{name}: true error within U of the stated one", covered, f"of {len(judged)}")
+    figure(f"{name}: largest true error at the task", max(one.true_mm for one in judged), "mm")
 
 
 @pytest.mark.parametrize("name", CELLS)
-def test_errors_are_those_of_the_bound(say, name: str) -> None:
+def test_errors_are_those_of_the_bound(figure, name: str) -> None:
     """Over all robots and parameters; the bound is that of the records and the tolerances together."""
     _, every = robots_of(name)
     shares = np.array([one.shares for one in every if one.found is not None])
     ratio = float(np.sqrt(np.mean(shares**2)))
-    say(f"{name}: rms error over the bound", f"{ratio:.3f}", "0.95 to 1.06, of 100 robots")
     spread = 0.055 * max(1.0, 10.0 / np.sqrt(len(shares)))
-    assert abs(ratio - 1.005) < spread
+    figure(f"{name}: rms error over the bound", ratio, "", between(1.005 - spread, 1.005 + spread))
 
 
 @pytest.mark.parametrize("name", CELLS)
-def test_no_record_is_outside_the_travel_and_no_robot_is_refused(say, name: str) -> None:
+def test_no_record_is_outside_the_travel_and_no_robot_is_refused(figure, name: str) -> None:
     _, every = robots_of(name)
-    outside, refused = sum(one.outside for one in every), sum(one.is_refused for one in every)
-    say(f"{name}: records outside the travel", f"{outside}", "none")
-    say(f"{name}: robots inside their tolerances refused", f"{refused} of {ROBOTS}", "none")
-    assert outside == 0
-    assert refused == 0
+    figure(f"{name}: records outside the travel", sum(one.outside for one in every), "", NEVER)
+    refused = sum(one.is_refused for one in every)
+    figure(f"{name}: robots inside their tolerances refused", refused, f"of {ROBOTS}", NEVER)
 
 
 @pytest.mark.parametrize("name", CELLS)
 @pytest.mark.parametrize("what", ["number", "joint"])
-def test_a_robot_out_by_twice_its_tolerance_is_refused_and_its_leg_named(say, name: str, what: str) -> None:
+def test_a_robot_out_by_twice_its_tolerance_is_refused_and_its_leg_named(
+    figure, name: str, what: str
+) -> None:
     """One number of a leg, or all coordinates of one of its joints, one length or one zero.
 
     The others are within the tolerances, and all are known as well as after a calibration.
@@ -160,29 +153,25 @@ def test_a_robot_out_by_twice_its_tolerance_is_refused_and_its_leg_named(say, na
     robot, every = robots_of(name)
     known = next(one.found for one in every if one.found is not None)
     found = [_found(robot, known, number, is_joint=what == "joint") for number in range(FAULTY)]
-    refused, named, besides, refused_exactly, named_exactly = (
-        sum(getattr(one, kind) for one in found)
-        for kind in ("is_refused", "is_named", "is_among", "is_refused_exactly", "is_named_exactly")
-    )
     refusable, nameable = (
-        100.0 * float(np.mean(shares)) for shares in zip(*(one.bounds for one in found), strict=True)
+        float(np.mean(shares)) for shares in zip(*(one.bounds for one in found), strict=True)
     )
-    say(f"{name}: a {what} out by twice its tolerance, refused", f"{refused} of {FAULTY}", "95, of a joint")
-    say(f"{name}:   at most, by any test", f"{refusable:.1f} %", "reported")
-    say(f"{name}:   were the robot known exactly", f"{refused_exactly} of {FAULTY}", "reported")
-    say(f"{name}:   with the right leg named", f"{named} of {FAULTY}", "95, of a joint")
-    say(f"{name}:   at most, by any test", f"{nameable:.1f} %", "reported")
-    say(f"{name}:   were the robot known exactly", f"{named_exactly} of {FAULTY}", "reported")
-    say(
-        f"{name}:   with the right leg named, or among those named beside",
-        f"{besides} of {FAULTY}",
-        "reported",
-    )
-    assert refused_exactly >= (0.95 if what == "joint" else 0.75) * FAULTY
-    assert named >= 0.5 * FAULTY
-    if what == "joint":
-        assert refused >= min(0.95, refusable / 100.0 - 0.03) * FAULTY
-        assert besides >= min(0.95, refusable / 100.0 - 0.03) * FAULTY
+    is_joint, best = what == "joint", min(0.95, refusable - 0.03) * FAULTY
+    for kind, words, least in (
+        ("is_refused", "refused", best if is_joint else None),
+        (
+            "is_refused_exactly",
+            "refused were the robot known exactly",
+            (0.95 if is_joint else 0.75) * FAULTY,
+        ),
+        ("is_named", "right leg named", 0.5 * FAULTY),
+        ("is_named_exactly", "right leg named were the robot known exactly", None),
+        ("is_among", "right leg named or among those named beside", best if is_joint else None),
+    ):
+        count, target = sum(getattr(one, kind) for one in found), None if least is None else at_least(least)
+        figure(f"{name}: a {what} out by twice its tolerance, {words}", count, f"of {FAULTY}", target)
+    figure(f"{name}: a {what}, refused at most by any test", refusable)
+    figure(f"{name}: a {what}, leg named at most by any test", nameable)
 
 
 @dataclass(frozen=True, slots=True)

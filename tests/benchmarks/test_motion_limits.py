@@ -1,19 +1,14 @@
 """Whole campaigns within limits of motion: what real robots are commanded to, and what the limits cost.
 
 Robots are drawn within the tolerances and move along the controller's lines on their own geometry, which
-the program does not know. ``CAMPAIGNS`` in the environment says how many there are; the targets are for
-1,000, which take an hour of processor time. All cores are used, or those of ``taskset``. What came of the
-robots so far is told every ``TOLD_EVERY`` robots, so that a run that is ended has told something, too.
+the program does not know. The targets are for 1,000, which take an hour of processor time.
 """
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -33,28 +28,25 @@ from hexacell.limits.limits import Limits
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, controller_geometry, make_robot, robot_of
 from procedures.calibration.held_out_poses import HeldOutPoses
-from tests.benchmarks.conftest import Say
+from tests.benchmarks.figures import NEVER, at_least, at_most
+from tests.benchmarks.machines import on_all_cores
+from tests.benchmarks.samples import sample
 from tests.benchmarks.virtual_calibration import robot_that_reaches, stands_at
 from tests.benchmarks.watched_robot import Seen, WatchedRobot, watch
 from tests.records_within_travel import within_travel
 from tests.simulated_campaign import SimulatedCampaign
 
-pytestmark = pytest.mark.benchmark
-
-CAMPAIGNS = int(os.environ.get("CAMPAIGNS", "40"))
+CAMPAIGNS = sample(__name__, "CAMPAIGNS")
 DESIGNS = 60
 """Fixed designs, of which the best is compared."""
 
-COMPARED = 6
+COMPARED = sample(__name__, "COMPARED")
 """Robots on which it is."""
 
 CANDIDATES = 512
 """Of held-out poses."""
 
 MOST_TIMES = 1.3
-
-TOLD_EVERY = 20
-"""Robots."""
 
 
 @dataclass(frozen=True)
@@ -146,23 +138,6 @@ def outcome(number: int, path: Path = BUNDLED) -> Outcome:
     )
 
 
-def outcomes(numbers: range, path: Path, limits: Limits, say: Say) -> list[Outcome]:
-    found: list[Outcome] = []
-    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), mp_context=get_context("fork")) as pool:
-        for one in pool.map(partial(outcome, path=path), numbers, chunksize=1):
-            found.append(one)
-            if len(found) % TOLD_EVERY == 0:
-                beyond = [robot.number for robot in found if not keeps(limits, robot.seen)]
-                given_up = [robot.number for robot in found if robot.reason]
-                moves = sum(robot.seen.moves for robot in found)
-                say(
-                    f"  after {len(found)} robots, {moves} moves: beyond limits, given up",
-                    f"{beyond}, {given_up}",
-                    "none, none",
-                )
-    return found
-
-
 def keeps(limits: Limits, seen: Seen) -> bool:
     """Whether no command, and no stop on a way, left the limits of motion."""
     assert limits.legs is not None
@@ -180,40 +155,39 @@ def keeps(limits: Limits, seen: Seen) -> bool:
 @pytest.mark.parametrize(
     "path", [BUNDLED, AT_LINUXCNC, HEXAPOD], ids=["bundled", "limits of an INI file", "hexapod"]
 )
-def test_no_command_leaves_the_limits(say, path: Path):
+def test_no_command_leaves_the_limits(figure, path: Path):
     cell, robot = cell_at(path)
     limits = robot.limits
-    found = outcomes(range(CAMPAIGNS), path, limits, say)
+    found = on_all_cores(partial(outcome, path=path), range(CAMPAIGNS))
     assert limits.legs is not None
     cone = float(np.degrees(limits.legs.platform_cones.min()))
     seen = [one.seen for one in found]
-    given_up = [one for one in found if one.reason]
-    say("robots, moves", f"{len(found)}, {sum(one.moves for one in seen)}", f"{CAMPAIGNS}")
-    largest = max(one.tilt for one in seen), max(one.turn for one in seen)
-    say("  largest tilt of a command", f"{largest[0]:.1f} deg", f"at most {np.degrees(limits.tilt):g}")
-    say("  largest turn of a command", f"{largest[1]:.1f} deg", f"at most {np.degrees(limits.turn):g}")
+    figure("robots", len(found))
+    figure("moves", sum(one.moves for one in seen))
+    tilt, turn = (np.degrees(one) + 1e-6 for one in (limits.tilt, limits.turn))
+    figure("  largest tilt of a command", max(one.tilt for one in seen), "deg", at_most(tilt))
+    figure("  largest turn of a command", max(one.turn for one in seen), "deg", at_most(turn))
     axes = np.max([one.largest for one in seen], axis=0)
     of_axes = np.minimum(-np.array(limits.axes.lowest), limits.axes.highest)
-    say("  largest command of a, b, c", f"{axes[3:].round(1)} deg", f"at most {of_axes[3:]}")
-    turned = np.array([cone - one.spare for one in seen])
-    say("  largest angle of a passive joint", f"{turned.max():.1f} deg", f"at most {cone:g}")
-    near = np.array([one.distance_mm for one in seen])
-    say("  smallest distance of legs", f"{near.min():.1f} mm", f"at least {limits.legs.distance_mm:g}")
-    beyond = [one.number for one in found if one.seen.spare < 0.0]
-    close = [one.number for one in found if one.seen.distance_mm < limits.legs.distance_mm]
-    say("  robots beyond a cone, with legs too near", f"{len(beyond)}, {len(close)}", f"none; {beyond[:9]}")
+    for axis, name in enumerate("abc", start=3):
+        figure(f"  largest command of {name}, limit {of_axes[axis]:g}", axes[axis], "deg")
+    figure(
+        "  largest angle of a passive joint", cone - min(one.spare for one in seen), "deg", at_most(cone)
+    )
+    distance, least = min(one.distance_mm for one in seen), at_least(limits.legs.distance_mm)
+    figure("  smallest distance of legs", distance, "mm", least)
+    beyond = [one.number for one in found if not keeps(limits, one.seen)]
+    figure("  robots of which a command, or a stop on a way, left the limits", len(beyond), "", NEVER)
     margins = [one.margin for one in found if np.isfinite(one.margin)]
-    say("  smallest singularity margin on the way", f"{min(margins):.4f}", "")
+    figure("  smallest singularity margin on the way", min(margins, default=None))
     left = sum(one.points < len(cell.settings.identification.points) for one in found)
     visited, planned = sum(one.held_out for one in found), 2 * len(cell.settings.verification.points)
-    say("  held-out points visited, before and after", f"{visited} of {planned * len(found)}", "")
-    say("  given up; with a point left whose reference is beyond", f"{len(given_up)}; {left}", "none;")
-    for one in given_up:
-        say("  given up", f"{one.number}", one.reason)
-    sigmas = np.array([one.sigma_mm for one in found])
-    say("  sigma at the worst task pose, median", f"{np.nanmedian(sigmas):.3f} mm", "")
-    assert [one.number for one in found if not keeps(limits, one.seen)] == []
-    assert not given_up
+    figure("  held-out points visited, before and after", visited, f"of {planned * len(found)}")
+    given_up = [f"{one.number}: {one.reason}" for one in found if one.reason]
+    figure("  given up", len(given_up), "; ".join(given_up), NEVER)
+    figure("  with a point left whose reference is beyond", left)
+    figure("  sigma at the worst task pose, median", np.nanmedian([one.sigma_mm for one in found]), "mm")
+    assert not beyond, beyond
 
 
 def best_fixed(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Generator) -> float:
@@ -243,13 +217,12 @@ def compared(number: int) -> tuple[float, float]:
     return outcome(number).sigma_mm, best_fixed(cell, robot, truth, random)
 
 
-def test_accuracy_beside_the_best_fixed_design(say):
-    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
-        pairs = np.array(list(pool.map(compared, range(COMPARED), chunksize=1)))
+def test_accuracy_beside_the_best_fixed_design(figure):
+    pairs = np.array(on_all_cores(compared, range(COMPARED)))
     pairs = pairs[np.isfinite(pairs).all(axis=1)]
     assert len(pairs) > COMPARED // 2
     ratios = pairs[:, 0] / pairs[:, 1]
-    say("sigma at the worst task pose: campaign", f"{np.median(pairs[:, 0]):.4f} mm", "")
-    say(f"  best of {DESIGNS} fixed designs", f"{np.median(pairs[:, 1]):.4f} mm", "")
-    say("  times as large, median and largest", f"{np.median(ratios):.2f}, {ratios.max():.2f}", "1.3")
-    assert np.median(ratios) <= MOST_TIMES
+    figure("sigma at the worst task pose, median: campaign", np.median(pairs[:, 0]), "mm")
+    figure(f"  best of {DESIGNS} fixed designs", np.median(pairs[:, 1]), "mm")
+    figure("  times as large, median", np.median(ratios), "", at_most(MOST_TIMES))
+    figure("  times as large, most", ratios.max())

@@ -1,32 +1,30 @@
 """Random mutations of everything that the program is given, through the entry points of its commands.
 
-``MUTATIONS`` in the environment says how many; the target is for 10,000. All cores are used. One in
-two hundred is a process of its own.
+One in two hundred is a process of its own.
 """
 
 from __future__ import annotations
 
-import os
 import random
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from tests.benchmarks.figures import NEVER, at_most
+from tests.benchmarks.machines import on_all_cores
+from tests.benchmarks.samples import sample
 from tests.mutations.attempts import Attempt, Place
 from tests.mutations.kinds import drawn_trial
 from tests.mutations.prompts import answers_to_prompts
 from tests.mutations.sound_cells import few_choices, make_templates
 from tests.mutations.trials import Templates
 
-pytestmark = pytest.mark.benchmark
-
-MUTATIONS = int(os.environ.get("MUTATIONS", "100"))
+MUTATIONS = sample(__name__, "MUTATIONS")
 TOGETHER = 20
 """Trials that a worker makes in a row."""
 
@@ -70,27 +68,20 @@ def several(templates: Templates, seeds: range) -> list[Tried]:
         return [tried(templates, seed, Path(folder)) for seed in seeds]
 
 
-def test_mutated_input_is_refused_or_used(templates, say) -> None:
+def test_mutated_input_is_refused_or_used(templates, figure) -> None:
     parts = [range(n, min(n + TOGETHER, MUTATIONS)) for n in range(0, MUTATIONS, TOGETHER)]
-    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
-        found: list[Tried] = []
-        for part in pool.map(several, [templates] * len(parts), parts):
-            found += part
-            for one in filter(is_wrong, part):
-                print(
-                    f"\n  seed {one.seed}, {one.kind}, {one.found.seconds:.1f} s: {one.found}", flush=True
-                )
-            if len(found) % 200 == 0:
-                print(f"\n  {len(found)} of {MUTATIONS}", end="", flush=True)
+    found = [one for part in on_all_cores(partial(several, templates), parts) for one in part]
+    for one in filter(is_wrong, found):
+        print(f"\n  seed {one.seed}, {one.kind}, {one.found.seconds:.1f} s: {one.found}", flush=True)
+    for kind, count in Counter(one.kind for one in found).most_common():
+        figure(f"mutations tried: {kind}", count)
     codes = Counter(one.found.code for one in found)
-    kinds = Counter(one.kind for one in found)
-    slow = [one for one in found if one.found.seconds > LONGEST_S]
-    slowest = max(found, key=lambda one: one.found.seconds)
-    wrong = [one for one in found if one.found.problems]
-    say("mutations tried", str(len(found)), ", ".join(f"{n} {kind}" for kind, n in kinds.most_common()))
-    say("exit codes", ", ".join(f"{code}: {n}" for code, n in sorted(codes.items())), "never 70")
-    say("with a traceback, a warning or a change outside", str(len(wrong)), "none")
-    say("longest answer, s of processor time", f"{slowest.found.seconds:.1f}", f"{LONGEST_S:g}")
-    say("answers that took longer", str(len(slow)), "none")
-    assert not wrong
-    assert not slow
+    figure("exit codes", ", ".join(f"{code}: {n}" for code, n in sorted(codes.items())))
+    figure(
+        "with a traceback, a warning or a change outside",
+        sum(bool(one.found.problems) for one in found),
+        "",
+        NEVER,
+    )
+    slowest = max(one.found.seconds for one in found)
+    figure("longest answer, processor time", slowest, "s", at_most(LONGEST_S))

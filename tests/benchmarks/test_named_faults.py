@@ -1,13 +1,9 @@
 """Mistakes in the records of good and of imperfect machines: are they named?
 
 And where the machine itself is at fault, and nothing may be named: what is listed first?
-
-``RUNS`` in the environment says how many machines there are of each kind.
 """
 
 from __future__ import annotations
-
-import os
 
 import numpy as np
 import pytest
@@ -17,13 +13,15 @@ from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.identification.solver.result import DataFault, GaugeFaultError
 from hexacell.measurements.records import MeasurementSet
 from hexacell.uncertainty.possible_causes import possible_causes
+from tests.benchmarks.figures import at_least
+from tests.benchmarks.samples import sample
 from tests.benchmarks.worlds.campaigns import Setting
 from tests.benchmarks.worlds.kinds import NONE, ORDINARY, PRECISION
 from tests.benchmarks.worlds.mistakes import MISTAKES, Mistake
 from tests.benchmarks.worlds.table import least_by_chance
 from tests.benchmarks.worlds.trials import Trial, world_of
 
-RUNS = int(os.environ.get("RUNS", "1"))
+RUNS = sample(__name__, "RUNS")
 MACHINES = 6
 """Of each kind, for one run."""
 
@@ -68,15 +66,14 @@ def are_named(mistake: Mistake, kind: str) -> list[bool]:
 
 
 @pytest.mark.parametrize(("kind", "least"), NAMED_SHARES.items())
-def test_mistakes_are_named(say, kind, least):
+def test_mistakes_are_named(figure, kind, least):
     every: list[bool] = []
     for mistake in MISTAKES:
         results = are_named(mistake, kind)
         every += results
-        say(f"{mistake.name}, {kind}", f"{sum(results)} of {len(results)}", "named")
-    share = 100 * sum(every) / len(every)
-    say(f"all mistakes, {kind}", f"{share:.1f} %", f"at least {100 * least:.0f} %")
-    assert sum(every) >= least_by_chance(least, len(every))
+        figure(f"{mistake.name}, {kind}: named", sum(results), f"of {len(results)}")
+    target = at_least(least_by_chance(least, len(every)))
+    figure(f"all mistakes, {kind}: named", sum(every), f"of {len(every)}", target)
 
 
 def listed_first(kind: str, factor: float) -> list[str]:
@@ -90,13 +87,13 @@ def listed_first(kind: str, factor: float) -> list[str]:
     return names
 
 
-def test_what_is_wrong_with_a_machine_explains_most(say):
+def test_what_is_wrong_with_a_machine_explains_most(figure):
     right = every = 0
     for kind, (name, factor) in FIRST_LISTED.items():
         first = listed_first(kind, factor)
         hits = sum(one.startswith(name) for one in first)
         right, every = right + hits, every + len(first)
-        say(f"{factor:g} times {kind}: {name} ... is listed first", f"{hits} of {len(first)}", "")
-    say("the right cause is listed first", f"{100 * right / every:.0f} %", f"{100 * FIRST_SHARE:.0f} %")
+        figure(f"{factor:g} times {kind}: {name} ... is listed first", hits, f"of {len(first)}")
+    target = at_least(least_by_chance(FIRST_SHARE, every))
+    figure("the right cause is listed first", right, f"of {every}", target)
     assert every > 3 * len(FIRST_LISTED) * RUNS
-    assert right >= least_by_chance(FIRST_SHARE, every)

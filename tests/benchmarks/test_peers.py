@@ -1,22 +1,17 @@
-"""What ``make bench-peers`` compares, on few robots: who must agree, and what the choice of poses is worth.
-
-``ROBOTS`` in the environment says how many robots.
-"""
+"""What ``make bench-peers`` compares, on few robots: who must agree, what chosen poses are worth."""
 
 from __future__ import annotations
-
-import os
 
 import numpy as np
 import pytest
 
+from tests.benchmarks.figures import at_most
 from tests.benchmarks.peers.__main__ import compare
 from tests.benchmarks.peers.comparison import WHOLE, Comparison, Way
 from tests.benchmarks.peers.turns import exponential, left_jacobian
+from tests.benchmarks.samples import sample
 
-pytestmark = pytest.mark.benchmark
-
-ROBOTS = int(os.environ.get("ROBOTS", "2"))
+ROBOTS = sample(__name__, "ROBOTS")
 OURS, IPOPT, CERES, PAPER = "hexacell_estimator", "casadi_poses", "ceres_poses", "paper_least_squares"
 
 
@@ -33,23 +28,22 @@ def errors(compared: Comparison, peer: str, way: Way) -> list[float]:
 
 
 @pytest.mark.parametrize("way", [Way.CHOSEN, Way.AIMED])
-def test_both_libraries_find_the_same_minimum(compared, say, way: Way) -> None:
+def test_both_libraries_find_the_same_minimum(compared, figure, way: Way) -> None:
     apart = np.abs(np.subtract(errors(compared, IPOPT, way), errors(compared, CERES, way))).max()
-    say(f"IPOPT and Ceres, {way} poses: rms errors differ by", f"{apart:.1e} mm", "the same minimum")
-    assert apart < 1e-6
+    figure(f"IPOPT and Ceres, {way} poses: rms errors differ by", apart, "mm", at_most(1e-6))
 
 
-def test_ours_is_no_worse_where_records_determine_the_robot(compared, say) -> None:
+def test_ours_is_no_worse_where_records_determine_the_robot(compared, figure) -> None:
     ours, theirs = (np.median(errors(compared, peer, Way.CHOSEN)) for peer in (OURS, IPOPT))
-    say("ours, and IPOPT with exact noise model", f"{ours:.4f}, {theirs:.4f} mm", "at most 1.05 times")
-    assert ours <= 1.05 * theirs
+    figure("IPOPT with exact noise model", theirs, "mm")
+    figure("ours", ours, "mm", at_most(1.05 * theirs))
 
 
-def test_chosen_poses_are_worth_more_than_any_estimator(compared, say) -> None:
+def test_chosen_poses_are_worth_more_than_any_estimator(compared, figure) -> None:
     chosen = np.median(errors(compared, OURS, Way.CHOSEN))
     best = min(np.median(errors(compared, peer, Way.RANDOM)) for peer in compared.results)
-    say("ours in chosen poses, the best peer in random ones", f"{chosen:.3f}, {best:.3f} mm", "a third")
-    assert 3.0 * chosen <= best
+    figure("the best peer in random poses", best, "mm")
+    figure("ours in chosen poses", chosen, "mm", at_most(best / 3.0))
 
 
 def test_turns_change_as_the_ceres_peer_derives_them() -> None:

@@ -4,13 +4,12 @@ An answer takes at least the latency of the instrument, and the time of request 
 the driver adds is what it waits beyond that, in the simulated time of lines inside this process, and its
 processor time: that of the line's thread, and that of the event loop for all three gauges. So other work on
 the machine counts little. What comes of it on pseudo-terminals in real time, with the machine as it is, is
-said beside it. ``POLLS`` in the environment says how often each gauge is polled.
+said beside it.
 """
 
 from __future__ import annotations
 
 import asyncio
-import os
 import time
 from dataclasses import dataclass
 
@@ -24,9 +23,11 @@ from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.plugins import Group, load
+from tests.benchmarks.figures import at_least
 from tests.benchmarks.line_in_process import Damage, InstrumentLine, LineTime, have_lines
+from tests.benchmarks.samples import sample
 
-POLLS = int(os.environ.get("POLLS", "100"))
+POLLS = sample(__name__, "POLLS")
 LEAST_SHARE = 0.95
 SHOWN_MM = 1.234
 AXES = ("x", "y", "z")
@@ -79,15 +80,14 @@ CELLS = {
 @pytest.mark.parametrize("name", CELLS)
 @pytest.mark.parametrize("call", FRAMES_A_CALL)
 async def test_three_gauges_are_polled_as_often_as_their_lines_allow(
-    name: str, call: str, say, monkeypatch
+    name: str, call: str, figure, monkeypatch
 ) -> None:
     cell = CELLS[name]
     on_terminals = await _on_terminals(cell, call)
     share, processor_s = await _in_process(cell, call, monkeypatch)
-    say(f"{name}, {call}: of what the lines allow", f"{100 * share:.1f} %", "at least 95 %")
-    say("  processor time of a call", f"{1e6 * processor_s:.0f} us", "")
-    say("  on pseudo-terminals, with the machine as it is now", f"{100 * on_terminals:.1f} %", "")
-    assert share >= LEAST_SHARE
+    figure(f"{name}, {call}: of what the lines allow", share, "", at_least(LEAST_SHARE))
+    figure("  processor time of a call", 1e6 * processor_s, "us")
+    figure("  on pseudo-terminals, with the machine as it is now", on_terminals)
 
 
 async def _in_process(cell: Cell, call: str, monkeypatch) -> tuple[float, float]:

@@ -2,69 +2,43 @@
 
 The machine of the bundled cell is calibrated once. Then its true geometry differs from the result by what
 the result's covariance allows, and each parameter drifts by up to 0.2 mm more. It is measured by the quick
-level with the budget of the cell, and by a whole calibration from the drawing. ``ROBOTS`` in the
-environment says how many machines drift; the targets are for 100. All cores are used.
+level with the budget of the cell, and by a whole calibration from the drawing.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
 
-from hexacell.campaign.planner import Plan
 from hexacell.campaign.task_accuracy import Task
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import Cell, load_cell
-from hexacell.checks.check import Check, identified_before
 from hexacell.checks.quick_level import QuickLevel
-from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import free_parameter_derivatives
-from hexacell.kinematics.rotations import Array
-from hexacell.robot.model import Robot, robot_of
+from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.verdict.decision import ErrorLimits
+from tests.benchmarks.figures import NEVER, at_least, at_most
+from tests.benchmarks.machines import (
+    STATED_DRIFT_MM,
+    Calibrated,
+    bundled,
+    calibrated,
+    on_all_cores,
+    whole_campaign,
+)
+from tests.benchmarks.samples import sample
 
-Say = Callable[[str, str, str], None]
-
-pytestmark = pytest.mark.benchmark
-
-ROBOTS = int(os.environ.get("ROBOTS", "12"))
+ROBOTS = sample(__name__, "ROBOTS")
 SEED = 14
 LARGE_MM, SMALL_MM = 0.2, 0.01
 """Drifts, uniform in both directions."""
 
-STATED_MM = 0.02
-"""What the cell file states a parameter may have drifted, one sigma."""
-
-EFFORT = SearchEffort(candidates=128)
 PARITY = 70
 ALLOWANCE = 1.5 / ROBOTS
-
-
-@dataclass(frozen=True, eq=False)
-class Calibrated:
-    """A machine whose controller has an identified geometry, with its covariance (P, P), mm^2."""
-
-    robot: Robot
-    covariance: Array
-
-    def quick(self, budget: int, drift_mm: float) -> QuickLevel:
-        settings = bundled().settings
-        before = identified_before(self.robot, self.covariance, drift_mm)
-        limits = ErrorLimits.of(settings.acceptance)
-        return QuickLevel(Check(settings, self.robot, before, limits, budget, effort=EFFORT), budget)
 
 
 @dataclass(frozen=True)
@@ -83,41 +57,11 @@ class Outcome:
     refused: str = ""
 
 
-@lru_cache
-def bundled() -> Cell:
-    """Its settings cannot be sent to another process."""
-    return load_cell(bundled_config("simulated-hexaglide"))
-
-
-@lru_cache
-def calibrated() -> Calibrated:
-    cell = bundled()
-    robot = robot_of(cell)
-    assert cell.settings.simulation is not None
-    actual = Geometry.of(robot.mechanism.parameters, cell.settings.simulation.geometry.model_dump())
-    truth = robot.mechanism.normalize_frames(actual)[0]
-    campaign = whole_campaign(cell, robot, truth, 1)
-    found = identify(robot.problem(campaign.measurements))
-    frames = robot.mechanism.normalize_frames(found.geometry)[1]
-    return Calibrated(replace(robot, controller=found.geometry, frames=frames), found.covariance)
-
-
-def whole_campaign(cell: Cell, robot: Robot, truth: Geometry, seed: int) -> VirtualCampaign:
-    plan = Plan(cell.settings, robot, effort=EFFORT, with_forecast=False)
-    campaign = VirtualCampaign(plan, VirtualRobot(robot, truth, np.random.default_rng(seed)))
-    campaign.carry_out()
-    return campaign
-
-
 def drifted(known: Calibrated, drift_mm: float, number: int) -> Geometry:
-    robot, random = known.robot, np.random.default_rng([SEED, number])
-    convention = robot.mechanism.convention
-    rows = robot.mechanism.convention.free_rows
+    random, rows = np.random.default_rng([SEED, number]), known.robot.mechanism.convention.free_rows
     factor = np.linalg.cholesky(known.covariance[np.ix_(rows, rows)])
-    by_every = free_parameter_derivatives(robot.mechanism, robot.commanding)
     change = factor @ random.standard_normal(len(factor))
-    change += random.uniform(-drift_mm, drift_mm, len(by_every)) @ by_every
-    return convention.geometry(convention.free_parameters(robot.commanding) + change)
+    return known.built(change + random.uniform(-drift_mm, drift_mm, len(known.by_every)) @ known.by_every)
 
 
 def outcome(known: Calibrated, robot: Robot, found: Identification, truth: Geometry) -> Outcome:
@@ -136,7 +80,8 @@ def outcome(known: Calibrated, robot: Robot, found: Identification, truth: Geome
 
 def by_quick_level(job: tuple[int, float, float, int]) -> Outcome:
     known, (budget, stated_mm, drift_mm, number) = calibrated(), job
-    truth, quick = drifted(known, drift_mm, number), known.quick(budget, stated_mm)
+    truth = drifted(known, drift_mm, number)
+    quick = QuickLevel(known.check(budget, stated_mm), budget)
     plan = replace(quick.plan, with_forecast=False)
     campaign = VirtualCampaign(plan, VirtualRobot(known.robot, truth, np.random.default_rng([2, number])))
     campaign.carry_out()
@@ -157,81 +102,71 @@ def by_calibration(job: tuple[float, int]) -> Outcome:
     return outcome(known, known.robot, identify(known.robot.problem(measured)), truth)
 
 
-@dataclass(frozen=True)
-class Compared:
-    quick: tuple[Outcome, ...]
-    whole: tuple[Outcome, ...]
-    generous: tuple[Outcome, ...]
-    little: tuple[Outcome, ...]
-    ratios: tuple[float, ...]
-
-
 @pytest.fixture(scope="module")
-def compared() -> Compared:
+def compared() -> dict[str, list[Outcome]]:
     calibrated()  # once, before the processes are made
     budget, numbers = bundled().settings.quick.budget_records, range(ROBOTS)
-    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
-        quick = tuple(pool.map(by_quick_level, [(budget, STATED_MM, LARGE_MM, one) for one in numbers]))
-        whole = tuple(pool.map(by_calibration, [(LARGE_MM, one) for one in numbers]))
-        generous = tuple(pool.map(by_quick_level, [(PARITY, STATED_MM, LARGE_MM, one) for one in numbers]))
-        little = tuple(pool.map(by_quick_level, [(budget, SMALL_MM, SMALL_MM, one) for one in numbers]))
-    ratios = tuple(one.error_mm / other.error_mm for one, other in zip(quick, whole, strict=True))
-    return Compared(quick, whole, generous, little, ratios)
+
+    def quick(budget: int, stated_mm: float, drift_mm: float) -> list[Outcome]:
+        return on_all_cores(by_quick_level, [(budget, stated_mm, drift_mm, one) for one in numbers])
+
+    return {
+        "quick": quick(budget, STATED_DRIFT_MM, LARGE_MM),
+        "whole": on_all_cores(by_calibration, [(LARGE_MM, one) for one in numbers]),
+        "generous": quick(PARITY, STATED_DRIFT_MM, LARGE_MM),
+        "little": quick(budget, SMALL_MM, SMALL_MM),
+    }
 
 
-def middle(found: tuple[Outcome, ...], name: str) -> float:
+def middle(found: list[Outcome], name: str) -> float:
     return float(np.median([getattr(one, name) for one in found]))
 
 
-def covered(found: tuple[Outcome, ...]) -> float:
-    return float(np.mean([one.true_mm <= one.expanded_mm for one in found]))
+def ratios(compared: dict[str, list[Outcome]], which: str) -> list[float]:
+    """Predicted errors over those of a calibration of the same machine."""
+    pairs = zip(compared[which], compared["whole"], strict=True)
+    return [one.error_mm / other.error_mm for one, other in pairs]
 
 
-def test_few_records_leave_at_most_twice_the_error_of_a_calibration(compared, say) -> None:
-    ratio = float(np.median(compared.ratios))
-    records, whole = middle(compared.quick, "records"), middle(compared.whole, "records")
-    say(f"machines drifted by up to {LARGE_MM} mm a parameter", f"{ROBOTS}", "100")
-    say("records of the quick level, of a calibration, median", f"{records:.0f}, {whole:.0f}", "24")
-    errors = f"{middle(compared.quick, 'error_mm'):.3f}, {middle(compared.whole, 'error_mm'):.3f} mm"
-    say("  predicted error at the worst task pose (one sigma)", errors, "")
-    shown = f"{ratio:.2f}, {max(compared.ratios):.2f}"
-    say("  the first over the second: median, largest", shown, "at most 2 at the median")
-    assert records <= 24
-    assert ratio <= 2.0
+def test_few_records_leave_at_most_twice_the_error_of_a_calibration(compared, figure) -> None:
+    of, found = (
+        f"of {ROBOTS} machines drifted by up to {LARGE_MM} mm a parameter",
+        ratios(compared, "quick"),
+    )
+    figure(
+        f"records of the quick level, median {of}", middle(compared["quick"], "records"), "", at_most(24)
+    )
+    figure("  of a calibration", middle(compared["whole"], "records"))
+    for name in ("quick", "whole"):
+        figure(
+            f"  {name}: predicted error at the worst task pose", middle(compared[name], "error_mm"), "mm"
+        )
+    figure("  the first over the second: median", np.median(found), "", at_most(2.0))
+    figure("  largest", max(found))
 
 
-def test_the_error_is_stated_honestly(compared, say) -> None:
-    for name, found in (("quick level", compared.quick), ("small drifts", compared.little)):
-        share, true_mm = covered(found), middle(found, "true_mm")
-        say(f"U covers the true error, {name}", f"{100 * share:.0f} %", "at least 93 %")
-        say("  true error and U, median", f"{true_mm:.3f}, {middle(found, 'expanded_mm'):.3f} mm", "")
-        assert share >= 0.93 - ALLOWANCE
+@pytest.mark.parametrize("which", ["quick", "little"])
+def test_the_error_is_stated_honestly(compared, figure, which) -> None:
+    found = compared[which]
+    share = np.mean([one.true_mm <= one.expanded_mm for one in found])
+    figure(f"U covers the true error, {which}", share, "", at_least(0.93 - ALLOWANCE))
+    figure("  true error, median", middle(found, "true_mm"), "mm")
+    figure("  U, median", middle(found, "expanded_mm"), "mm")
+    refused = [one.refused for one in found if one.refused]
+    figure("  machines whose records were refused", len(refused), "; ".join(refused), NEVER)
 
 
-def test_no_machine_is_refused(compared, say) -> None:
-    refused = [one.refused for one in (*compared.quick, *compared.little) if one.refused]
-    say("machines whose records were refused", f"{len(refused)}", "none")
-    assert not refused
-
-
-def test_a_larger_budget_reaches_the_calibration_and_no_more_is_measured(compared, say) -> None:
+def test_a_larger_budget_reaches_the_calibration_and_no_more_is_measured(compared, figure) -> None:
     """The rows of the calibration and of the larger budget are of the same machines."""
-    records = middle(compared.generous, "records")
-    ratio = float(
-        np.median([a.error_mm / b.error_mm for a, b in zip(compared.generous, compared.whole, strict=True)])
-    )
-    say(f"with {PARITY} records allowed: records, error ratio", f"{records:.0f}, {ratio:.2f}", "about 1")
-    told = [one.records + one.told for one in compared.quick if one.told is not None]
-    say("  what the first runs had said would be needed, median", f"{np.median(told):.0f}", "")
-    assert ratio <= 1.15
-    assert records <= PARITY
+    records = middle(compared["generous"], "records")
+    figure(f"with {PARITY} records allowed: records", records, "", at_most(PARITY))
+    figure("  error ratio", np.median(ratios(compared, "generous")), "", at_most(1.15))
+    told = [one.records + one.told for one in compared["quick"] if one.told is not None]
+    figure("  what the first runs had said would be needed, median", np.median(told) if told else None)
 
 
-def test_small_drifts_need_few_records(compared, say) -> None:
-    ratio = float(
-        np.median([a.error_mm / b.error_mm for a, b in zip(compared.little, compared.whole, strict=True)])
+def test_small_drifts_need_few_records(compared, figure) -> None:
+    figure(
+        f"drifts of {SMALL_MM} mm, stated: records", middle(compared["little"], "records"), "", at_most(24)
     )
-    records = middle(compared.little, "records")
-    say(f"drifts of {SMALL_MM} mm, stated: records, error ratio", f"{records:.0f}, {ratio:.2f}", "24, 1")
-    assert ratio <= 1.1
-    assert records <= 24
+    figure("  error ratio", np.median(ratios(compared, "little")), "", at_most(1.1))

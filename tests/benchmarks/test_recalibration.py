@@ -3,36 +3,34 @@
 The bundled cell, whose records have noise and nothing else wrong with them; the limit is 0.15 mm on the
 largest error at a task pose. Each result is written as a run writes it, in the frames in which the task
 poses move least: how far they still move, by the machine's own equations, is measured too, and how far they
-would in the convention's frames. ``MACHINES`` in the environment says how many machines there are; the
-target is for 100. All cores are used.
+would in the convention's frames.
 """
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 
 import numpy as np
 
 from hexacell.campaign.task_accuracy import Task
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.loader import Cell
 from hexacell.errors import HexacellError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import Robot, robot_of
 from hexacell.verdict.decision import Verdict
+from tests.benchmarks.figures import NEVER, at_least, at_most
+from tests.benchmarks.machines import bundled, on_all_cores
+from tests.benchmarks.samples import sample
 from tests.benchmarks.virtual_calibration import calibrate, robot_that_stands
 from tests.benchmarks.worlds.closure import Bodies, CannotCloseError, follow, slider_places
 from tests.benchmarks.worlds.effects import Effect
 from tests.benchmarks.worlds.table import least_by_chance
 from tests.benchmarks.worlds.world import World
 
-MACHINES = int(os.environ.get("MACHINES", "4"))
+MACHINES = sample(__name__, "MACHINES")
 TIMES = 5
-LIMIT_MM = load_cell(bundled_config("simulated-hexaglide")).settings.acceptance.position_mm
+LIMIT_MM = bundled().settings.acceptance.position_mm
 PASSES = 0.99
 
 
@@ -59,7 +57,7 @@ class Calibration:
 
 def calibrations(number: int) -> list[Calibration]:
     """Of a machine that can stand at all points, within its limits, as its controller sends it there."""
-    cell = load_cell(bundled_config("simulated-hexaglide"))
+    cell = bundled()
     robot = robot_of(cell)
     truth = robot_that_stands(cell, robot, np.random.default_rng([7, number]))
     done = []
@@ -112,35 +110,32 @@ def _moved(cell: Cell, robot: Robot, written: Geometry) -> float:
     return float(np.linalg.norm(moved.positions - task.positions, axis=-1).max())
 
 
-def test_a_machine_that_is_calibrated_again_and_again_passes_every_time(say):
-    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
-        every = [one for each in pool.map(calibrations, range(MACHINES)) for one in each]
+def test_a_machine_that_is_calibrated_again_and_again_passes_every_time(figure):
+    every = [one for each in on_all_cores(calibrations, range(MACHINES)) for one in each]
     passed = [one for one in every if one.verdict is Verdict.PASS]
     stated_ones = [one for one in every if np.isfinite(one.true_mm)]
     for one in every:
         if one.verdict is not Verdict.PASS:
-            name = f"  machine {one.machine}, time {one.time + 1}"
-            say(f"{name}: {one.verdict}", f"{one.true_mm:.3f} mm, U {one.u_mm:.3f}", one.reason)
+            words = f"  machine {one.machine}, time {one.time + 1}: {one.verdict}, U {one.u_mm:.3f}"
+            figure(f"{words}; {one.reason}", one.true_mm, "mm")
     for time in range(TIMES):
         each = [one for one in stated_ones if one.time == time]
-        say(
-            f"time {time + 1}: largest error, U; medians",
-            f"{np.median([one.true_mm for one in each]):.3f}, {np.median([one.u_mm for one in each]):.3f}",
-            f"limit {LIMIT_MM:g}",
-        )
-        say(
-            "  farthest task pose moved; in the convention's frames; medians",
-            f"{np.nanmedian([one.moved_mm for one in each]):.3f}, "
-            f"{np.nanmedian([one.moved_by_convention_mm for one in each]):.3f} mm",
-            "",
-        )
+        for words, name in (
+            ("largest error", "true_mm"),
+            ("U", "u_mm"),
+            ("farthest task pose moved", "moved_mm"),
+            ("the same in the convention's frames", "moved_by_convention_mm"),
+        ):
+            values = [getattr(one, name) for one in each]
+            figure(f"time {time + 1}: {words}, median", np.nanmedian(values), "mm")
     covered = sum(abs(one.value_mm - one.true_mm) <= one.u_mm for one in stated_ones)
     false = sum(one.true_mm > LIMIT_MM for one in passed)
-    say("passes", f"{len(passed)} of {len(every)}", "99 %")
-    say("  true error within U", f"{covered} of {len(stated_ones)}", "93 to 98 %")
-    say("  false passes", f"{false}", "none")
+    least = at_least(least_by_chance(PASSES, len(every)))
+    figure("passes", len(passed), f"of {len(every)}", least)
+    figure("  true error within U", covered, f"of {len(stated_ones)}")
+    figure("  false passes", false, "", NEVER)
     again = [one for one in stated_ones if one.time > 0]
-    assert np.median([one.moved_mm for one in again]) < LIMIT_MM
-    assert np.median([one.moved_mm / one.moved_by_convention_mm for one in again]) < 0.5
-    assert len(passed) >= least_by_chance(PASSES, len(every))
-    assert not false
+    moved = np.median([one.moved_mm for one in again])
+    figure("  farthest task pose moved by a further calibration, median", moved, "mm", at_most(LIMIT_MM))
+    share = np.median([one.moved_mm / one.moved_by_convention_mm for one in again])
+    figure("  share of that in the convention's frames, median", share, "", at_most(0.5))

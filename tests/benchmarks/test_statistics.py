@@ -18,8 +18,10 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.rotations import Array
 from hexacell.study import data_sets
+from tests.benchmarks.figures import at_least, at_most, between
+from tests.benchmarks.samples import sample
 
-SETS = 1000
+SETS = sample(__name__, "SETS")
 NOISE_MM = 0.01
 STEP_MM = 1e-4
 
@@ -103,25 +105,20 @@ def _by_joints(positions, joints: Array) -> Array:
     return np.stack(columns, axis=-1)
 
 
-def test_errors_are_at_the_cramer_rao_bound(outcome: Outcome, say) -> None:
+def test_errors_are_at_the_cramer_rao_bound(outcome: Outcome, figure) -> None:
     ratio = np.sqrt(np.mean(outcome.errors**2, axis=0)) / outcome.bound
-    say("rms error / Cramer-Rao bound, median of 35", f"{np.median(ratio):.3f}", "0.98 to 1.03")
-    say("  smallest and largest", f"{ratio.min():.3f} .. {ratio.max():.3f}", "0.92 to 1.08")
-    assert 0.98 <= np.median(ratio) <= 1.03
-    assert ratio.min() >= 0.92
-    assert ratio.max() <= 1.08
+    figure("rms error / Cramer-Rao bound, median of 35", np.median(ratio), "", between(0.98, 1.03))
+    figure("  smallest", ratio.min(), "", at_least(0.92))
+    figure("  largest", ratio.max(), "", at_most(1.08))
 
 
-def test_confidence_intervals_have_their_nominal_coverage(outcome: Outcome, say) -> None:
+def test_confidence_intervals_have_their_nominal_coverage(outcome: Outcome, figure) -> None:
     each = 100 * outcome.covered.mean(axis=0)
-    say("95 % intervals cover, pooled", f"{each.mean():.2f} %", "94 to 96 %")
-    say("  each parameter", f"{each.min():.1f} .. {each.max():.1f} %", "92.5 to 97.5 %")
-    assert 94.0 <= each.mean() <= 96.0
-    assert each.min() >= 92.5
-    assert each.max() <= 97.5
+    figure("95 % intervals cover, pooled", each.mean(), "%", between(94.0, 96.0))
+    figure("  least covered parameter", each.min(), "%", at_least(92.5))
+    figure("  most covered parameter", each.max(), "%", at_most(97.5))
 
 
-def test_clean_records_are_kept(outcome: Outcome, say) -> None:
+def test_clean_records_are_kept(outcome: Outcome, figure) -> None:
     share = 100 * outcome.removed / outcome.records
-    say("clean records taken for gross errors", f"{share:.4f} %", "below 0.1 %")
-    assert share < 0.1
+    figure("clean records taken for gross errors", share, "%", at_most(0.1))

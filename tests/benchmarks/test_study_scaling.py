@@ -1,6 +1,4 @@
-"""How well a study uses two processes: time with one over twice the time with two, in one run.
-
-``DRAWS`` in the environment says how many draws of each of 21 cases, ``PAIRS`` how often both are timed. On
+"""How well a study uses two processes: time with one over twice the time with two, in one run. On
 a computer that does something else besides, two processes have less than two processors to themselves.
 """
 
@@ -15,11 +13,11 @@ import pytest
 
 from hexacell.study.paper_simulation import PAPER
 from hexacell.study.tasks import processes, run_study
+from tests.benchmarks.figures import at_least
+from tests.benchmarks.samples import sample
 
-pytestmark = pytest.mark.benchmark
-
-DRAWS = int(os.environ.get("DRAWS", "20"))
-PAIRS = int(os.environ.get("PAIRS", "3"))
+DRAWS = sample(__name__, "DRAWS")
+PAIRS = sample(__name__, "PAIRS")
 LEAST = 0.90
 
 
@@ -34,12 +32,12 @@ def results(folder: Path, count: int) -> list[str]:
 
 
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="needs two processors")
-def test_two_processes_are_nearly_twice_as_fast(tmp_path: Path, say) -> None:
+def test_two_processes_are_nearly_twice_as_fast(tmp_path: Path, figure) -> None:
     found = []
     for pair in range(PAIRS):
         one, two = (seconds(tmp_path / str(pair), count) for count in (1, 2))
         found.append(one / (2.0 * two))
         assert results(tmp_path / str(pair), 1) == results(tmp_path / str(pair), 2)
-    told = ", ".join(f"{efficiency:.2f}" for efficiency in found)
-    say(f"efficiency of two processes, {21 * DRAWS} tasks", told, f"median at least {LEAST:.2f}")
-    assert np.median(found) >= LEAST
+    for pair, efficiency in enumerate(found, start=1):
+        figure(f"efficiency of two processes, {21 * DRAWS} tasks, time {pair}", efficiency)
+    figure("  median", np.median(found), "", at_least(LEAST))

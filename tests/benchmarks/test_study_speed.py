@@ -1,8 +1,4 @@
-"""How long a study of many robots takes, each calibrated with orientations that hexacell chooses.
-
-``ROBOTS`` in the environment says how many; the target is for 1,000 on two processors, fewer are told
-as what 1,000 would take.
-"""
+"""How long a study of many robots takes, each calibrated with orientations that hexacell chooses."""
 
 from __future__ import annotations
 
@@ -14,10 +10,11 @@ import pytest
 
 from hexacell.study.design_study import DesignOutcome, DesignTrial, run_design_trial
 from hexacell.study.tasks import Study, processes, run_study
+from tests.benchmarks.figures import at_most
+from tests.benchmarks.samples import sample
+from tests.benchmarks.worlds.table import most_by_chance
 
-pytestmark = pytest.mark.benchmark
-
-ROBOTS = int(os.environ.get("ROBOTS", "40"))
+ROBOTS = sample(__name__, "ROBOTS")
 FULL = 1000
 LONGEST_S = 600.0
 """The target, which is missed without compiled loops."""
@@ -37,14 +34,14 @@ ADAPTIVE = Study("adaptive", "robots", tasks_of, run_design_trial, DesignOutcome
 
 
 @pytest.mark.skipif((os.cpu_count() or 1) < PROCESSES, reason="needs two processors")
-def test_a_thousand_robots_in_ten_minutes(tmp_path, say) -> None:
+def test_a_thousand_robots_in_ten_minutes(tmp_path, figure) -> None:
     begun = time.perf_counter()
     outcomes = run_study(ADAPTIVE, tmp_path, ROBOTS, processes(PROCESSES), lambda *_: None)
     seconds = time.perf_counter() - begun
     assert len(outcomes) == ROBOTS
     unidentified = sum(one.last is None for one in outcomes)
-    say(f"{ROBOTS} robots; not calibrated", f"{seconds:.0f} s; {unidentified}", "one in a hundred")
+    figure(f"{ROBOTS} robots", seconds, "s")
+    # Some stand at one point only without leaving their cones.
+    figure("  not calibrated", unidentified, "", at_most(most_by_chance(0.01, ROBOTS)))
     whole = seconds * FULL / ROBOTS
-    say(f"{FULL} robots on {PROCESSES} processors", f"{whole:.0f} s", f"at most {LONGEST_S:.0f} s")
-    assert unidentified <= ROBOTS / 100  # some stand at one point only without leaving their cones
-    assert whole <= LONGEST_S
+    figure(f"{FULL} robots on {PROCESSES} processors", whole, "s", at_most(LONGEST_S))

@@ -2,16 +2,11 @@
 
 Worlds (``tests/benchmarks/worlds``) are measured at 5 points x 11 orientations within 45 deg, identified,
 and stated with the uncertainty budget of their machine; what they really do at the task poses is known.
-``RUNS`` in the environment says how many there are of each kind and size; the targets are for 100.
-All cores are used.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -19,6 +14,9 @@ import pytest
 from hexacell.cell.uncertainty import Grade
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
+from tests.benchmarks.figures import NEVER, at_most, between
+from tests.benchmarks.machines import on_all_cores
+from tests.benchmarks.samples import sample
 from tests.benchmarks.worlds.budgets import drawn, machine
 from tests.benchmarks.worlds.campaigns import Setting
 from tests.benchmarks.worlds.effects import Effect
@@ -28,7 +26,7 @@ from tests.benchmarks.worlds.table import HEAD, Totals, least_by_chance, lines, 
 from tests.benchmarks.worlds.trials import Outcome, Trial, carry_out, settings
 from tests.benchmarks.worlds.world import World
 
-RUNS = int(os.environ.get("RUNS", "1"))
+RUNS = sample(__name__, "RUNS")
 DRAWN = 30
 """Machines drawn from each budget, for one run of each kind."""
 
@@ -61,39 +59,30 @@ def identified(own: Setting, effect: Effect, seed: int) -> tuple[World, Identifi
 
 def outcomes(trials: Iterable[Trial]) -> list[Outcome]:
     settings()  # before the processes are forked, so that they share them
-    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
-        return list(pool.map(carry_out, trials, chunksize=4))
+    return on_all_cores(carry_out, trials, together=4)
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_machines_drawn_from_their_budget_err_by_no_more_than_is_stated(say, name):
+def test_machines_drawn_from_their_budget_err_by_no_more_than_is_stated(figure, name):
     kind, grade, limit = MACHINES[name]
     totals = Totals(outcomes(Trial(kind, 1.0, number, grade, limit) for number in range(DRAWN * RUNS)))
     judged = totals.judged
     true = np.array([one.true_mm for one in judged])
     u = np.median([one.u_mm for one in judged])
-    say(
-        f"{name}: largest error, median and 95 %",
-        f"{np.median(true):.3f}, {np.quantile(true, 0.95):.3f} mm",
-        f"{len(judged)} machines",
-    )
-    say("  U, median", f"{u:.3f} mm", f"limit {limit:g}")
-    say("  |stated - true| <= U", f"{100 * totals.covered:.1f} %", "93 to 98 %")
-    say(
-        "  passes, false ones",
-        f"{totals.passes}, {totals.false_passes} of {len(totals.outcomes)}",
-        "no false",
-    )
-    say("  false ones with a guard band of U alone", f"{totals.false_passes_with_u}", "")
-    say("  causes named wrongly", f"{totals.wrongly_named}", "at most 1 %")
-    covered = round(totals.covered * len(judged))
-    assert least_by_chance(0.93, len(judged)) <= covered <= most_by_chance(0.98, len(judged))
-    assert not totals.false_passes
-    assert totals.wrongly_named <= most_by_chance(0.01, len(totals.outcomes))
+    figure(f"{name}: largest error, median of {len(judged)} machines", np.median(true), "mm")
+    figure("  95 % within", np.quantile(true, 0.95), "mm")
+    figure(f"  U, median (limit {limit:g})", u, "mm")
+    covers = between(least_by_chance(0.93, len(judged)), most_by_chance(0.98, len(judged)))
+    figure("  |stated - true| <= U", round(totals.covered * len(judged)), f"of {len(judged)}", covers)
+    figure("  passes", totals.passes, f"of {len(totals.outcomes)}")
+    figure("  false ones", totals.false_passes, "", NEVER)
+    figure("  false ones with a guard band of U alone", totals.false_passes_with_u)
+    named = at_most(most_by_chance(0.01, len(totals.outcomes)))
+    figure("  causes named wrongly", totals.wrongly_named, "", named)
 
 
 @pytest.mark.parametrize("effect", ONE_BY_ONE, ids=lambda effect: effect.name)
-def test_a_line_of_the_budget_is_the_error_that_machines_with_that_effect_make(say, effect):
+def test_a_line_of_the_budget_is_the_error_that_machines_with_that_effect_make(figure, effect):
     own = settings()[0]
     _, found = identified(own, Effect(), 0)
     says = stated(own.cell.settings, own.robot, found, [effect])
@@ -107,9 +96,9 @@ def test_a_line_of_the_budget_is_the_error_that_machines_with_that_effect_make(s
     simulated = float(np.sqrt(np.mean(squares, axis=0).max()))
     ratio = simulated / line.combined_mm
     slack = 0.1 + 3.5 / np.sqrt(2 * ALIKE * RUNS)
-    figure = f"{effect.name}, {effect.size:g} {effect.unit}"
-    say(figure, f"{simulated:.4f} mm", f"budget {line.combined_mm:.4f}")
-    assert 1.0 - slack <= ratio <= 1.0 + slack
+    words = f"{effect.name}, {effect.size:g} {effect.unit}"
+    figure(words, simulated, "mm")
+    figure(f"{words}: over the budget's", ratio, "", between(1.0 - slack, 1.0 + slack))
 
 
 @pytest.fixture(scope="module")
@@ -120,24 +109,24 @@ def swept() -> list[Outcome]:
     )
 
 
-def test_no_machine_beyond_the_budget_passes_that_records_show_to_be_wrong(swept, say):
+def test_no_machine_beyond_the_budget_passes_that_records_show_to_be_wrong(swept, figure):
     print(HEAD, *lines(swept), sep="\n")
     for factor in FACTORS:
         each = Totals([one for one in swept if one.trial.factor == factor])
-        say(
-            f"{factor:g} times the usual size: passes, false ones",
-            f"{each.passes}, {each.false_passes} of {len(each.outcomes)}",
-            "",
-        )
-        say("  |stated - true| <= U", f"{100 * each.covered:.1f} %", "")
+        figure(f"{factor:g} times the usual size: passes", each.passes, f"of {len(each.outcomes)}")
+        figure(f"  {factor:g} times: false ones", each.false_passes)
+        figure(f"  {factor:g} times: |stated - true| <= U", 100 * each.covered, "%")
+        figure(f"  {factor:g} times: causes named wrongly", each.wrongly_named)
     shown = Totals([one for one in swept if one.trial.factor > 1.0 and not KINDS[one.trial.kind].hidden])
-    share = 100 * shown.false_passes / len(shown.outcomes)
-    say("false passes, effects that records can show", f"{share:.2f} %", "below 1 %")
+    of, false = len(shown.outcomes), shown.false_passes
+    words = "false passes, effects that records can show"
+    figure(words, false, f"of {of}", at_most(most_by_chance(0.01, of)))
+    named = at_most(most_by_chance(0.01, len(swept)))
+    figure("causes named wrongly", Totals(swept).wrongly_named, f"of {len(swept)}", named)
     assert len({one.trial.kind for one in swept}) >= 60
-    assert shown.false_passes <= most_by_chance(0.01, len(shown.outcomes))
 
 
-def test_effects_that_no_record_shows_are_known(swept, say):
+def test_effects_that_no_record_shows_are_known(swept, figure):
     """They change the error and not the evidence; a statement can only list them."""
     for name, kind in KINDS.items():
         if kind.hidden:
@@ -148,18 +137,6 @@ def test_effects_that_no_record_shows_are_known(swept, say):
             ]
             true = np.median([one.true_mm for one in largest])
             ratio = np.median([one.ratio for one in largest])
-            say(
-                f"{name}, {FACTORS[-1] * kind.usual:g} {kind.unit}",
-                f"{true:.3f} mm",
-                f"residuals {ratio:.2f}",
-            )
-            assert ratio < UNSUSPICIOUS
-
-
-def test_causes_are_not_named_wrongly(swept, say):
-    for factor in FACTORS:
-        each = Totals([one for one in swept if one.trial.factor == factor])
-        share = 100 * each.wrongly_named / len(each.outcomes)
-        say(f"{factor:g} times: causes named wrongly", f"{share:.1f} %", "at most 1 %")
-    every = Totals(swept)
-    assert every.wrongly_named <= most_by_chance(0.01, len(swept))
+            words = f"{name}, {FACTORS[-1] * kind.usual:g} {kind.unit}"
+            figure(words, true, "mm")
+            figure(f"{words}: residuals over the noise", ratio, "", at_most(UNSUSPICIOUS))

@@ -81,7 +81,12 @@ def test_a_hexaglide_is_calibrated_and_its_geometry_runs(linuxcnc: LinuxCNC) -> 
     assert written(linuxcnc) == before
 
 
-def test_a_stock_hexapod_is_calibrated_through_a_crash_of_linuxcnc(hexapod: LinuxCNC) -> None:
+@pytest.mark.parametrize("is_short", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_a_stock_hexapod_is_calibrated_through_a_crash_of_linuxcnc(
+    hexapod: LinuxCNC, is_short: bool
+) -> None:
+    if is_short:
+        shorten(hexapod)
     before = written(hexapod)
     require_stopped_and_resumed(hexapod, kill)
     after = written(hexapod)

@@ -16,6 +16,8 @@ from tests.linuxcnc.server_client import ServerClient
 from tests.waiting import wait_until
 
 POSES = 1000
+HEXAGLIDE = ("linuxcnc", 550.0, "hexaglidekins.fwd-kins-fail")
+HEXAPOD = ("hexapod", 780.0, "genhexkins.fwd-kins-fail")
 AS_SHOWN = 1.1e-6
 """Six decimals of LinuxCNC, and rounding, mm and deg."""
 ARRIVED = 2e-5
@@ -74,11 +76,12 @@ def has_ended(client: ServerClient, commanded: np.ndarray) -> bool:
 @pytest.mark.parametrize(
     ("name", "height", "fails", "changes", "count"),
     [
-        ("linuxcnc", 550.0, "hexaglidekins.fwd-kins-fail", (), POSES),
-        ("hexapod", 780.0, "genhexkins.fwd-kins-fail", (), POSES),
-        ("hexapod", 780.0, "genhexkins.fwd-kins-fail", (with_screws,), POSES // 10),
+        pytest.param(*HEXAGLIDE, (), POSES // 5, id="hexaglide"),
+        pytest.param(*HEXAPOD, (), POSES // 5, id="hexapod"),
+        pytest.param(*HEXAPOD, (with_screws,), POSES // 10, id="screws"),
+        pytest.param(*HEXAGLIDE, (), POSES, id="hexaglide, all", marks=pytest.mark.slow),
+        pytest.param(*HEXAPOD, (), POSES, id="hexapod, all", marks=pytest.mark.slow),
     ],
-    ids=["hexaglide", "hexapod", "screws"],
 )
 def test_random_poses_have_the_same_joints(request, name, height, fails, changes, count) -> None:
     machine = request.getfixturevalue(name)

@@ -1,0 +1,227 @@
+"""Figures of benchmarks, each with its unit and target: printed, kept in one file, shown as a table.
+
+``python -m tests.benchmarks.figures`` writes the table, see ``make figures``.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import subprocess
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+
+from tests.benchmarks.samples import samples
+
+CHECKOUT = Path(__file__).parents[2]
+FIGURES = CHECKOUT / "build" / "figures.json"
+TABLE = CHECKOUT / "docs" / "measured-figures.md"
+DID_NOT_END = "did not run to its end"
+
+HEAD = """# Figures of the benchmarks
+
+Written by `make figures` from `build/figures.json`, which `make bench` writes in one pass over all
+benchmarks (`FULL=1` takes the samples of the targets, for hours). A figure that is not of the commit below
+names its own.
+**missed** is a target that was not reached. [Measured](measured.md) has what else was found.
+
+"""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a figure must keep within."""
+
+    least: float = -math.inf
+    most: float = math.inf
+
+    def __str__(self) -> str:
+        if self.least == self.most:
+            return f"{self.most:g}"
+        if self.least == -math.inf:
+            return f"at most {self.most:.4g}"
+        if self.most == math.inf:
+            return f"at least {self.least:.4g}"
+        return f"{self.least:.4g} to {self.most:.4g}"
+
+    def holds(self, value: float) -> bool:
+        """Whether a value keeps within it, which no value that is not a number does."""
+        return self.least <= value <= self.most
+
+
+def at_most(most: float) -> Target:
+    return Target(most=most)
+
+
+def at_least(least: float) -> Target:
+    return Target(least=least)
+
+
+def between(least: float, most: float) -> Target:
+    return Target(least, most)
+
+
+NEVER = Target(0.0, 0.0)
+"""Of what must not happen at all."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure as the file has it; ``met`` is null where there is no target."""
+
+    benchmark: str
+    name: str
+    value: float | str | None
+    unit: str
+    target: str
+    met: bool | None
+    commit: str
+    samples: str
+    machine: str
+
+    def line(self) -> str:
+        """As it is printed while the benchmark runs."""
+        target = f"({self.target})" if self.target else ""
+        return f"  {self.name:<64} {self.shown:>18}  {target}{'  MISSED' if self.met is False else ''}"
+
+    @property
+    def shown(self) -> str:
+        value = f"{self.value:.4g}" if isinstance(self.value, float) else str(self.value)
+        return f"{'-' if self.value is None else value} {self.unit}".strip()
+
+
+Say = Callable[..., None]
+"""``figure(name, value, unit="", target=None)``: see :class:`Figures`."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """Where the figures of one benchmark go, and what it has missed so far."""
+
+    benchmark: str
+    module: str
+    missed: list[str]
+    file: Path | None
+
+    def __call__(
+        self, name: str, value: float | str | None, unit: str = "", target: Target | None = None
+    ) -> None:
+        """Print and keep a figure; a missed target fails the benchmark when it has come to its end."""
+        met = None
+        if target is not None:
+            met = isinstance(value, int | float) and target.holds(float(value))
+        number = _number(value)
+        figure = Figure(
+            self.benchmark,
+            name,
+            number,
+            unit,
+            "" if target is None else str(target),
+            met,
+            commit(),
+            ", ".join(f"{key}={size}" for key, size in samples(self.module).items()),
+            machine(),
+        )
+        print(f"\n{figure.line()}", end="", flush=True)
+        if met is False:
+            self.missed.append(f"{name}: {figure.shown} ({target})")
+        if self.file is not None:
+            keep(figure, self.file)
+
+
+def _number(value: float | str | None) -> float | str | None:
+    """A value that JSON has, without numpy's types."""
+    if value is None or isinstance(value, str):
+        return value
+    if isinstance(value, int) or float(value).is_integer():
+        return int(value)
+    return float(value) if math.isfinite(value) else str(float(value))
+
+
+def keep(figure: Figure, file: Path) -> None:
+    """Put a figure into the file, in the place of the one of the same name, if there is one."""
+    kept = {(one.benchmark, one.name): one for one in read(file)}
+    kept[figure.benchmark, figure.name] = figure
+    kept = {
+        key: one for key, one in kept.items() if one.commit == figure.commit or not _is_end(one, figure)
+    }
+    file.parent.mkdir(parents=True, exist_ok=True)
+    document = {"commit": figure.commit, "figures": [asdict(one) for one in kept.values()]}
+    new = file.with_suffix(".new")
+    new.write_text(json.dumps(document, indent=1))
+    new.replace(file)
+
+
+def _is_end(old: Figure, new: Figure) -> bool:
+    """Whether an old figure says that a benchmark did not end, which has since given another figure."""
+    return old.benchmark == new.benchmark and old.name == DID_NOT_END
+
+
+def read(file: Path) -> list[Figure]:
+    """The figures in the file; none if there is no file."""
+    return [Figure(**one) for one in json.loads(file.read_text())["figures"]] if file.exists() else []
+
+
+@cache
+def commit() -> str:
+    """The present commit, with a + if files differ from it."""
+
+    def git(*words: str) -> str:
+        command = ["git", "-C", str(CHECKOUT), *words]
+        return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+
+    changed = git("status", "--porcelain", "--untracked-files=no")
+    return (git("rev-parse", "--short=8", "HEAD") or "unknown") + ("+" if changed else "")
+
+
+@cache
+def machine() -> str:
+    """What class of machine this is."""
+    described = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
+    names = [
+        line.partition(":")[2].strip() for line in described.splitlines() if line.startswith("model name")
+    ]
+    name = names[0] if names else platform.processor() or platform.machine()
+    return f"{len(os.sched_getaffinity(0))} cores, {name}, Python {platform.python_version()}"
+
+
+def table(figures: Iterable[Figure], present: str) -> str:
+    """All figures as a page, those that missed their target first."""
+    listed = sorted(figures, key=lambda one: (one.benchmark.partition("::")[0], one.met is not False))
+    rows = [
+        "| benchmark | figure | value | target | met | samples | commit |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for one in listed:
+        met = {True: "yes", False: "**missed**", None: ""}[one.met]
+        of = "" if one.commit.rstrip("+") == present.rstrip("+") else one.commit
+        name = " ".join(one.name.replace("|", "\\|").split())
+        cells = (_module(one), name, one.shown.replace("|", "\\|"), one.target, met, one.samples, of)
+        rows.append("| " + " | ".join(cells) + " |")
+    missed = sum(one.met is False for one in listed)
+    targets = sum(one.met is not None for one in listed)
+    machines = ", ".join(sorted({one.machine for one in listed}))
+    of = f"Commit {present}; {machines}. {len(listed)} figures, {targets} with targets, {missed} missed."
+    return HEAD + of + "\n\n" + "\n".join(rows) + "\n"
+
+
+def _module(figure: Figure) -> str:
+    return figure.benchmark.partition("::")[0].removeprefix("tests/benchmarks/")
+
+
+def main() -> None:
+    """Write the table, if there are figures."""
+    figures = read(FIGURES)
+    if not figures:
+        print(f"hexacell: {TABLE.name} stays as it is: make bench has not written {FIGURES.name}")
+        return
+    TABLE.write_text(table(figures, json.loads(FIGURES.read_text())["commit"]))
+    print(f"hexacell: {TABLE.relative_to(CHECKOUT)} has {len(figures)} figures")
+
+
+if __name__ == "__main__":
+    main()

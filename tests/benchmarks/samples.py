@@ -1,0 +1,54 @@
+"""How many samples each benchmark takes: in ``make bench``, and with ``FULL=1`` as the targets have it.
+
+A variable of the environment of the same name takes precedence: ``ROBOTS=24 make bench ARGS=...``.
+"""
+
+from __future__ import annotations
+
+import os
+
+SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
+    "against_the_paper": {"SETS": (100, 100)},
+    "change_alarm": {"RUNS": (60, 200)},
+    "check": {"RUNS": (8, 100)},
+    "convergence": {"ROBOTS": (300, 1000)},
+    "damaged_lines": {"FRAMES": (5_000, 1_000_000)},
+    "design_efficiency": {"ROBOTS": (10, 24)},
+    "drift_watch": {"CELLS": (6, 100), "STEPS": (60, 300)},
+    "encoder_rounds": {"ROUNDS": (3_000, 100_000)},
+    "first_resume": {"KILLS": (2, 200)},
+    "gauge_trials": {"TRIALS": (30, 100)},
+    "healthy_robots": {"ROBOTS": (30, 1000)},
+    "length_check": {"MACHINES": (100, 100)},
+    "long_polling": {"HOURS": (1, 24)},
+    "measured_noise": {"RUNS": (2, 6)},
+    "mechanisms": {"ROBOTS": (6, 100)},
+    "motion_limits": {"CAMPAIGNS": (6, 1000), "COMPARED": (4, 6)},
+    "mutations": {"MUTATIONS": (100, 10_000)},
+    "named_faults": {"RUNS": (1, 5)},
+    "orientations": {"ROBOTS": (20, 1000)},
+    "paper_study": {"DRAWS": (20, 20)},
+    "peers": {"ROBOTS": (2, 6)},
+    "polling_rate": {"POLLS": (50, 100)},
+    "quick_level": {"ROBOTS": (12, 100)},
+    "recalibration": {"MACHINES": (4, 100)},
+    "screen_speed": {"RUNS": (3, 5)},
+    "statistics": {"SETS": (1000, 1000)},
+    "study_scaling": {"DRAWS": (10, 20), "PAIRS": (3, 5)},
+    "study_speed": {"ROBOTS": (24, 200)},
+    "tolerances": {"BUILT": (300, 1500)},
+    "worlds": {"RUNS": (1, 34)},
+    "year": {"NIGHTS": (120, 365)},
+}
+
+
+def samples(benchmark: str) -> dict[str, int]:
+    """How many samples a benchmark takes now, by their names; ``benchmark`` is its module."""
+    column = int(os.environ.get("FULL", "0") == "1")
+    listed = SAMPLES.get(benchmark.rpartition(".test_")[2] or benchmark, {})
+    return {name: int(os.environ.get(name, sizes[column])) for name, sizes in listed.items()}
+
+
+def sample(benchmark: str, name: str) -> int:
+    """How many of one kind, see :func:`samples`."""
+    return samples(benchmark)[name]

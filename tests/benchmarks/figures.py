@@ -50,7 +50,7 @@ class Target:
 
     def holds(self, value: float) -> bool:
         """Whether a value keeps within it, which no value that is not a number does."""
-        return self.least <= value <= self.most
+        return bool(self.least <= value <= self.most)
 
 
 def at_most(most: float) -> Target:

@@ -29,7 +29,8 @@ def peer(casadi, problem: Problem, weights: np.ndarray):
     """A CasADi solver of the weighted problem, and where it starts."""
     parameters = casadi.SX.sym("parameters", 35)
     vector = casadi.DM(problem.basis) @ parameters
-    S, B = (casadi.reshape(vector[part], 3, 6) for part in (slice(0, 18), slice(18, 36)))
+    from tests.benchmarks.peers import casadi_poses  # which needs CasADi
+
     constants = [casadi.SX.sym(f"c{point}", 3) for point in range(problem.points)]
     unknowns, start = [parameters], [problem.prior.free]
     legs, residuals = [], []
@@ -37,12 +38,9 @@ def peer(casadi, problem: Problem, weights: np.ndarray):
     factors = np.swapaxes(np.linalg.cholesky(weights), 1, 2)
     for row in range(problem.records):
         position, turn = casadi.SX.sym(f"P{row}", 3), casadi.SX.sym(f"w{row}", 3)
-        rotation = _rotation(casadi, turn) @ casadi.DM(problem.start.rotations[row])
-        for leg in range(6):
-            v = S[:, leg] - position - rotation @ B[:, leg]
-            v[0] += problem.joints[row, leg]
-            length = vector[36 + leg]
-            legs.append((casadi.sumsqr(v) - length**2) / (2 * length))
+        rotation = casadi_poses.rotation_of(turn) @ casadi.DM(problem.start.rotations[row])
+        joints = casadi.DM(problem.joints[row])
+        legs.append(casadi_poses.closed_legs(vector, position, rotation, joints))
         deviation = casadi.DM(problem.deviations[row])
         residuals.append(casadi.DM(factors[row]) @ (position - deviation - constants[points[row]]))
         unknowns += [position, turn]
@@ -55,13 +53,6 @@ def peer(casadi, problem: Problem, weights: np.ndarray):
     }
     options = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": 0, "ipopt.tol": 1e-8}
     return casadi.nlpsol("peer", "ipopt", program, options), np.concatenate(start)
-
-
-def _rotation(casadi, turn):
-    square = casadi.sumsqr(turn) + 1e-30
-    angle = casadi.sqrt(square)
-    k = casadi.skew(turn)
-    return casadi.SX.eye(3) + casadi.sin(angle) / angle * k + (1 - casadi.cos(angle)) / square * (k @ k)
 
 
 def test_no_slower_than_the_compiled_peer(casadi, table_one, figure) -> None:

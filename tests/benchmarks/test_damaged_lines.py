@@ -144,10 +144,11 @@ class Cell:
         by_port: dict[str, dict[int, Indicator]] = {}
         for one, indicator in zip(settings, self.indicators, strict=True):
             by_port.setdefault(str(one.port), {})[one.channel] = indicator
+        described = (ID_H,) if protocol == "request" else ()
         have_lines(
             monkeypatch,
             {
-                url: InstrumentLine(instrument_class(protocol)(some, ID_H), self.damage)
+                url: InstrumentLine(instrument_class(protocol)(some, *described), self.damage)
                 for url, some in by_port.items()
             },
         )

@@ -22,8 +22,8 @@ from tests.benchmarks.figures import at_least
 from tests.benchmarks.samples import sample
 from tests.benchmarks.worlds.budgets import drawn, machine, settings_of
 from tests.benchmarks.worlds.campaigns import setting
-from tests.benchmarks.worlds.effects import Several
-from tests.benchmarks.worlds.encoders import Scale
+from tests.benchmarks.worlds.effects import at_once
+from tests.benchmarks.worlds.encoders import scale
 from tests.benchmarks.worlds.world import World
 
 MACHINES = sample(__name__, "MACHINES")
@@ -77,7 +77,7 @@ def test_what_is_stated_after_a_length_check_holds(grade, name, figure) -> None:
     scale_held, held, agreed, expanded = 0, 0, 0, []
     for number in range(MACHINES):
         common = COMMON_UM_M * float(random.standard_normal())
-        effect = Several((drawn(others, 1.0, random), Scale(1e-6 * common * np.ones(6))))
+        effect = at_once(drawn(others, 1.0, random), scale(1e-6 * common * np.ones(6)))
         world = World(robot, own.truth, effect, number)
         found = identify(robot.problem(world.records(own.commands, robot.commanding)), find_outliers=False)
         belief = robot.belief(found)

@@ -12,25 +12,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hexacell.campaign.planner import Plan
-from hexacell.campaign.task_accuracy import Task
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import Cell, load_cell
-from hexacell.config.interface import ControllerGeometry
-from hexacell.dry_run.campaign import VirtualCampaign
-from hexacell.errors import HexacellError
-from hexacell.identification.estimator import identify
+from hexacell.cell.loader import Cell
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
-from hexacell.results.written_geometry import as_written
-from hexacell.robot.model import Robot, make_robot, robot_of
-from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.robot.model import Robot, robot_of
 from hexacell.verdict.decision import Verdict
 from tests.benchmarks.figures import NEVER, at_least, between
+from tests.benchmarks.machines import bundled
 from tests.benchmarks.samples import sample
 from tests.benchmarks.tolerance_bound import largest_chances
-from tests.benchmarks.virtual_calibration import robot_that_stands, verification_of
+from tests.benchmarks.virtual_calibration import Judged, by_derivatives, judged, robot_that_stands
 
 ROBOTS = sample(__name__, "ROBOTS")
 CELLS = os.environ.get("MECHANISMS", "simulated-hexaglide gough-stewart linapod rotary-cranks").split()
@@ -38,69 +30,23 @@ FAULTY = 100
 """Robots with one number out by twice its tolerance."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Calibrated:
-    """What came of a robot; ``outside``: records at which the ball left the gauges' travel."""
-
-    found: Identification | None = None
-    truth: Geometry | None = None
-    outside: int = 0
-    is_refused: bool = False
-    verdict: Verdict | None = None
-    true_mm: float = np.nan
-    value_mm: float = np.nan
-    u_mm: float = np.nan
-    limit_mm: float = np.nan
-    reason: str = ""
-
-    @property
-    def shares(self) -> Array:
-        """Errors of the free parameters (p,) in units of the bound: the noise's and tolerances' share."""
-        assert self.found is not None
-        assert self.truth is not None
-        convention = self.found.problem.mechanism.convention
-        error = self.found.free - convention.free_parameters(self.truth)
-        return np.asarray(error / np.sqrt(np.diag(self.found.free_covariance)))
+def shares(one: Judged) -> Array:
+    """Errors of the free parameters (p,) in units of the bound: the noise's and tolerances' share."""
+    assert one.done is not None
+    found = one.done.found
+    error = found.free - found.problem.mechanism.convention.free_parameters(one.truth)
+    return np.asarray(error / np.sqrt(np.diag(found.free_covariance)))
 
 
-def calibrated(cell: Cell, robot: Robot, number: int) -> Calibrated:
+def calibrated(cell: Cell, robot: Robot, number: int) -> Judged:
     random = np.random.default_rng([15, number])
-    truth = robot_that_stands(cell, robot, random)
-    virtual = VirtualRobot(robot, truth, random)
-    campaign = VirtualCampaign(Plan(cell.settings, robot, with_forecast=False), virtual)
-    try:
-        campaign.carry_out()
-        found = identify(campaign.plan.robot.problem(campaign.measurements))
-        one = Calibrated(found, truth, campaign.outside)
-        one = replace(one, is_refused=bool(robot.tolerance_violations(found.estimate)))
-        written = as_written(cell.settings, robot, found.geometry).geometry
-        after = make_robot(cell.settings, ControllerGeometry(written, robot.branch), taught=written)
-        verified = verification_of(cell.settings, found, (robot, after), (truth, random))
-    except HexacellError as failed:
-        return Calibrated(outside=campaign.outside, reason=str(failed))
-    failures = ", ".join(test.sentence for test in verified.tests if not test.passed)
-    if verified.accuracy is None:
-        return replace(one, verdict=verified.verdict, reason=failures or "no accuracy")
-    belief = after.belief(found)
-    task = Task.of(cell.settings, after, belief).reachable(belief)
-    budget = task.budget(found, belief, after.effects, {})
-    assert budget is not None
-    errors = budget.errors_of(found.free - robot.mechanism.convention.free_parameters(truth))
-    return replace(
-        one,
-        verdict=verified.verdict,
-        true_mm=errors.position.value,
-        value_mm=verified.accuracy.position.value,
-        u_mm=verified.accuracy.position.expanded,
-        limit_mm=verified.accuracy.position.limit,
-        reason=failures,
-    )
+    return judged(cell, robot, robot_that_stands(cell, robot, random), random, by_derivatives)
 
 
 @cache
-def robots_of(name: str) -> tuple[Robot, tuple[Calibrated, ...]]:
+def robots_of(name: str) -> tuple[Robot, tuple[Judged, ...]]:
     """The robot as drawn, and what came of those built after it."""
-    cell = load_cell(bundled_config(name))
+    cell = bundled(name)
     robot = robot_of(cell)
     return robot, tuple(calibrated(cell, robot, number) for number in range(ROBOTS))
 
@@ -108,28 +54,27 @@ def robots_of(name: str) -> tuple[Robot, tuple[Calibrated, ...]]:
 @pytest.mark.parametrize("name", CELLS)
 def test_robots_within_the_tolerances_are_identified_and_none_is_wrong(figure, name: str) -> None:
     _, every = robots_of(name)
-    judged = [one for one in every if np.isfinite(one.true_mm)]
+    known = [one for one in every if np.isfinite(one.true_mm)]
     for number, one in enumerate(every):
         if one.verdict is not Verdict.PASS:
             figure(f"  robot {number}: U {one.u_mm:.3f} mm; {one.reason}", one.true_mm, "mm")
     passed = sum(one.verdict is Verdict.PASS for one in every)
-    wrong = sum(one.verdict is Verdict.PASS and not one.true_mm <= one.limit_mm for one in every)
-    covered = sum(abs(one.value_mm - one.true_mm) <= one.u_mm for one in judged)
-    identified = sum(one.found is not None for one in every)
+    wrong, covered = sum(one.is_false_pass for one in every), sum(one.is_covered for one in known)
+    identified = sum(one.done is not None for one in every)
     figure(f"{name}: identified", identified, f"of {ROBOTS}", at_least(ROBOTS))
     figure(f"{name}: pass", passed, f"of {ROBOTS}")
     figure(f"{name}: pass though the error is above the limit", wrong, "", NEVER)
-    figure(f"{name}: true error within U of the stated one", covered, f"of {len(judged)}")
-    figure(f"{name}: largest true error at the task", max(one.true_mm for one in judged), "mm")
+    figure(f"{name}: true error within U of the stated one", covered, f"of {len(known)}")
+    figure(f"{name}: largest true error at the task", max(one.true_mm for one in known), "mm")
 
 
 @pytest.mark.parametrize("name", CELLS)
 def test_errors_are_those_of_the_bound(figure, name: str) -> None:
     """Over all robots and parameters; the bound is that of the records and the tolerances together."""
     _, every = robots_of(name)
-    shares = np.array([one.shares for one in every if one.found is not None])
-    ratio = float(np.sqrt(np.mean(shares**2)))
-    spread = 0.055 * max(1.0, 10.0 / np.sqrt(len(shares)))
+    ratios = np.array([shares(one) for one in every if one.done is not None])
+    ratio = float(np.sqrt(np.mean(ratios**2)))
+    spread = 0.055 * max(1.0, 10.0 / np.sqrt(len(ratios)))
     figure(f"{name}: rms error over the bound", ratio, "", between(1.005 - spread, 1.005 + spread))
 
 
@@ -151,7 +96,7 @@ def test_a_robot_out_by_twice_its_tolerance_is_refused_and_its_leg_named(
     The others are within the tolerances, and all are known as well as after a calibration.
     """
     robot, every = robots_of(name)
-    known = next(one.found for one in every if one.found is not None)
+    known = next(one.done.found for one in every if one.done is not None)
     found = [_found(robot, known, number, is_joint=what == "joint") for number in range(FAULTY)]
     refusable, nameable = (
         float(np.mean(shares)) for shares in zip(*(one.bounds for one in found), strict=True)

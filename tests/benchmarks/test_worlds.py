@@ -11,9 +11,12 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
+from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.uncertainty import Grade
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
+from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.uncertainty.propagation import Propagation
 from tests.benchmarks.figures import NEVER, at_most, between
 from tests.benchmarks.machines import on_all_cores
 from tests.benchmarks.samples import sample
@@ -21,8 +24,7 @@ from tests.benchmarks.worlds.budgets import drawn, machine
 from tests.benchmarks.worlds.campaigns import Setting
 from tests.benchmarks.worlds.effects import Effect
 from tests.benchmarks.worlds.kinds import KINDS, NONE, ORDINARY, PRECISION
-from tests.benchmarks.worlds.stating import stated
-from tests.benchmarks.worlds.table import HEAD, Totals, least_by_chance, lines, most_by_chance
+from tests.benchmarks.worlds.table import Totals, least_by_chance, most_by_chance
 from tests.benchmarks.worlds.trials import Outcome, Trial, carry_out, settings
 from tests.benchmarks.worlds.world import World
 
@@ -85,13 +87,15 @@ def test_machines_drawn_from_their_budget_err_by_no_more_than_is_stated(figure, 
 def test_a_line_of_the_budget_is_the_error_that_machines_with_that_effect_make(figure, effect):
     own = settings()[0]
     _, found = identified(own, Effect(), 0)
-    says = stated(own.cell.settings, own.robot, found, [effect])
-    line = says.budget.lines[0]
+    belief = own.robot.belief(found)
+    reached = Task.of(own.cell.settings, own.robot, belief).reachable(belief)
+    propagation = Propagation.of(found, belief, task=reached.poses, workspace=reached.workspace)
+    line = UncertaintyBudget.of(propagation, [effect]).lines[0]
     random = np.random.default_rng(11)
     squares = []
     for _ in range(ALIKE * RUNS):
         world, found = identified(own, drawn([effect], 1.0, random), int(random.integers(1 << 31)))
-        errors = world.errors(found.geometry, says.poses, says.workspace, HOUR)
+        errors = world.errors(found.geometry, reached.poses, reached.workspace, HOUR)
         squares.append(np.sum(errors.once**2, axis=-1))
     simulated = float(np.sqrt(np.mean(squares, axis=0).max()))
     ratio = simulated / line.combined_mm
@@ -110,7 +114,6 @@ def swept() -> list[Outcome]:
 
 
 def test_no_machine_beyond_the_budget_passes_that_records_show_to_be_wrong(swept, figure):
-    print(HEAD, *lines(swept), sep="\n")
     for factor in FACTORS:
         each = Totals([one for one in swept if one.trial.factor == factor])
         figure(f"{factor:g} times the usual size: passes", each.passes, f"of {len(each.outcomes)}")

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hexacell.campaign.planner import Plan
+from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.dry_run.campaign import VirtualCampaign
-from hexacell.errors import LimitError
+from hexacell.errors import HexacellError, LimitError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
@@ -21,9 +22,12 @@ from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, make_robot
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
+from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import HeldOut, Verification, verify
 from procedures.calibration.held_out_poses import HeldOutPoses
 from procedures.run.keys import SixNumbers
+from tests.benchmarks.worlds.effects import Effect
+from tests.benchmarks.worlds.world import World
 
 HELD_OUT_FROM, AFTER_FROM, CONFIRMING_FROM = 100, 200, 300
 """Points of the held-out records before and after, and of the confirming ones: of no other records."""
@@ -38,7 +42,88 @@ class VirtualCalibration:
     found: Identification
     after: Robot
     verification: Verification
-    records: int
+    outside: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """What was stated of a calibration's result, and what is true of it.
+
+    ``reason``: where no result was verified, a test of the model failed, or the orientation does not pass.
+    ``outside``: records at which the ball left the gauges' travel.
+    """
+
+    truth: Geometry
+    done: VirtualCalibration | None = None
+    verdict: Verdict | None = None
+    is_refused: bool = False
+    true_mm: float = np.nan
+    value_mm: float = np.nan
+    u_mm: float = np.nan
+    limit_mm: float = np.nan
+    outside: int = 0
+    reason: str = ""
+
+    @property
+    def is_covered(self) -> bool:
+        """Whether the true error is within U of the stated one."""
+        return abs(self.value_mm - self.true_mm) <= self.u_mm
+
+    @property
+    def is_false_pass(self) -> bool:
+        """Whether it passes though the true error is above the limit, or not known."""
+        return self.verdict is Verdict.PASS and not self.true_mm <= self.limit_mm
+
+
+TrueError = Callable[[Robot, Geometry, Identification, Task], float]
+"""The largest true position error, mm, over the poses of a task, with what was found in the controller."""
+
+
+def by_leg_equations(after: Robot, truth: Geometry, found: Identification, task: Task) -> float:
+    """A Hexaglide's, by equations that owe nothing to the code under test."""
+    errors = World(after, truth, Effect(), 0).errors(found.geometry, task.poses, task.workspace)
+    return errors.largest_mm
+
+
+def by_derivatives(after: Robot, truth: Geometry, found: Identification, task: Task) -> float:
+    """Any mechanism's."""
+    budget = task.budget(found, after.belief(found), after.effects, {})
+    assert budget is not None
+    off = found.free - after.mechanism.convention.free_parameters(truth)
+    return float(budget.errors_of(off).position.value)
+
+
+def judged(
+    cell: Cell, robot: Robot, truth: Geometry, random: np.random.Generator, true_error: TrueError
+) -> Judged:
+    """Carry a calibration out, and compare what is stated with the truth."""
+    try:
+        done = calibrate(cell, robot, truth, random)
+    except HexacellError as failed:
+        return Judged(truth, reason=str(failed))
+    found, after, says = done.found, done.after, done.verification
+    is_refused = bool(robot.tolerance_violations(found.estimate))
+    reason = ", ".join(test.sentence for test in says.tests if not test.passed)
+    if says.accuracy is None:
+        reason = reason or "no accuracy"
+        return Judged(truth, done, says.verdict, is_refused, outside=done.outside, reason=reason)
+    belief = after.belief(found)
+    task = Task.of(cell.settings, after, belief).reachable(belief)
+    position, turned = says.accuracy.position, says.accuracy.orientation
+    if not reason and turned.verdict is not Verdict.PASS:
+        reason = f"orientation {turned.value:.3f} +- {turned.expanded:.3f} deg"
+    return Judged(
+        truth,
+        done,
+        says.verdict,
+        is_refused,
+        true_error(after, truth, found, task),
+        position.value,
+        position.expanded,
+        position.limit,
+        done.outside,
+        reason,
+    )
 
 
 def robot_that_reaches(cell: Cell, robot: Robot, random: np.random.Generator) -> Geometry:
@@ -81,7 +166,7 @@ def calibrate(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Gener
     written = as_written(cell.settings, robot, found.geometry).geometry
     after = make_robot(cell.settings, ControllerGeometry(written, robot.branch), taught=written)
     verification = verification_of(cell.settings, found, (robot, after), (truth, random))
-    return VirtualCalibration(found, after, verification, len(campaign.measurements))
+    return VirtualCalibration(found, after, verification, campaign.outside)
 
 
 def verification_of(

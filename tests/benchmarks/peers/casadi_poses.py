@@ -33,7 +33,8 @@ def solve(records: Records) -> Array:
         position, turn, joints = (
             casadi.SX.sym(f"{name}{row}", size) for name, size in (("P", 3), ("w", 3), ("q", 6))
         )
-        legs.append(_legs(geometry, position, _rotation(turn) @ casadi.DM(records.rotations[row]), joints))
+        rotation = rotation_of(turn) @ casadi.DM(records.rotations[row])
+        legs.append(closed_legs(geometry, position, rotation, joints))
         gauge = position - zeros[:, int(point)] - casadi.DM(records.deviations[row])
         encoder = joints - casadi.DM(records.joints[row])
         cost += casadi.sumsqr(gauge) / records.gauge_mm**2 + casadi.sumsqr(encoder) / records.encoder_mm**2
@@ -48,7 +49,7 @@ def solve(records: Records) -> Array:
     return result
 
 
-def _legs(geometry: Any, position: Any, rotation: Any, joints: Any) -> Any:
+def closed_legs(geometry: Any, position: Any, rotation: Any, joints: Any) -> Any:
     S, B = (casadi.reshape(geometry[part], 3, 6) for part in (slice(0, 18), slice(18, 36)))
     legs = S - casadi.repmat(position, 1, 6) - rotation @ B
     legs[0, :] += joints.T
@@ -56,7 +57,7 @@ def _legs(geometry: Any, position: Any, rotation: Any, joints: Any) -> Any:
     return (casadi.sum1(legs**2).T - lengths**2) / (2.0 * lengths)
 
 
-def _rotation(turn: Any) -> Any:
+def rotation_of(turn: Any) -> Any:
     square = casadi.sumsqr(turn) + 1e-30
     angle, k = casadi.sqrt(square), casadi.skew(turn)
     return casadi.SX.eye(3) + casadi.sin(angle) / angle * k + (1 - casadi.cos(angle)) / square * (k @ k)

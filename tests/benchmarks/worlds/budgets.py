@@ -15,7 +15,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.robot.stated import stated_effects
 from hexacell.uncertainty.effects import Effect as StatedEffect
 from tests.benchmarks.worlds import encoders, gauges, legs, rails
-from tests.benchmarks.worlds.effects import Effect, Only, Several
+from tests.benchmarks.worlds.effects import Effect, at_once
 from tests.benchmarks.worlds.legs import Course
 
 Random = np.random.Generator
@@ -52,53 +52,55 @@ def drawn(stated: Iterable[StatedEffect], factor: float, random: Random) -> Effe
     Raises:
         KeyError: there is no such effect here.
     """
-    return Several(tuple(_DRAWS[effect.name](factor * effect.size, random) for effect in stated))
+    return at_once(*(_DRAWS[effect.name](factor * effect.size, random) for effect in stated))
 
 
 def _directions(mrad: float, random: Random) -> Effect:
     yaw, pitch = mrad * MRAD * random.standard_normal((2, 3))[:, rails.RAILS]
-    return rails.NotParallel(yaw, pitch)
+    return rails.not_parallel(yaw, pitch)
 
 
 def _waves(wave_mm: float) -> Draw:
     def draw(um: float, random: Random) -> Effect:
         phases = random.uniform(0.0, 2.0 * np.pi, (3, 3))[rails.RAILS]
-        return rails.Wavy(um * UM, wave_mm, np.array([0.0, 1.0, 1.0]), phases)
+        return rails.wavy(um * UM, wave_mm, np.array([0.0, 1.0, 1.0]), phases)
 
     return draw
 
 
 def _warmer(kelvin: float, course: Course) -> Effect:
     leg, base, platform = kelvin * PPM * np.array(EXPANSIONS_UM_M_K)
-    return legs.Warm(leg * np.ones(6), base, platform, base, course)
+    return legs.warm(leg * np.ones(6), base, platform, base, course)
 
 
 def _oval(um: float, random: Random) -> Effect:
     xy, yz, zx, xx, zz = um * UM * np.sqrt(1.5) * random.standard_normal(5)
     form = np.array([[xx, xy, zx], [xy, -xx, yz], [zx, yz, 0.0]]) / 2.0
-    return gauges.Oval(form + zz / np.sqrt(12.0) * np.diag([-1.0, -1.0, 2.0]))
+    return gauges.oval(form + zz / np.sqrt(12.0) * np.diag([-1.0, -1.0, 2.0]))
 
 
 def _scale(shares: Array) -> Effect:
-    return encoders.Scale(shares * PPM)
+    return encoders.scale(shares * PPM)
 
 
 _DRAWS: dict[str, Draw] = {
     "scale common to all encoders": lambda s, r: _scale(s * r.standard_normal() * np.ones(6)),
     "scale of each encoder": lambda s, r: _scale(s * r.standard_normal(6)),
-    "repeatability of a slider": lambda s, _: rails.Stopping(s * UM, np.array([1.0, 0.0, 0.0])),
+    "repeatability of a slider": lambda s, _: rails.stopping(s * UM, np.array([1.0, 0.0, 0.0])),
     "direction of each rail": _directions,
     **{f"waves of the rails, {wave:g} mm long": _waves(wave) for wave in WAVES_MM},
-    "sag common to all rails": lambda s, r: rails.Sagging(s * UM * r.standard_normal() * np.ones(6)),
-    "temperature at work": lambda s, r: Only(_warmer(s * r.standard_normal(), Course.STEADY), at_work=True),
-    "temperature while measuring": lambda s, r: Only(
+    "sag common to all rails": lambda s, r: rails.sagging(s * UM * r.standard_normal() * np.ones(6)),
+    "temperature at work": lambda s, r: at_once(
+        _warmer(s * r.standard_normal(), Course.STEADY), at_work=True
+    ),
+    "temperature while measuring": lambda s, r: at_once(
         _warmer(s * r.standard_normal(), Course.CENTRED), at_work=False
     ),
-    "load at work": lambda s, r: Only(
-        legs.Elastic(COMPLIANCE * UM * np.ones(6), s * r.standard_normal(3), np.zeros(3)), at_work=True
+    "load at work": lambda s, r: at_once(
+        legs.elastic(COMPLIANCE * UM * np.ones(6), s * r.standard_normal(3), np.zeros(3)), at_work=True
     ),
-    "scale of each gauge": lambda s, r: gauges.Linear(np.diag(1e-3 * s * r.standard_normal(3))[None]),
+    "scale of each gauge": lambda s, r: gauges.linear(np.diag(1e-3 * s * r.standard_normal(3))[None]),
     "roundness of the ball": _oval,
-    "ball beside the tool's centre": lambda s, r: gauges.BallElsewhere(s * r.standard_normal(3)),
+    "ball beside the tool's centre": lambda s, r: gauges.ball_elsewhere(s * r.standard_normal(3)),
 }
 """By the names of the effects of a budget."""

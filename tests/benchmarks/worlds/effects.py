@@ -1,8 +1,10 @@
-"""What an effect of an imperfect machine may change: nothing, unless a subclass says so."""
+"""What an effect of an imperfect machine may change."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +56,10 @@ class Stops:
         """The same with a random sequence of its own."""
         return replace(self, seed=(*self.seed, number))
 
+    def shares(self, hour: float | None) -> Array:
+        """The hours (n,), or if one is named, whether it is over."""
+        return self.hours if hour is None else (self.hours > hour).astype(float)
+
     def random(self) -> np.random.Generator:
         """The same sequence whenever it is asked for."""
         return np.random.default_rng(self.seed)
@@ -88,100 +94,60 @@ class Shift:
         )
 
 
+NOTHING: Array = np.zeros(())
+
+
+def _nothing(*_: object) -> Array:
+    return NOTHING
+
+
+def _no_shift(*_: object) -> Shift:
+    return Shift()
+
+
+@dataclass(frozen=True, eq=False)
 class Effect:
-    """One imperfection. Every hook gives a difference to the perfect machine, which is zero here."""
+    """One imperfection, by how the machine differs from the perfect one; what is not given, does not.
 
-    is_random = False
-    """Whether the platform is elsewhere at every visit of a pose."""
+    Attributes:
+        encoder_error: what encoders show too much (n, 6), mm, where they show (n, 6); servos do not see it.
+        following_error: how far sliders stop from where they should (n, 6), mm; the encoders show it.
+        encoder_noise: what is added to the joint variables of a record only (n, 6), mm.
+        shift: what joints and lengths are off.
+        ball: where the surface that the gauges touch is off the ball's (n, 3), mm, in the base frame, by
+            the platform's rotations (n, 3, 3).
+        gauge_error: what gauges read too much (n, 3), mm, where the ball has moved by (n, 3) since zero.
+        is_random: whether the platform is elsewhere at every visit of a pose.
+    """
 
-    def encoder_error(self, stops: Stops, shown: Array) -> Array | float:
-        """What encoders show too much (n, 6), mm, where they show ``shown``; the servos do not see it."""
-        return 0.0
-
-    def following_error(self, stops: Stops) -> Array | float:
-        """How far sliders stop from where they should (n, 6), mm; the encoders show it."""
-        return 0.0
-
-    def encoder_noise(self, stops: Stops) -> Array | float:
-        """What is added to the joint variables of a record only (n, 6), mm."""
-        return 0.0
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        """What joints and lengths are off."""
-        return Shift()
-
-    def ball(self, stops: Stops, rotations: Array) -> Array | float:
-        """Where the ball's surface is that the gauges touch, off its reference (n, 3), mm, base frame."""
-        return 0.0
-
-    def gauge_error(self, stops: Stops, moved: Array) -> Array | float:
-        """What gauges read too much (n, 3), mm, where the ball has moved by ``moved`` since their zero."""
-        return 0.0
+    encoder_error: Callable[[Stops, Array], Array] = _nothing
+    following_error: Callable[[Stops], Array] = _nothing
+    encoder_noise: Callable[[Stops], Array] = _nothing
+    shift: Callable[[Stops, Posture], Shift] = _no_shift
+    ball: Callable[[Stops, Array], Array] = _nothing
+    gauge_error: Callable[[Stops, Array], Array] = _nothing
+    is_random: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class Several(Effect):
-    """Effects together."""
+def at_once(*effects: Effect, at_work: bool | None = None) -> Effect:
+    """Effects at once; if it is said, at work only, or while measuring only."""
 
-    effects: tuple[Effect, ...] = field(default=())
+    def summed(name: str) -> Callable[..., Any]:
+        nothing: Any = Shift() if name == "shift" else NOTHING
 
-    @property
-    def is_random(self) -> bool:  # type: ignore[override]
-        return any(effect.is_random for effect in self.effects)
+        def hook(stops: Stops, *given: object) -> Any:
+            if at_work not in {None, stops.at_work}:
+                return nothing
+            parts = (
+                getattr(one, name)(stops.of_effect(number), *given) for number, one in enumerate(effects)
+            )
+            return sum(parts, start=nothing)
 
-    def _each(self, stops: Stops) -> list[tuple[Effect, Stops]]:
-        return [(effect, stops.of_effect(number)) for number, effect in enumerate(self.effects)]
+        return hook
 
-    def encoder_error(self, stops: Stops, shown: Array) -> Array | float:
-        return sum((one.encoder_error(own, shown) for one, own in self._each(stops)), start=0.0)
-
-    def following_error(self, stops: Stops) -> Array | float:
-        return sum((one.following_error(own) for one, own in self._each(stops)), start=0.0)
-
-    def encoder_noise(self, stops: Stops) -> Array | float:
-        return sum((one.encoder_noise(own) for one, own in self._each(stops)), start=0.0)
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        return sum((one.shift(own, posture) for one, own in self._each(stops)), start=Shift())
-
-    def ball(self, stops: Stops, rotations: Array) -> Array | float:
-        return sum((one.ball(own, rotations) for one, own in self._each(stops)), start=0.0)
-
-    def gauge_error(self, stops: Stops, moved: Array) -> Array | float:
-        return sum((one.gauge_error(own, moved) for one, own in self._each(stops)), start=0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Only(Effect):
-    """An effect that is there at work only, or while measuring only."""
-
-    effect: Effect
-    at_work: bool
-
-    @property
-    def is_random(self) -> bool:  # type: ignore[override]
-        return self.effect.is_random
-
-    def encoder_error(self, stops: Stops, shown: Array) -> Array | float:
-        return self._acting(stops).encoder_error(stops, shown)
-
-    def following_error(self, stops: Stops) -> Array | float:
-        return self._acting(stops).following_error(stops)
-
-    def encoder_noise(self, stops: Stops) -> Array | float:
-        return self._acting(stops).encoder_noise(stops)
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        return self._acting(stops).shift(stops, posture)
-
-    def ball(self, stops: Stops, rotations: Array) -> Array | float:
-        return self._acting(stops).ball(stops, rotations)
-
-    def gauge_error(self, stops: Stops, moved: Array) -> Array | float:
-        return self._acting(stops).gauge_error(stops, moved)
-
-    def _acting(self, stops: Stops) -> Effect:
-        return self.effect if stops.at_work == self.at_work else Effect()
+    hooks = [one.name for one in fields(Effect) if one.name != "is_random"]
+    given: dict[str, Any] = {name: summed(name) for name in hooks}
+    return Effect(**given, is_random=any(one.is_random for one in effects))
 
 
 def in_steps(values: Array, step: float) -> Array:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from hexacell.kinematics.rotations import Array
@@ -12,112 +10,60 @@ from tests.benchmarks.worlds.effects import Effect, Stops, in_steps
 TURN = 2.0 * np.pi
 
 
-@dataclass(frozen=True, eq=False)
-class Scale(Effect):
+def scale(shares: Array) -> Effect:
     """Each encoder (6,) shows a share too much."""
-
-    shares: Array
-
-    def encoder_error(self, stops: Stops, shown: Array) -> Array:
-        return shown * self.shares
+    return Effect(encoder_error=lambda _, shown: shown * shares)
 
 
-@dataclass(frozen=True, eq=False)
-class Curved(Effect):
+def curved(ends: Array, half_mm: float = 800.0) -> Effect:
     """Each encoder's scale changes along it: (6,) mm too much at the ends of +-``half_mm``."""
-
-    ends: Array
-    half_mm: float = 800.0
-
-    def encoder_error(self, stops: Stops, shown: Array) -> Array:
-        return self.ends * (shown / self.half_mm) ** 2
+    return Effect(encoder_error=lambda _, shown: ends * (shown / half_mm) ** 2)
 
 
-@dataclass(frozen=True, eq=False)
-class Periodic(Effect):
+def periodic(amplitude_mm: float, period_mm: float, phases: Array) -> Effect:
     """Each encoder's interpolation is off by ``amplitude_mm`` once a period."""
-
-    amplitude_mm: float
-    period_mm: float
-    phases: Array
-
-    def encoder_error(self, stops: Stops, shown: Array) -> Array:
-        return self.amplitude_mm * np.sin(TURN * shown / self.period_mm + self.phases)
+    return Effect(encoder_error=lambda _, shown: amplitude_mm * np.sin(TURN * shown / period_mm + phases))
 
 
-@dataclass(frozen=True, eq=False)
-class Offset(Effect):
+def offset(offsets: Array) -> Effect:
     """Each encoder's zero (6,) is off, mm."""
-
-    offsets: Array
-
-    def encoder_error(self, stops: Stops, shown: Array) -> Array:
-        return np.broadcast_to(self.offsets, shown.shape)
+    return Effect(encoder_error=lambda _, shown: np.broadcast_to(offsets, shown.shape))
 
 
-@dataclass(frozen=True, eq=False)
-class Hysteresis(Effect):
+def hysteresis(half_mm: float) -> Effect:
     """Encoders, or nuts, are off by +-``half_mm`` by the direction that a slider came from."""
-
-    half_mm: float
-    is_random = True
-
-    def encoder_error(self, stops: Stops, shown: Array) -> Array:
-        return self.half_mm * stops.directions
+    return Effect(encoder_error=lambda stops, _: half_mm * stops.directions, is_random=True)
 
 
-@dataclass(frozen=True, eq=False)
-class LostCounts(Effect):
+def lost_counts(lost: Array, hour: float) -> Effect:
     """Encoders lose (6,) mm at some hour."""
-
-    lost: Array
-    hour: float
-
-    def encoder_error(self, stops: Stops, shown: Array) -> Array:
-        return (stops.hours > self.hour)[:, None] * self.lost
+    return Effect(encoder_error=lambda stops, _: (stops.hours > hour)[:, None] * lost)
 
 
-@dataclass(frozen=True, eq=False)
-class Creep(Effect):
+def creep(speeds: Array) -> Effect:
     """Encoders' zeros creep, (6,) mm an hour."""
-
-    speeds: Array
-
-    def encoder_error(self, stops: Stops, shown: Array) -> Array:
-        return stops.hours[:, None] * self.speeds
+    return Effect(encoder_error=lambda stops, _: stops.hours[:, None] * speeds)
 
 
-@dataclass(frozen=True, eq=False)
-class Resolution(Effect):
+def resolution(step_mm: float) -> Effect:
     """Joint variables of records come in steps, whatever they are."""
-
-    step_mm: float
-
-    def encoder_noise(self, stops: Stops) -> Array:
-        return in_steps(stops.joints, self.step_mm) - stops.joints
+    return Effect(encoder_noise=lambda stops: in_steps(stops.joints, step_mm) - stops.joints)
 
 
-@dataclass(frozen=True, eq=False)
-class MoreNoise(Effect):
+def more_noise(sigma_mm: float) -> Effect:
     """Noise of ``sigma_mm`` beside the stated one, in the record only."""
-
-    sigma_mm: float
-
-    def encoder_noise(self, stops: Stops) -> Array:
-        return self.sigma_mm * stops.random().standard_normal(stops.joints.shape)
+    return Effect(encoder_noise=lambda stops: sigma_mm * stops.random().standard_normal(stops.joints.shape))
 
 
-@dataclass(frozen=True, eq=False)
-class Outliers(Effect):
+def outliers(size_mm: float, share: float = 0.01) -> Effect:
     """A share of records has one joint variable off by +-``size_mm``."""
 
-    size_mm: float
-    share: float = 0.01
-
-    def encoder_noise(self, stops: Stops) -> Array:
+    def noise(stops: Stops) -> Array:
         random = stops.random()
-        hit = random.random(len(stops)) < self.share
+        hit = random.random(len(stops)) < share
         leg = random.integers(0, 6, len(stops))
         sign = random.choice([-1.0, 1.0], len(stops))
-        error: Array = (hit * sign * self.size_mm)[:, None] * (np.arange(6) == leg[:, None])
+        error: Array = (hit * sign * size_mm)[:, None] * (np.arange(6) == leg[:, None])
         return error
+
+    return Effect(encoder_noise=noise)

@@ -15,7 +15,7 @@ import numpy as np
 from hexacell.identification.solver.result import DataFaultKind
 from hexacell.kinematics.rotations import Array
 from tests.benchmarks.worlds import budgets, encoders, gauges, legs, rails
-from tests.benchmarks.worlds.effects import MOVE_GAUGES_HOURS, RECORD_HOURS, Effect, Only, Several
+from tests.benchmarks.worlds.effects import MOVE_GAUGES_HOURS, RECORD_HOURS, Effect, at_once
 from tests.benchmarks.worlds.legs import Course
 
 Random = np.random.Generator
@@ -103,12 +103,12 @@ def hour(random: Random) -> float:
 
 
 def wavy(wave_mm: float, directions: Array) -> Make:
-    return lambda size, random: rails.Wavy(size * UM, wave_mm, directions, phases(random, 6, 3))
+    return lambda size, random: rails.wavy(size * UM, wave_mm, directions, phases(random, 6, 3))
 
 
 def wavy_rails(wave_mm: float, directions: Array) -> Make:
     """The sliders of one rail have one way."""
-    return lambda size, random: rails.Wavy(
+    return lambda size, random: rails.wavy(
         size * UM, wave_mm, directions, phases(random, 3, 3)[rails.RAILS]
     )
 
@@ -116,7 +116,7 @@ def wavy_rails(wave_mm: float, directions: Array) -> Make:
 def parallel(yaw: Callable[[Random], Array] | None, pitch: Callable[[Random], Array] | None) -> Make:
     def make(size: float, random: Random) -> Effect:
         parts = [np.zeros(6) if drawn is None else size * MRAD * drawn(random) for drawn in (yaw, pitch)]
-        return rails.NotParallel(*parts)
+        return rails.not_parallel(*parts)
 
     return make
 
@@ -128,16 +128,18 @@ def everywhere(_: Random) -> Array:
 def elastic(weight_n: float, spread: float) -> Make:
     def make(size: float, random: Random) -> Effect:
         compliances = size * UM * (1.0 + spread * each(random))
-        return legs.Elastic(compliances, weight_n * DOWN, CENTRE)
+        return legs.elastic(compliances, weight_n * DOWN, CENTRE)
 
     return make
 
 
 def run_out(*, slider: bool, platform: bool) -> Make:
     def make(size: float, random: Random) -> Effect:
-        return Several(
-            tuple(
-                legs.RunOut(size * UM, 3.0 * random.standard_normal((6, 3)), phases(random, 6, 3), at)
+        return at_once(
+            *(
+                legs.run_out(
+                    size * UM, 3.0 * random.standard_normal((6, 3)), phases(random, 6, 3), at_platform=at
+                )
                 for at, has in ((False, slider), (True, platform))
                 if has
             )
@@ -150,19 +152,19 @@ def warm(
     legs_share: Callable[[Random], Array], base: float, platform: float, course: Course = Course.STEADY
 ) -> Make:
     """So many K warmer: shares a K of legs, base and platform."""
-    return lambda size, random: legs.Warm(
+    return lambda size, random: legs.warm(
         size * legs_share(random), size * base, size * platform, size * base, course
     )
 
 
 def at_work(make: Make) -> Make:
     """Only while nothing is measured."""
-    return lambda size, random: Only(make(size, random), at_work=True)
+    return lambda size, random: at_once(make(size, random), at_work=True)
 
 
 def load(compliance: float) -> Make:
     """A force of so many N along each axis on the tool, one sigma; legs yield ``compliance``, um/N."""
-    return lambda size, random: legs.Elastic(
+    return lambda size, random: legs.elastic(
         compliance * UM * np.ones(6), size * random.standard_normal(3), np.zeros(3)
     )
 
@@ -196,42 +198,42 @@ def not_square(random: Random) -> Array:
 
 def noisier(factor_of_size: Array, freedom: float | None = None) -> Make:
     """Gauges as noisy as ``1 + size`` times what is stated."""
-    return lambda size, _: gauges.MoreNoise(
+    return lambda size, _: gauges.more_noise(
         STATED_MM * np.sqrt((1.0 + size) ** 2 - 1.0) * factor_of_size, freedom
     )
 
 
 def together(*parts: tuple[str, float]) -> Make:
     """Some kinds at multiples of their usual size, all at ``size`` times that."""
-    return lambda size, random: Several(
-        tuple(KINDS[name].world(size * factor, random) for name, factor in parts)
+    return lambda size, random: at_once(
+        *(KINDS[name].world(size * factor, random) for name, factor in parts)
     )
 
 
 _NONE = [Kind(NONE, "", 1, lambda _size, _random: Effect())]
 
 _ENCODERS = [
-    Kind("encoders, common scale", "ppm", 15, lambda s, _: encoders.Scale(s * PPM * np.ones(6)), True),
-    Kind("encoders, each its scale", "ppm", 10, lambda s, r: encoders.Scale(s * PPM * each(r))),
-    Kind("encoders, one its scale", "ppm", 20, lambda s, r: encoders.Scale(s * PPM * one(r))),
-    Kind("encoders, scale bent", "um", 5, lambda s, r: encoders.Curved(s * UM * each(r))),
-    Kind("encoders, interpolation 2 mm", "um", 1, lambda s, r: encoders.Periodic(s * UM, 2, phases(r, 6))),
-    Kind("encoders, periodic 20 mm", "um", 2, lambda s, r: encoders.Periodic(s * UM, 20, phases(r, 6))),
-    Kind("encoders, periodic 200 mm", "um", 3, lambda s, r: encoders.Periodic(s * UM, 200, phases(r, 6))),
-    Kind("encoders, zeros off", "um", 30, lambda s, r: encoders.Offset(s * UM * each(r))),
-    Kind("encoders, hysteresis", "um", 1, lambda s, _: encoders.Hysteresis(s * UM)),
-    Kind("encoders, zeros creep", "um/h", 3, lambda s, r: encoders.Creep(s * UM * each(r))),
+    Kind("encoders, common scale", "ppm", 15, lambda s, _: encoders.scale(s * PPM * np.ones(6)), True),
+    Kind("encoders, each its scale", "ppm", 10, lambda s, r: encoders.scale(s * PPM * each(r))),
+    Kind("encoders, one its scale", "ppm", 20, lambda s, r: encoders.scale(s * PPM * one(r))),
+    Kind("encoders, scale bent", "um", 5, lambda s, r: encoders.curved(s * UM * each(r))),
+    Kind("encoders, interpolation 2 mm", "um", 1, lambda s, r: encoders.periodic(s * UM, 2, phases(r, 6))),
+    Kind("encoders, periodic 20 mm", "um", 2, lambda s, r: encoders.periodic(s * UM, 20, phases(r, 6))),
+    Kind("encoders, periodic 200 mm", "um", 3, lambda s, r: encoders.periodic(s * UM, 200, phases(r, 6))),
+    Kind("encoders, zeros off", "um", 30, lambda s, r: encoders.offset(s * UM * each(r))),
+    Kind("encoders, hysteresis", "um", 1, lambda s, _: encoders.hysteresis(s * UM)),
+    Kind("encoders, zeros creep", "um/h", 3, lambda s, r: encoders.creep(s * UM * each(r))),
     Kind(
-        "encoders, one loses counts", "um", 10, lambda s, r: encoders.LostCounts(s * UM * one(r), hour(r))
+        "encoders, one loses counts", "um", 10, lambda s, r: encoders.lost_counts(s * UM * one(r), hour(r))
     ),
-    Kind("encoders, resolution", "um", 5, lambda s, _: encoders.Resolution(s * UM)),
+    Kind("encoders, resolution", "um", 5, lambda s, _: encoders.resolution(s * UM)),
     Kind(
         "encoders, noisier",
         "times more",
         0.2,
-        lambda s, _: encoders.MoreNoise(STATED_MM * float(np.sqrt((1 + s) ** 2 - 1))),
+        lambda s, _: encoders.more_noise(STATED_MM * float(np.sqrt((1 + s) ** 2 - 1))),
     ),
-    Kind("encoders, 1 % outliers", "um", 50, lambda s, _: encoders.Outliers(s * UM), faults=GROSS),
+    Kind("encoders, 1 % outliers", "um", 50, lambda s, _: encoders.outliers(s * UM), faults=GROSS),
 ]
 
 _RAILS = [
@@ -250,9 +252,9 @@ _RAILS = [
     Kind("rails wavy xyz, 600 mm", "um", 3, wavy(600, EVERY)),
     Kind("three rails wavy yz, 600 mm", "um", 3, wavy_rails(600, Y + Z)),
     Kind("three rails wavy yz, 1500 mm", "um", 5, wavy_rails(1500, Y + Z)),
-    Kind("rails sag alike", "um", 20, lambda s, _: rails.Sagging(s * UM * np.ones(6)), True),
-    Kind("rails sag, each", "um", 5, lambda s, r: rails.Sagging(s * UM * each(r))),
-    Kind("three rails sag, each", "um", 5, lambda s, r: rails.Sagging(s * UM * per_rail(r))),
+    Kind("rails sag alike", "um", 20, lambda s, _: rails.sagging(s * UM * np.ones(6)), True),
+    Kind("rails sag, each", "um", 5, lambda s, r: rails.sagging(s * UM * each(r))),
+    Kind("three rails sag, each", "um", 5, lambda s, r: rails.sagging(s * UM * per_rail(r))),
     Kind("rails yaw, each", "mrad", 0.02, parallel(each, None)),
     Kind("rails pitch, each", "mrad", 0.02, parallel(None, each)),
     Kind("three rails yaw, each", "mrad", 0.02, parallel(per_rail, None)),
@@ -264,24 +266,24 @@ _RAILS = [
         "rails twisted, arm 60 mm",
         "mrad",
         0.05,
-        lambda s, r: rails.Twisted(s * MRAD * per_rail(r), np.array([0.0, 20.0, 60.0])),
+        lambda s, r: rails.twisted(s * MRAD * per_rail(r), np.array([0.0, 20.0, 60.0])),
     ),
     Kind(
-        "sliders nod, arm 60 mm", "mrad", 0.03, lambda s, r: rails.Nodding(s * MRAD, 600, 60, phases(r, 6))
+        "sliders nod, arm 60 mm", "mrad", 0.03, lambda s, r: rails.nodding(s * MRAD, 600, 60, phases(r, 6))
     ),
-    Kind("rails, a bump each", "um", 3, lambda s, r: rails.Bump(s * UM, 40, r.uniform(-600, 600, 6))),
-    Kind("rails yield under load", "um/N", 0.02, lambda s, _: rails.Yielding(
+    Kind("rails, a bump each", "um", 3, lambda s, r: rails.bump(s * UM, 40, r.uniform(-600, 600, 6))),
+    Kind("rails yield under load", "um/N", 0.02, lambda s, _: rails.yielding(
         s * UM * np.ones(6), 20 * DOWN, CENTRE
     )),
 ]  # fmt: skip
 
 _SLIDERS = [
-    Kind("sliders do not repeat x", "um", 2, lambda s, _: rails.Stopping(s * UM, X)),
-    Kind("sliders do not repeat yz", "um", 2, lambda s, _: rails.Stopping(s * UM, Y + Z)),
-    Kind("sliders do not repeat xyz", "um", 2, lambda s, _: rails.Stopping(s * UM, EVERY)),
-    Kind("sliders stop elsewhere, seen", "um", 5, lambda s, _: rails.Following(s * UM)),
-    Kind("backlash by direction", "um", 2, lambda s, _: encoders.Hysteresis(s * UM)),
-    Kind("play of legs by load", "um", 2, lambda s, _: legs.Play(s * UM, 20 * DOWN, CENTRE)),
+    Kind("sliders do not repeat x", "um", 2, lambda s, _: rails.stopping(s * UM, X)),
+    Kind("sliders do not repeat yz", "um", 2, lambda s, _: rails.stopping(s * UM, Y + Z)),
+    Kind("sliders do not repeat xyz", "um", 2, lambda s, _: rails.stopping(s * UM, EVERY)),
+    Kind("sliders stop elsewhere, seen", "um", 5, lambda s, _: rails.following(s * UM)),
+    Kind("backlash by direction", "um", 2, lambda s, _: encoders.hysteresis(s * UM)),
+    Kind("play of legs by load", "um", 2, lambda s, _: legs.play(s * UM, 20 * DOWN, CENTRE)),
 ]
 
 _LEGS = [
@@ -291,7 +293,7 @@ _LEGS = [
     Kind("joints run out, sliders", "um", 2, run_out(slider=True, platform=False)),
     Kind("joints run out, platform", "um", 2, run_out(slider=False, platform=True)),
     Kind("joints run out, both", "um", 2, run_out(slider=True, platform=True)),
-    Kind("axes of joints apart", "um", 10, lambda s, r: legs.AxesApart(s * UM * each(r))),
+    Kind("axes of joints apart", "um", 10, lambda s, r: legs.axes_apart(s * UM * each(r))),
     Kind("legs warmer, steel", "K", 1, warm(alike(STEEL), 0, 0)),
     Kind("legs differ in temperature", "K", 0.3, warm(differing(STEEL), 0, 0)),
     Kind("all warmer, granite base", "K", 1, warm(alike(ALUMINIUM), GRANITE, ALUMINIUM)),
@@ -303,60 +305,60 @@ _LEGS = [
     Kind("legs warmer at work", "K", 1, at_work(warm(alike(STEEL), 0, 0)), hidden=True),
     Kind("all warmer at work", "K", 1, at_work(warm(alike(ALUMINIUM), GRANITE, ALUMINIUM)), hidden=True),
     Kind("load at work", "N", 20, at_work(load(0.03)), hidden=True),
-    Kind("legs creep, each", "um/h", 3, lambda s, r: legs.Growing(s * UM * each(r))),
-    Kind("a leg slips once", "um", 10, lambda s, r: legs.Growing(s * UM * one(r), hour(r))),
+    Kind("legs creep, each", "um/h", 3, lambda s, r: legs.growing(s * UM * each(r))),
+    Kind("a leg slips once", "um", 10, lambda s, r: legs.growing(s * UM * one(r), hour(r))),
 ]
 
 _BALL = [
-    Kind("ball out of round, order 2", "um", 2, lambda s, r: gauges.OutOfRound(s * UM, direction(r), 2)),
-    Kind("ball out of round, order 3", "um", 2, lambda s, r: gauges.OutOfRound(s * UM, direction(r), 3)),
-    Kind("ball and tool off the drawing", "um", 300, lambda s, r: gauges.ToolElsewhere(
+    Kind("ball out of round, order 2", "um", 2, lambda s, r: gauges.out_of_round(s * UM, direction(r), 2)),
+    Kind("ball out of round, order 3", "um", 2, lambda s, r: gauges.out_of_round(s * UM, direction(r), 3)),
+    Kind("ball and tool off the drawing", "um", 300, lambda s, r: gauges.tool_elsewhere(
         s * UM * direction(r)
     )),
-    Kind("ball off the tool", "um", 20, lambda s, r: gauges.BallElsewhere(s * UM * direction(r)), True),
+    Kind("ball off the tool", "um", 20, lambda s, r: gauges.ball_elsewhere(s * UM * direction(r)), True),
     Kind(
-        "ball slips once", "um", 10, lambda s, r: gauges.BallMoves(s * UM * direction(r), hour(r)),
+        "ball slips once", "um", 10, lambda s, r: gauges.ball_moves(s * UM * direction(r), hour(r)),
         faults=SHIFT,
     ),
-    Kind("ball creeps", "um/h", 5, lambda s, r: gauges.BallMoves(s * UM * direction(r))),
-    Kind("ball's stem bends", "per mille", 1, lambda s, _: gauges.StemBends(1e-3 * s)),
+    Kind("ball creeps", "um/h", 5, lambda s, r: gauges.ball_moves(s * UM * direction(r))),
+    Kind("ball's stem bends", "per mille", 1, lambda s, _: gauges.stem_bends(1e-3 * s)),
 ]  # fmt: skip
 
 _GAUGES = [
-    Kind("gauges, common scale", "per mille", 1, lambda s, _: gauges.Linear(scaled(1e-3 * s * EVERY))),
-    Kind("gauges, each its scale", "per mille", 1, lambda s, r: gauges.Linear(
+    Kind("gauges, common scale", "per mille", 1, lambda s, _: gauges.linear(scaled(1e-3 * s * EVERY))),
+    Kind("gauges, each its scale", "per mille", 1, lambda s, r: gauges.linear(
         scaled(1e-3 * s * r.standard_normal(3))
     )),
-    Kind("gauges, scale bent", "um", 2, lambda s, r: gauges.Bent(s * UM * r.standard_normal(3))),
-    Kind("gauges, periodic 1 mm", "um", 2, lambda s, r: gauges.Periodic(s * UM, 1.0, phases(r, 3))),
-    Kind("gauges, hysteresis", "um", 2, lambda s, _: gauges.Hysteresis(s * UM)),
-    Kind("gauges, resolution", "um", 5, lambda s, _: gauges.Resolution(s * UM)),
-    Kind("triad turned, once for all", "deg", 0.3, lambda s, r: gauges.Linear(
+    Kind("gauges, scale bent", "um", 2, lambda s, r: gauges.bent(s * UM * r.standard_normal(3))),
+    Kind("gauges, periodic 1 mm", "um", 2, lambda s, r: gauges.periodic(s * UM, 1.0, phases(r, 3))),
+    Kind("gauges, hysteresis", "um", 2, lambda s, _: gauges.hysteresis(s * UM)),
+    Kind("gauges, resolution", "um", 5, lambda s, _: gauges.resolution(s * UM)),
+    Kind("triad turned, once for all", "deg", 0.3, lambda s, r: gauges.linear(
         turned(s * DEG * r.standard_normal((1, 3)))
     )),
-    Kind("triad turned, at each point", "deg", 0.3, lambda s, r: gauges.Linear(
+    Kind("triad turned, at each point", "deg", 0.3, lambda s, r: gauges.linear(
         turned(s * DEG * r.standard_normal((POINTS, 3)))
     )),
-    Kind("plungers not square", "deg", 0.1, lambda s, r: gauges.Linear(s * DEG * not_square(r))),
-    Kind("cosine error", "deg", 1, lambda s, r: gauges.Linear(
+    Kind("plungers not square", "deg", 0.1, lambda s, r: gauges.linear(s * DEG * not_square(r))),
+    Kind("cosine error", "deg", 1, lambda s, r: gauges.linear(
         scaled(1.0 / np.cos(s * DEG * np.abs(r.standard_normal(3))) - 1.0)
     )),
     Kind("gauges noisier", "times more", 0.2, noisier(EVERY)),
     Kind("one gauge noisier", "times more", 0.5, noisier(X)),
     Kind("gauges noisier, long tails", "times more", 0.2, noisier(EVERY, 3.0)),
-    Kind("gauges, 1 % outliers", "um", 50, lambda s, _: gauges.Outliers(s * UM), faults=GROSS),
-    Kind("stands drift", "um/h", 10, lambda s, r: gauges.Drifting(s * UM * r.standard_normal((POINTS, 3)))),
-    Kind("stands warm up", "um/h", 30, lambda s, r: gauges.Drifting(
+    Kind("gauges, 1 % outliers", "um", 50, lambda s, _: gauges.outliers(s * UM), faults=GROSS),
+    Kind("stands drift", "um/h", 10, lambda s, r: gauges.drifting(s * UM * r.standard_normal((POINTS, 3)))),
+    Kind("stands warm up", "um/h", 30, lambda s, r: gauges.drifting(
         s * UM * r.standard_normal((POINTS, 3)), warming_up=True
     )),
-    Kind("one gauge's zero drifts", "um/h", 20, lambda s, r: gauges.Drifting(
+    Kind("one gauge's zero drifts", "um/h", 20, lambda s, r: gauges.drifting(
         s * UM * r.standard_normal((POINTS, 1)) * X
     )),
-    Kind("stands turn", "mrad/h", 0.05, lambda s, r: gauges.Turning(
+    Kind("stands turn", "mrad/h", 0.05, lambda s, r: gauges.turning(
         s * MRAD * r.standard_normal(3), np.array([0.0, 0.0, 200.0])
     )),
     Kind(
-        "a stand is pushed", "um", 10, lambda s, r: gauges.Jump(s * UM * direction(r), hour(r)),
+        "a stand is pushed", "um", 10, lambda s, r: gauges.jump(s * UM * direction(r), hour(r)),
         faults=SHIFT,
     ),
 ]  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 from enum import Enum
 
 import numpy as np
@@ -11,74 +11,63 @@ from hexacell.kinematics.rotations import Array
 from tests.benchmarks.worlds.closure import leg_forces
 from tests.benchmarks.worlds.effects import Effect, Posture, Shift, Stops
 
-TURN = 2.0 * np.pi
 WARM_UP_HOURS = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Elastic(Effect):
+def _longer(of_pull: Callable[[Array], Array], weight: Array, centre: Array) -> Effect:
+    """Legs are longer by a function of their pull (n, 6), N, under a weight (3,) at a centre (3,)."""
+    return Effect(
+        shift=lambda _, posture: Shift(
+            lengths=of_pull(leg_forces(posture.bodies, posture.poses, weight, centre))
+        )
+    )
+
+
+def elastic(compliances: Array, weight: Array, centre: Array) -> Effect:
     """Legs stretch by (6,) mm a N under a weight (3,), N, at a centre (3,), mm, platform frame."""
-
-    compliances: Array
-    weight: Array
-    centre: Array
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        pull = leg_forces(posture.bodies, posture.poses, self.weight, self.centre)
-        return Shift(lengths=self.compliances * pull)
+    return _longer(lambda pull: compliances * pull, weight, centre)
 
 
-@dataclass(frozen=True, eq=False)
-class Play(Effect):
+def play(half_mm: float, weight: Array, centre: Array, soft_n: float = 0.3) -> Effect:
     """Legs are +-``half_mm`` longer or shorter as they are pulled or pushed, softly within ``soft_n``."""
-
-    half_mm: float
-    weight: Array
-    centre: Array
-    soft_n: float = 0.3
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        pull = leg_forces(posture.bodies, posture.poses, self.weight, self.centre)
-        return Shift(lengths=self.half_mm * np.tanh(pull / self.soft_n))
+    return _longer(lambda pull: half_mm * np.tanh(pull / soft_n), weight, centre)
 
 
-@dataclass(frozen=True, eq=False)
-class RunOut(Effect):
+def run_out(size_mm: float, waves: Array, phases: Array, *, at_platform: bool) -> Effect:
     """Joints' centres move as legs turn in them: ``size_mm``, one sigma along each axis.
 
     The displacement is a wave over the direction of the leg, with wave vectors and phases (6, 3).
     """
 
-    size_mm: float
-    waves: Array
-    phases: Array
-    at_platform: bool
+    def shift(_: Stops, posture: Posture) -> Shift:
+        toward = _on_platform(posture) if at_platform else posture.bodies.directions(posture.poses)[0]
+        angle = np.sum(toward * waves, axis=-1)[..., None] + phases
+        moved = np.sqrt(2.0) * size_mm * np.sin(angle)
+        return Shift(platform=moved) if at_platform else Shift(sliders=moved)
 
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        toward, _ = posture.bodies.directions(posture.poses)
-        if self.at_platform:
-            toward = np.einsum("nji,nlj->nli", posture.poses.rotations, toward)
-        angle = np.sum(toward * self.waves, axis=-1)[..., None] + self.phases
-        moved = np.sqrt(2.0) * self.size_mm * np.sin(angle)
-        return Shift(platform=moved) if self.at_platform else Shift(sliders=moved)
+    return Effect(shift=shift)
 
 
-@dataclass(frozen=True, eq=False)
-class AxesApart(Effect):
+def axes_apart(distances: Array) -> Effect:
     """The two axes of platform joints pass each other at (6,) mm.
 
     The first is along x of the platform; the second, normal to it and to the leg, is off along the leg's
     part normal to the first.
     """
 
-    distances: Array
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        toward, _ = posture.bodies.directions(posture.poses)
-        own = np.einsum("nji,nlj->nli", posture.poses.rotations, toward)
-        own = own * np.array([0.0, 1.0, 1.0])
+    def shift(_: Stops, posture: Posture) -> Shift:
+        own = _on_platform(posture) * np.array([0.0, 1.0, 1.0])
         own = own / np.linalg.norm(own, axis=-1, keepdims=True)
-        return Shift(platform=self.distances[:, None] * own)
+        return Shift(platform=distances[:, None] * own)
+
+    return Effect(shift=shift)
+
+
+def _on_platform(posture: Posture) -> Array:
+    """Directions of the legs (n, 6, 3) in the platform frame."""
+    toward, _ = posture.bodies.directions(posture.poses)
+    own: Array = np.einsum("nji,nlj->nli", posture.poses.rotations, toward)
+    return own
 
 
 class Course(Enum):
@@ -104,41 +93,33 @@ class Course(Enum):
         return shares
 
 
-@dataclass(frozen=True, eq=False)
-class Warm(Effect):
+def warm(
+    legs: Array,
+    base: float = 0.0,
+    platform: float = 0.0,
+    rails: float = 0.0,
+    course: Course = Course.STEADY,
+) -> Effect:
     """Parts have grown by shares: legs (6,), the base across its rails and along them, the platform."""
 
-    legs: Array
-    base: float = 0.0
-    platform: float = 0.0
-    rails: float = 0.0
-    course: Course = Course.STEADY
+    def encoder_error(stops: Stops, shown: Array) -> Array:
+        return -rails * course.shares(stops.hours)[:, None] * shown
 
-    def encoder_error(self, stops: Stops, shown: Array) -> Array:
-        return -self.rails * self.course.shares(stops.hours)[:, None] * shown
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        share = self.course.shares(stops.hours)
-        bodies = posture.bodies
+    def shift(stops: Stops, posture: Posture) -> Shift:
+        share, bodies = course.shares(stops.hours), posture.bodies
         zero = bodies.sliders[..., 0] - posture.joints
         grown = np.stack(
-            [self.rails * zero, self.base * bodies.sliders[..., 1], self.base * bodies.sliders[..., 2]],
-            axis=-1,
+            [rails * zero, base * bodies.sliders[..., 1], base * bodies.sliders[..., 2]], axis=-1
         )
         return Shift(
             sliders=share[:, None, None] * grown,
-            platform=self.platform * share[:, None, None] * bodies.platform,
-            lengths=share[:, None] * self.legs * bodies.lengths,
+            platform=platform * share[:, None, None] * bodies.platform,
+            lengths=share[:, None] * legs * bodies.lengths,
         )
 
+    return Effect(encoder_error=encoder_error, shift=shift)
 
-@dataclass(frozen=True, eq=False)
-class Growing(Effect):
+
+def growing(growth: Array, hour: float | None = None) -> Effect:
     """Legs grow (6,) mm an hour, or by as much at once at some hour."""
-
-    growth: Array
-    hour: float | None = None
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        share = stops.hours if self.hour is None else (stops.hours > self.hour).astype(float)
-        return Shift(lengths=share[:, None] * self.growth)
+    return Effect(shift=lambda stops, _: Shift(lengths=stops.shares(hour)[:, None] * growth))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from hexacell.kinematics.rotations import Array
@@ -17,6 +15,8 @@ RAILS = np.array([0, 1, 2, 2, 1, 0])
 HALF_MM = 800.0
 """Half the length of a rail."""
 
+X, _, Z = np.eye(3)
+
 
 def along_rails(posture: Posture) -> Array:
     """Where the slider joints are along their rails (n, 6), mm."""
@@ -24,121 +24,85 @@ def along_rails(posture: Posture) -> Array:
     return places
 
 
-@dataclass(frozen=True, eq=False)
-class Wavy(Effect):
+def _aside(amounts: Array, direction: Array) -> Shift:
+    """Slider joints moved by (n, 6) along a direction, or (n, 6, 1) each along its own."""
+    return Shift(sliders=amounts[..., None] * direction)
+
+
+def wavy(amplitude_mm: float, wave_mm: float, directions: Array, phases: Array) -> Effect:
     """Each slider's way is a wave along some directions (3,), ``amplitude_mm`` high.
 
     ``phases`` (6, 3) are those of the ways of sliders.
     """
 
-    amplitude_mm: float
-    wave_mm: float
-    directions: Array
-    phases: Array
+    def shift(_: Stops, posture: Posture) -> Shift:
+        angle = TURN * along_rails(posture)[..., None] / wave_mm + phases
+        return Shift(sliders=amplitude_mm * directions * np.sin(angle))
 
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        angle = TURN * along_rails(posture)[..., None] / self.wave_mm + self.phases
-        return Shift(sliders=self.amplitude_mm * self.directions * np.sin(angle))
+    return Effect(shift=shift)
 
 
-@dataclass(frozen=True, eq=False)
-class Sagging(Effect):
+def sagging(depths: Array) -> Effect:
     """Rails hang down in the middle, (6,) mm there and nothing at both ends."""
-
-    depths: Array
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        down = -self.depths * (1.0 - (along_rails(posture) / HALF_MM) ** 2)
-        return Shift(sliders=down[..., None] * np.array([0.0, 0.0, 1.0]))
+    return Effect(
+        shift=lambda _, posture: _aside(-depths * (1.0 - (along_rails(posture) / HALF_MM) ** 2), Z)
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class NotParallel(Effect):
+def not_parallel(yaw: Array, pitch: Array) -> Effect:
     """Rails lead aside (6,) and up (6,), rad, about their middle."""
-
-    yaw: Array
-    pitch: Array
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        tangent = np.stack([np.zeros(6), self.yaw, self.pitch], axis=-1)
-        return Shift(sliders=along_rails(posture)[..., None] * tangent)
+    tangent = np.stack([np.zeros(6), yaw, pitch], axis=-1)
+    return Effect(shift=lambda _, posture: _aside(along_rails(posture), tangent))
 
 
-@dataclass(frozen=True, eq=False)
-class Twisted(Effect):
+def twisted(rolls: Array, arm: Array) -> Effect:
     """Rails roll (6,) rad from the middle to an end, which moves joints on an arm (3,), mm."""
-
-    rolls: Array
-    arm: Array
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        roll = self.rolls * along_rails(posture) / HALF_MM
-        sideways = np.cross([1.0, 0.0, 0.0], self.arm)
-        return Shift(sliders=roll[..., None] * sideways)
+    return Effect(shift=lambda _, posture: _aside(rolls * along_rails(posture) / HALF_MM, np.cross(X, arm)))
 
 
-@dataclass(frozen=True, eq=False)
-class Nodding(Effect):
+def nodding(amplitude: float, wave_mm: float, arm_mm: float, phases: Array) -> Effect:
     """Sliders pitch by a wave of ``amplitude`` rad, which moves joints ``arm_mm`` high along the rail."""
-
-    amplitude: float
-    wave_mm: float
-    arm_mm: float
-    phases: Array
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        pitch = self.amplitude * np.sin(TURN * along_rails(posture) / self.wave_mm + self.phases)
-        return Shift(sliders=self.arm_mm * pitch[..., None] * np.array([1.0, 0.0, 0.0]))
+    return Effect(
+        shift=lambda _, posture: _aside(
+            arm_mm * amplitude * np.sin(TURN * along_rails(posture) / wave_mm + phases), X
+        )
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class Bump(Effect):
+def bump(height_mm: float, width_mm: float, places: Array) -> Effect:
     """Each way has a bump of a height, a width (standard deviation) and a place (6,), mm."""
 
-    height_mm: float
-    width_mm: float
-    places: Array
+    def shift(_: Stops, posture: Posture) -> Shift:
+        away = (along_rails(posture) - places) / width_mm
+        return _aside(height_mm * np.exp(-0.5 * away**2), Z)
 
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        away = (along_rails(posture) - self.places) / self.width_mm
-        up = self.height_mm * np.exp(-0.5 * away**2)
-        return Shift(sliders=up[..., None] * np.array([0.0, 0.0, 1.0]))
+    return Effect(shift=shift)
 
 
-@dataclass(frozen=True, eq=False)
-class Stopping(Effect):
+def stopping(sigma_mm: float, directions: Array) -> Effect:
     """At every stop sliders are elsewhere along some directions (3,), one sigma; encoders do not see it."""
 
-    sigma_mm: float
-    directions: Array
-    is_random = True
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
+    def shift(stops: Stops, _: Posture) -> Shift:
         drawn = stops.random().standard_normal((len(stops), 6, 3))
-        return Shift(sliders=self.sigma_mm * self.directions * drawn)
+        return Shift(sliders=sigma_mm * directions * drawn)
+
+    return Effect(shift=shift, is_random=True)
 
 
-@dataclass(frozen=True, eq=False)
-class Following(Effect):
+def following(sigma_mm: float) -> Effect:
     """At every stop sliders are elsewhere, one sigma, as the encoders show."""
-
-    sigma_mm: float
-    is_random = True
-
-    def following_error(self, stops: Stops) -> Array:
-        return self.sigma_mm * stops.random().standard_normal((len(stops), 6))
+    return Effect(
+        following_error=lambda stops: sigma_mm * stops.random().standard_normal((len(stops), 6)),
+        is_random=True,
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class Yielding(Effect):
+def yielding(compliances: Array, weight: Array, centre: Array) -> Effect:
     """Slider joints yield along z by (6,) mm for each N that their leg pulls."""
 
-    compliances: Array
-    weight: Array
-    centre: Array
+    def shift(_: Stops, posture: Posture) -> Shift:
+        toward, _distances = posture.bodies.directions(posture.poses)
+        pull = leg_forces(posture.bodies, posture.poses, weight, centre)
+        return _aside(-compliances * pull * toward[..., 2], Z)
 
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        toward, _ = posture.bodies.directions(posture.poses)
-        pull = leg_forces(posture.bodies, posture.poses, self.weight, self.centre)
-        down = -self.compliances * pull * toward[..., 2]
-        return Shift(sliders=down[..., None] * np.array([0.0, 0.0, 1.0]))
+    return Effect(shift=shift)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from tests.benchmarks.worlds import frames, legs, rails
 from tests.benchmarks.worlds.campaigns import Setting, setting
 from tests.benchmarks.worlds.closure import Bodies, close, leg_forces, slider_places
 from tests.benchmarks.worlds.effects import Effect, Posture, Shift, Stops
-from tests.benchmarks.worlds.encoders import Offset, Scale
+from tests.benchmarks.worlds.encoders import offset, scale
 from tests.benchmarks.worlds.kinds import CENTRE, DOWN, KINDS, NONE
 from tests.benchmarks.worlds.world import World
 
@@ -119,24 +119,14 @@ def test_encoders_that_show_too_much_bring_sliders_short(own):
     ideal, joints = reached(own, Effect()), commanded_joints(own)
     shares = 1e-4 * np.arange(-2.0, 4.0)
     expected = product_poses(own, joints * (1.0 - shares), ideal)
-    assert difference(reached(own, Scale(shares)), expected) < 1e-8
+    assert difference(reached(own, scale(shares)), expected) < 1e-8
 
 
 def test_zeros_of_encoders_are_a_shift_of_slider_joints(own):
     offsets = 0.1 * np.arange(6.0)
     S = own.truth["S"] - offsets[:, None] * np.array([1.0, 0.0, 0.0])
     moved = Geometry.of(own.truth.parameters, {"S": S, "B": own.truth["B"], "l": own.truth["l"]})
-    assert difference(reached(own, Offset(offsets)), reached(own, Effect(), moved)) < 1e-8
-
-
-@dataclass(frozen=True, eq=False)
-class Constant(Effect):
-    """Joints and lengths off by constants."""
-
-    off: Shift
-
-    def shift(self, stops: Stops, posture: Posture) -> Shift:
-        return self.off
+    assert difference(reached(own, offset(offsets)), reached(own, Effect(), moved)) < 1e-8
 
 
 def test_small_shifts_move_the_platform_as_the_derivatives_of_the_product_say(own):
@@ -145,14 +135,15 @@ def test_small_shifts_move_the_platform_as_the_derivatives_of_the_product_say(ow
     lengths = 1e-3 * random.standard_normal(6)
     ideal, joints = reached(own, Effect()), commanded_joints(own)
     change = own.truth.parameters.vector({"S": sliders, "B": platform, "l": lengths})
+    off = Shift(sliders, platform, lengths)
     linear = pose_sensitivity(own.robot.mechanism, own.truth, ideal, joints).parameters @ change
-    found = pose_errors(reached(own, Constant(Shift(sliders, platform, lengths))), ideal)
+    found = pose_errors(reached(own, Effect(shift=lambda *_: off)), ideal)
     assert np.abs(found - linear).max() < 2e-2 * np.abs(linear).max()
 
 
 def test_a_machine_that_grows_as_a_whole_goes_as_far_too_far(own):
     share = 1e-4
-    found = reached(own, legs.Warm(share * np.ones(6), share, share, share))
+    found = reached(own, legs.warm(share * np.ones(6), share, share, share))
     expected = reached(own, Effect())
     assert np.allclose(found.positions, (1.0 + share) * expected.positions, atol=1e-4)  # of second order
     assert np.allclose(found.rotations, expected.rotations, atol=1e-6)
@@ -160,7 +151,7 @@ def test_a_machine_that_grows_as_a_whole_goes_as_far_too_far(own):
 
 def test_rails_that_all_lead_aside_are_a_turned_machine(own):
     yaw = 1e-4
-    found = reached(own, rails.NotParallel(yaw * np.ones(6), np.zeros(6)))
+    found = reached(own, rails.not_parallel(yaw * np.ones(6), np.zeros(6)))
     turn = Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix()
     # Turned back, slider joints are where they were but for x, which then depends on y.
     S = own.truth["S"].copy()
@@ -174,7 +165,7 @@ def test_rails_that_all_lead_aside_are_a_turned_machine(own):
 def test_a_sag_is_deepest_in_the_middle_and_nothing_at_the_ends(own):
     places = np.array([[-800.0, 0.0, 800.0, 400.0, 0.0, -400.0]])
     posture = _standing(own, places)
-    down = rails.Sagging(0.05 * np.ones(6)).shift(_stops(places), posture).sliders
+    down = rails.sagging(0.05 * np.ones(6)).shift(_stops(places), posture).sliders
     assert isinstance(down, np.ndarray)
     assert np.allclose(down[0, :, 2], [0.0, -0.05, 0.0, -0.0375, -0.05, -0.0375])
     assert not down[..., :2].any()
@@ -182,7 +173,7 @@ def test_a_sag_is_deepest_in_the_middle_and_nothing_at_the_ends(own):
 
 def test_a_wave_repeats_after_its_length_and_has_its_amplitude(own):
     places = np.linspace(-300.0, 300.0, 601)[:, None] * np.ones(6)
-    wave = rails.Wavy(0.01, 150.0, np.array([0.0, 1.0, 0.0]), np.zeros((6, 3)))
+    wave = rails.wavy(0.01, 150.0, np.array([0.0, 1.0, 0.0]), np.zeros((6, 3)))
     shift = wave.shift(_stops(places), _standing(own, places)).sliders
     assert isinstance(shift, np.ndarray)
     assert np.allclose(shift[:451], shift[150:], atol=1e-12)
@@ -228,7 +219,7 @@ def test_elastic_legs_are_longer_by_their_pull(own):
     poses, joints = reached(own, Effect()), commanded_joints(own)
     bodies = Bodies.of(own.truth, joints)
     pull = leg_forces(bodies, poses, 20.0 * DOWN, CENTRE)
-    shift = legs.Elastic(1e-5 * np.ones(6), 20.0 * DOWN, CENTRE).shift(
+    shift = legs.elastic(1e-5 * np.ones(6), 20.0 * DOWN, CENTRE).shift(
         _stops(joints), Posture(joints, bodies, poses)
     )
     assert np.allclose(shift.lengths, 1e-5 * pull)
@@ -236,7 +227,7 @@ def test_elastic_legs_are_longer_by_their_pull(own):
 
 def test_sliders_that_do_not_repeat_scatter_the_platform_as_the_derivatives_say(own):
     sigma = 0.002
-    visits = world(own, rails.Stopping(sigma, np.array([1.0, 0.0, 0.0])))
+    visits = world(own, rails.stopping(sigma, np.array([1.0, 0.0, 0.0])))
     task, workspace = own.task.poses, own.task.workspace
     errors = visits.errors(own.truth, task, workspace)
     joints = slider_places(own.truth, own.robot.branch, task)

@@ -66,7 +66,8 @@ docs: venv
 	$(RUN) sphinx --fail-on-warning --keep-going --quiet -c docs . build/site $(ARGS)
 	@echo "hexacell: the site is build/site/index.html"
 
-# The pictures of README and docs; CONTRIBUTING.md says which is made by what.
+# The pictures of README and docs, and the table of what the last `make bench` measured; CONTRIBUTING.md says which
+# is made by what.
 figures: venv
 	$(RUN) docs.draw
 	HEXACELL_UPDATE_SNAPSHOTS=1 $(RUN) pytest -q tests/screen/test_snapshots.py
@@ -75,6 +76,7 @@ figures: venv
 	rm -rf build/study
 	.venv/bin/hexacell study paper --folder build/study
 	cp build/study/paper.svg docs/study-paper.svg
+	$(RUN) tests.benchmarks.figures
 
 screenshots:
 	@.ci/screenshots build/screenshots

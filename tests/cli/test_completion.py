@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -16,7 +13,6 @@ import pytest
 from hexacell.cell.bundled import bundled_names
 from hexacell.cli.app import main
 from hexacell.cli.parser import make_parser
-from tests.cli.terminal import Terminal
 
 SHELLS = ("bash", "zsh", "fish")
 BASH = """\
@@ -26,28 +22,6 @@ COMP_CWORD=$#
 _shtab_hexacell
 printf '%s\\n' "${COMPREPLY[@]}"
 """
-INTERACTIVE = {
-    "bash": ["bash", "--norc", "--noprofile", "-i"],
-    "zsh": ["zsh", "-f", "-i"],
-}
-"""Shells without anybody's settings."""
-READY = {
-    "bash": "source ./script",
-    "zsh": "fpath=($PWD/functions $fpath); autoload -Uz compinit; compinit -u -D",
-}
-"""How the README has the script installed."""
-
-TYPED = [
-    ("hexacell comple", "tion"),
-    ("hexacell run my", "-robot.toml"),
-    ("hexacell run my-robot.toml --mode opt", "imise"),
-    ("hexacell run my-robot.toml --unatt", "ended"),
-    ("hexacell fit my-robot.toml --measurements rec", "ords.csv"),
-    ("hexacell report runs/my-robot/20", "26-11-20T103000Z"),
-    ("hexacell cell val", "idate"),
-    ("hexacell demo --config paper", "-experiment"),
-]
-"""What is typed before the tab key, and what that adds."""
 
 
 @pytest.fixture
@@ -109,65 +83,6 @@ def test_bash_has_every_command_and_every_option_of_the_parser(folder):
 )
 def test_bash_offers_what_a_value_can_be(folder, words, offered):
     assert asked_of_bash(folder, *words) == offered
-
-
-@contextmanager
-def typing_at(shell: str, folder: Path) -> Iterator[Terminal]:
-    """A terminal with a shell that has the script."""
-    master, slave = os.openpty()
-    environment = {
-        "PATH": os.environ["PATH"],
-        "HOME": str(folder),
-        "TERM": "xterm",
-        "PS1": "",
-        "LC_ALL": "C",
-    }
-    running = subprocess.Popen(
-        INTERACTIVE[shell],
-        cwd=folder,
-        env=environment,
-        stdin=slave,
-        stdout=slave,
-        stderr=slave,
-        start_new_session=True,
-    )
-    try:
-        yield Terminal(master, slave)
-    finally:
-        running.kill()
-        running.wait()
-        os.close(master)
-        os.close(slave)
-
-
-def require(shell: str) -> None:
-    if shutil.which(shell) is None:
-        pytest.skip(f"{shell} is not installed")
-
-
-@pytest.mark.parametrize("shell", INTERACTIVE)
-def test_the_tab_key_completes_what_is_typed(folder, shell):
-    require(shell)
-    with typing_at(shell, folder) as terminal:
-        terminal.type(f"{READY[shell]}; echo is re''ady\n")
-        terminal.read_until("is ready")
-        for typed, added in TYPED:
-            terminal.type(typed)
-            terminal.read_until(typed)
-            terminal.type("\t")
-            terminal.read_until(added)
-            terminal.type("\x15")  # Ctrl-U: away with the line
-
-
-@pytest.mark.parametrize(("typed", "added"), TYPED)
-def test_fish_completes_the_same(folder, typed, added):
-    require("fish")
-    question = f"source script.fish; complete -C '{typed}'"
-    asked = ["fish", "--no-config", "--command", question]
-    environment = {**os.environ, "HOME": str(folder), "XDG_CONFIG_HOME": str(folder)}
-    told = subprocess.run(asked, cwd=folder, env=environment, capture_output=True, text=True, check=True)
-    offered = [line.partition("\t")[0].rstrip("/") for line in told.stdout.splitlines()]
-    assert offered == [typed.rpartition(" ")[2] + added]
 
 
 def test_a_shell_that_it_does_not_know_is_refused(typed_here: Callable):

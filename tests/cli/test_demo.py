@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
 import re
 import shutil
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,35 +15,6 @@ import pytest
 from hexacell.runs.cell_lock import cell_lock
 from procedures.run.keys import Phase
 from procedures.steps import events
-
-# An independent reading of TOML, good enough for a config: what is text, remark, number, or neither.
-TOKEN = re.compile(
-    r"""(?P<remark>\#[^\n]*)
-      | (?P<text>"(?:[^"\\]|\\.)*"|'[^']*')
-      | (?P<number>(?<![\w.])[+-]?\d+(?:\.\d+)?(?![\w.:-]))
-      | (?P<rest>[\s\S])""",
-    re.VERBOSE,
-)
-SECTION = re.compile(r"^\[+([\w.-]+)\]+", re.MULTILINE)
-
-
-def tokens(text: str) -> Iterator[tuple[str, str, int]]:
-    for match in TOKEN.finditer(text):
-        assert match.lastgroup is not None
-        yield match.lastgroup, match[0], match.start()
-
-
-def section_at(text: str, place: int) -> str:
-    return str(SECTION.findall(text, 0, place)[-1])
-
-
-def key_at(text: str, place: int) -> str:
-    return str(re.findall(r"^(\w+) *=", text[:place], flags=re.MULTILINE)[-1])
-
-
-def remarks(text: str) -> list[str]:
-    return [token for kind, token, _ in tokens(text) if kind == "remark"]
-
 
 MEASURED_TWICE = 6
 """Orientations at each held-out point, its reference included."""
@@ -123,10 +92,6 @@ def test_the_mean_deviation_falls_by_more_than_99_percent(demo):
     assert np.mean(after) < 0.01 * np.mean(before)
 
 
-def test_the_demo_prints_the_speed_of_its_clock(demo):
-    assert "The simulated cell's clock runs 150 times as fast as real time." in demo.outcome.err
-
-
 def test_the_output_of_the_demo_fits_a_terminal(demo):
     *words, _result = demo.outcome.err.splitlines()
     assert max(map(len, words)) <= 80
@@ -162,30 +127,6 @@ def test_recalibrating_the_demos_cell_passes_and_nothing_need_be_taught_anew(dem
         assert document["displacement"]["is_within_limits"], document["teaching"]
         assert "Taught points and frames stay: they move by at most 0." in outcome.err
         assert document["displacement"]["position_mm"] > 0.0
-
-
-def test_only_number_tokens_of_the_geometry_are_new_in_the_config(demo):
-    before, after = ((demo.run / f"config-{when}").read_text() for when in ("before", "after"))
-    pairs = list(itertools.zip_longest(tokens(before), tokens(after)))
-    different = [(old, new) for old, new in pairs if old[:2] != new[:2]]
-    assert len(different) > 30
-    for (old_kind, _, place), (new_kind, _, _) in different:
-        assert old_kind == new_kind == "number"
-        assert section_at(before, place) == "geometry"
-        assert key_at(before, place) in {"S", "B", "l"}
-    assert remarks(before) == remarks(after)
-    assert len(remarks(before)) > 20
-
-
-def test_the_rest_of_the_config_has_the_same_meaning(demo):
-    before, after = (
-        tomllib.loads((demo.run / f"config-{when}").read_text()) for when in ("before", "after")
-    )
-    for config in (before, after):
-        for name in ("S", "B", "l"):
-            del config["geometry"][name]
-    assert before == after
-    assert set(before) > {"geometry", "machine"}
 
 
 def lengths_in(geometry):
@@ -278,12 +219,6 @@ def test_an_unknown_cell_does_not_remove_an_earlier_demo(typed_here, earlier, na
     assert contents(earlier) == before
 
 
-def test_the_bundled_cells_can_be_loaded(typed_here):
-    outcome = typed_here("demo", "--config", "12")
-    known = "gough-stewart, linapod, paper-experiment, rotary-cranks, simulated-hexaglide"
-    assert f"There are: {known}" in re.sub("linuxcnc-[a-z]+, ", "", outcome.err)
-
-
 def test_a_folder_that_is_no_demo_is_not_changed(typed_here, tmp_path):
     theirs = tmp_path / "theirs"
     theirs.mkdir()
@@ -293,18 +228,6 @@ def test_a_folder_that_is_no_demo_is_not_changed(typed_here, tmp_path):
     assert outcome.document["exit_code"] == 2
     assert "theirs: this folder is not empty" in outcome.err
     assert contents(theirs) == {theirs / "thesis.txt": b"years"}
-
-
-@pytest.mark.parametrize(
-    ("folder", "words"),
-    [("file", "something else has that name"), ("file/inside", "a part of the path is not a folder")],
-)
-def test_a_file_in_place_of_the_demo_folder_is_refused(typed_here, tmp_path, folder, words):
-    (tmp_path / "file").write_text("mine")
-    outcome = typed_here("demo", "--folder", folder)
-    assert outcome.code == 2
-    assert outcome.err.startswith(f"hexacell: {folder}: the folder cannot be made: {words}")
-    assert contents(tmp_path) == {tmp_path / "file": b"mine"}
 
 
 def test_a_running_demo_is_not_removed(typed_here, earlier):

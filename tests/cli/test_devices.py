@@ -264,22 +264,6 @@ def test_a_device_that_the_cell_has_not_is_refused(typed_here, served) -> None:
     assert "the cell has no device 'w'. Name one of x, y, z, encoders" in outcome.err
 
 
-def test_encoders_with_modbus_are_served_and_watched(typed_here, cell_folder) -> None:
-    cell_folder.edit(
-        (
-            "nodes = [1, 2, 3, 4, 5, 6]",
-            "modbus = { registers = [0, 2, 4, 6, 8, 10] }",
-        ),
-        ('protocol = "cia406"', 'protocol = "modbus"'),
-    )
-    outcome = typed_here(
-        "devices", "--diagnose", "encoders", "--cell", cell_folder.cell, "--seconds", "0.1", "--json"
-    )
-    assert outcome.code == 0, outcome.err
-    assert outcome.document["identities"][5]["description"] == "device 1, register 10"
-    assert len(outcome.document["series"]) == 6
-
-
 def test_a_gauge_in_inches_is_watched_and_named(typed_here, cell_folder) -> None:
     with cell_folder.cell.open("a") as cell:
         cell.write('\n[[simulation.faults]]\nkind = "in inches"\ndevice = "x"\n')
@@ -382,14 +366,6 @@ def test_a_node_id_is_set_for_the_only_device_alone(start, terminal, addresses) 
     assert ended(process, terminal) == ExitCode.HARDWARE
     told = " ".join(terminal.shown.split())
     assert "has several nodes: 1, 2, 3, 4, 5, 6. Connect the one device" in told
-
-
-def test_a_node_id_is_not_set_unless_a_person_agrees(start, terminal) -> None:
-    process = start_at(terminal, start, "devices", "--can", NO_BUS, "--set-node", "9")
-    terminal.read_until("Type yes: ")
-    terminal.type("no\n")
-    assert ended(process, terminal) == ExitCode.ANSWER_NEEDED
-    assert "Nothing was set" in terminal.shown
 
 
 @pytest.mark.parametrize(

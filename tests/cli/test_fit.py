@@ -152,38 +152,6 @@ def test_a_mistake_in_the_file_is_named_with_its_line(typed_here, cell_folder, t
     assert cell_folder.snapshot() == before
 
 
-def test_a_file_that_is_not_utf8_is_refused_with_its_line(typed_here, cell_folder, tmp_path):
-    (tmp_path / "m.csv").write_bytes(b"point,orientation\n1,\xff\n")
-    outcome = fit(typed_here, cell_folder)
-    assert outcome.code == 2
-    assert "m.csv:2: the file is not UTF-8 text" in outcome.err
-
-
-@pytest.mark.parametrize(
-    ("name", "words"), [("absent.csv", "it does not exist"), (".", "this is not a file")]
-)
-def test_a_file_that_cannot_be_read(typed_here, cell_folder, name, words):
-    outcome = fit(typed_here, cell_folder, name)
-    assert outcome.code == 2
-    assert f"{name}: " in outcome.err
-    assert words in outcome.err
-
-
-def test_further_columns_another_order_and_windows_line_ends_are_accepted(
-    typed_here, demo, tmp_path, records
-):
-    order = [*reversed(range(len(HEADER)))]
-    rows = [[line.split(",")[place] for place in order] for line in records]
-    text = "\r\n".join(",".join(["remark" if row is rows[0] else '"a, b"', *row]) for row in rows)
-    (tmp_path / "m.csv").write_bytes(b"\xef\xbb\xbf" + text.encode() + b"\r\n\r\n")
-    outcome = typed_here("fit", demo.cell, "--measurements", "m.csv", "--json")
-    assert outcome.code == 0
-    # Beside its journal `fit` would know of the provisional geometry, and begin there.
-    of_run = json.loads((demo.run / "result.json").read_text())["geometry"]
-    for symbol, values in outcome.document["geometry"].items():
-        assert np.abs(np.subtract(values, of_run[symbol])).max() < 1e-6
-
-
 def small_tilts(cell_folder, degrees: float) -> list[str]:
     """Records of a robot that is as its config says, with noise, at tilts up to some degrees."""
     config = tomllib.loads(cell_folder.controller.read_text())["geometry"]

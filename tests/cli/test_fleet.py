@@ -117,12 +117,6 @@ def test_what_needs_a_cell_says_so(typed_here, arguments) -> None:
     assert "cell" in outcome.err
 
 
-def test_passwords_are_refused_in_the_address(typed_here) -> None:
-    for command in ("status", "history"):
-        refused = typed_here(command, "--archive", "postgresql://me:secret@host/cells")
-        assert (refused.code, "secret" in refused.err) == (2, False)
-
-
 def test_what_is_overdue_is_said() -> None:
     now = datetime.now(UTC)
     late = FleetCell(name="late", host="east", cell="x", seen_at=now, due_at=now - timedelta(days=1))

@@ -68,18 +68,6 @@ def test_a_run_is_told_in_lines(cell, typed_here) -> None:
     assert typed_here("history", cell.path, "--show", "never").code == 2
 
 
-def test_a_run_of_which_nothing_is_left_is_told(cell, typed_here) -> None:
-    run = propose_run(cell)
-    run.folder.journal.write_bytes(b"")
-    refused = typed_here("history", cell.path, "--show", run.folder.path.name)
-    assert (refused.code, "nothing happened in this run" in refused.err) == (2, True)
-
-
-def test_one_question_at_a_time(cell, typed_here) -> None:
-    refused = typed_here("history", cell.path, "--drift", "--compare", "a", "b")
-    assert (refused.code, "not allowed with" in refused.err) == (2, True)
-
-
 def test_an_archive_that_is_not_there_is_warned_about(cell, typed_here, tmp_path) -> None:
     propose_run(cell)
     listed = typed_here("history", cell.path, "--archive", f"postgresql://nobody@/none?host={tmp_path}")
@@ -126,13 +114,6 @@ def test_old_runs_are_listed_and_deleted_if_asked_for(cell, typed_here) -> None:
     assert typed_here("history", cell.path, "--delete").code == 2
     assert typed_here("history", cell.path, "--keep", "-1").code == 2
     assert typed_here("history", cell.path, "--keep", "nan").code == 2
-
-
-def test_a_check_has_no_geometry_to_compare(cell, typed_here) -> None:
-    nights = Nights(cell)
-    before, after = nights.calibrate().path.name, nights.check().path.name
-    refused = typed_here("history", cell.path, "--compare", before, after)
-    assert (refused.code, f"the run {after} identified no geometry of its own" in refused.err) == (2, True)
 
 
 def test_every_write_into_the_config_is_listed(cell, typed_here) -> None:

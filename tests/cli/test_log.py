@@ -33,12 +33,6 @@ def test_verbose_logs_on_stderr_and_twice_in_detail(typed_here, quick_cell) -> N
     assert "DEBUG hexacell.plugins: encoder protocol 'cia406' is" in twice
 
 
-def test_a_file_and_verbose_give_the_detail_to_the_file(typed_here, quick_cell, tmp_path) -> None:
-    file = tmp_path / "hexacell.log"
-    assert typed_here("cell", "-v", "validate", quick_cell.cell, "--log-file", file).err == ""
-    assert "DEBUG hexacell.plugins" in file.read_text()
-
-
 def test_a_failure_is_logged_with_its_exit_code(typed_here, tmp_path) -> None:
     file = tmp_path / "hexacell.log"
     assert typed_here("status", tmp_path / "no.toml", "--log-file", file).code == 2

@@ -227,12 +227,6 @@ def test_a_file_that_cannot_be_used(typed_here, cell_folder, stranger, mistake):
     assert words in outcome.err
 
 
-def test_an_absent_measurement_file_is_refused(typed_here, cell_folder):
-    outcome = typed_here("next", cell_folder.cell, "--measurements", "absent.csv", "--json")
-    assert outcome.code == 2
-    assert "absent.csv: cannot be read: it does not exist" in outcome.err
-
-
 @pytest.mark.parametrize("number", ["-1", "one"])
 def test_an_invalid_count_of_refusals(typed_here, cell_folder, number):
     outcome = typed_here("next", cell_folder.cell, "--measurements", "m.csv", "--refused", number)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-import socket
 
 import pytest
 
@@ -98,16 +96,6 @@ def test_who_is_told_can_be_tried_and_sent_to_later(typed_here, quick_cell, tmp_
         assert typed_here("notify", quick_cell.cell, "--send").out == "nothing waits\n"
 
 
-def test_a_failure_that_is_tried_again_has_the_same_id(typed_here, quick_cell) -> None:
-    with webhook() as server:
-        tell(quick_cell, "hall", server.url)
-        with cell_lock(quick_cell.controller):
-            for _ in range(2):
-                typed_here("run", quick_cell.cell, *CHECK)
-    first, second = (json.loads(body) for body in server.bodies)
-    assert (first["id"], first["line"]) == (second["id"], second["line"])
-
-
 @pytest.mark.parametrize(
     ("url", "is_warned"),
     [("http://host/", True), ("mqtt://host", True), ("https://host/", False), ("mqtt://127.0.0.1", False)],
@@ -123,30 +111,6 @@ def test_nobody_to_tell(typed_here, quick_cell) -> None:
     outcome = typed_here("notify", quick_cell.cell, "--test")
     assert outcome.code == 2
     assert "[[notifications]]" in outcome.err
-
-
-def test_killed_while_it_is_sent_it_is_sent_later(typed_here, start, quick_cell) -> None:
-    tell(quick_cell, "hall", f"http://127.0.0.1:{closed_port()}/")
-    with cell_lock(quick_cell.controller):
-        typed_here("run", quick_cell.cell, *CHECK)
-    refused = quick_cell.cell.read_text()
-    with socket.socket() as silent:
-        silent.bind(("127.0.0.1", 0))
-        silent.listen()
-        port = silent.getsockname()[1]
-        quick_cell.cell.write_text(re.sub(r"(?<=http://127.0.0.1:)\d+", str(port), refused))
-        process = start("notify", quick_cell.cell, "--send")
-        connection, _ = silent.accept()
-        with connection:
-            assert connection.recv(1)
-            process.popen.kill()
-            process.popen.wait()
-    with webhook() as server:
-        quick_cell.cell.write_text(
-            refused.replace(refused.rpartition('url = "')[2].split('"')[0], server.url)
-        )
-        assert typed_here("notify", quick_cell.cell, "--send").out == "hall: notified (1)\n"
-    assert json.loads(server.bodies[0])["occasions"] == ["failure"]
 
 
 def test_a_stop_signal_while_it_is_told_leaves_the_exit_code(typed_here, quick_cell, monkeypatch) -> None:

@@ -112,14 +112,6 @@ def test_a_point_out_of_reach_is_named_with_its_leg(typed_here, cell_folder, com
     assert re.search(r"\bleg [1-6]\b", message)
 
 
-@pytest.mark.usefixtures("never_moves")
-@pytest.mark.parametrize("command", COMMANDS)
-def test_a_point_beyond_a_sliders_end_is_named_with_its_leg(typed_here, cell_folder, command):
-    cell_folder.edit(("joint_max_mm = 800.0", "joint_max_mm = 480.0"))
-    message = refused(typed_here, cell_folder, command, 2, "identification point 1", "480")
-    assert re.search(r"\bleg [1-6]\b|\bq[1-6]\b", message)
-
-
 def notes_of_refusal(cell_folder) -> set[str]:
     """What runs without a person leave that did not begin: why, each in a folder of its own."""
     return {str((run / "not-begun.json").relative_to(cell_folder.path)) for run in cell_folder.runs()}
@@ -171,16 +163,6 @@ def test_two_gauges_with_their_cables_swapped(typed_here, served):
     refused(typed_here, served, "preflight", 3, "gauge x", "gauge z", "port")
 
 
-def test_an_encoder_that_is_missing(typed_here, served):
-    served.edit(("nodes = [1, 2, 3, 4, 5, 6]", "nodes = [1, 2, 3, 4, 5, 9]"))
-    assert advises_a_search(refused(typed_here, served, "preflight", 3, "leg 6", "node 9"))
-
-
-def test_a_bus_that_is_not_there(typed_here, served):
-    served.cell.write_text(re.sub('channel = "[^"]*"', 'channel = "/dev/nowhere"', served.cell.read_text()))
-    assert advises_a_search(refused(typed_here, served, "preflight", 3, "/dev/nowhere"))
-
-
 @pytest.fixture
 def closed_port() -> int:
     """A TCP port on which nothing listens."""
@@ -191,12 +173,6 @@ def closed_port() -> int:
 def without_controller(served: Any, closed_port: int) -> None:
     text = served.cell.read_text()
     served.cell.write_text(re.sub(r"(?m)^port = \d+$", f"port = {closed_port}", text))
-
-
-def test_a_controller_that_is_not_there(typed_here, served, closed_port):
-    without_controller(served, closed_port)
-    told = refused(typed_here, served, "preflight", 3, f"controller 127.0.0.1:{closed_port}")
-    assert advises_a_search(told)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

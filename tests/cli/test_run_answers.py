@@ -42,59 +42,6 @@ class TestUnattendedRun:
         assert fast_cell.controller.read_bytes() == config
         assert not (run / "config-after").exists()
 
-    def test_a_change_beyond_its_limit_needs_approval(self, typed_here, fast_cell, demo):
-        fast_cell.edit(("largest_change_mm = 15.0", "largest_change_mm = 1.0"))
-        run = fast_cell.rewound(demo.run, before="propose")
-        config = fast_cell.controller.read_bytes()
-        outcome = typed_here("run", fast_cell.cell, "--resume", run)
-        assert outcome.code == 4
-        assert re.search(
-            r"largest change is \d\.\d\d mm, the .* apart \(limit without a person 1 mm\)", outcome.err
-        )
-        assert fast_cell.controller.read_bytes() == config
-
-    def test_a_result_out_of_limits_is_rolled_back_bit_for_bit(self, typed_here, fast_cell, demo):
-        fast_cell.edit(("position_mm = 0.3 ", "position_mm = 0.0001 "))
-        run = fast_cell.rewound(demo.run, before="propose")
-        config = fast_cell.controller.read_bytes()
-        outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json")
-        assert outcome.code == outcome.document["exit_code"] == 1
-        line = outcome.document["line"]
-        # By chance the error may be larger than its U as well: then the robot fails.
-        assert re.search(
-            r": (not evaluated \(U is above the limit\)|fail); rolled back, the controller has its old "
-            "config, the worse one$",
-            line,
-        )
-        assert "the old geometry is back in the controller" in outcome.err
-        assert fast_cell.controller.read_bytes() == config
-        assert (run / "config-after").read_bytes() != config
-
-    def test_a_config_edited_during_the_run_is_not_overwritten(self, typed_here, fast_cell, demo):
-        run = fast_cell.rewound(demo.run, before="propose")
-        theirs = fast_cell.controller.read_bytes() + b"# tuned by hand\n"
-        fast_cell.controller.write_bytes(theirs)
-        outcome = typed_here("run", fast_cell.cell, "--resume", run)
-        assert outcome.code == 2
-        assert f"{fast_cell.controller}: the config changed since the run began" in outcome.err
-        assert fast_cell.controller.read_bytes() == theirs
-
-    def test_a_failed_reload_restores_the_config(self, start, typed_here, fast_cell, demo):
-        simulation = start("simulate", fast_cell.cell)
-        simulation.wait_for("serving", lambda: simulation.err)
-        fast_cell.cell.write_text(
-            simulation.out.replace(
-                "reload_command = []", 'reload_command = ["sh", "-c", "echo sorry; exit 7"]'
-            )
-        )
-        run = fast_cell.rewound(demo.run, before="propose")
-        config = fast_cell.controller.read_bytes()
-        outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json")
-        assert outcome.code == outcome.document["exit_code"] == 6
-        assert "failed with status 7: sorry" in outcome.err
-        assert "its config is restored" in outcome.err
-        assert fast_cell.controller.read_bytes() == config
-
     def test_a_check_changes_nothing(self, typed_here, fast_cell):
         config = fast_cell.controller.read_bytes()
         outcome = typed_here("run", fast_cell.cell, "--unattended", "--json")
@@ -182,12 +129,6 @@ class TestAPersonAtTheTerminal:
         assert ended(process, terminal) == 4
         assert "left without an answer" in terminal.shown
         assert cell.controller.read_bytes() == (demo.run / "config-before").read_bytes()
-
-    def test_a_question_can_be_interrupted(self, waiting, terminal):
-        process, _, _ = waiting
-        process.popen.send_signal(signal.SIGINT)
-        assert ended(process, terminal) == 130
-        assert "hexacell: interrupted" in terminal.shown
 
     def test_moves_the_gauges_from_point_to_point(self, quick_cell, start, terminal):
         quick_cell.edit(BY_HAND)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shlex
@@ -186,53 +185,6 @@ def test_a_closed_pipe_causes_no_traceback(arguments, tmp_path):
             check=False,
         )
     assert (shell.returncode, shell.stderr) == (0, "")
-
-
-class TestRunsThatCannotBeResumed:
-    @pytest.fixture
-    def rewound(self, demo, cell_folder):
-        return cell_folder.rewound(demo.run, before="propose")
-
-    def refused(self, typed_here, cell_folder, run, words, *arguments):
-        before = cell_folder.snapshot()
-        outcome = typed_here("run", cell_folder.cell, "--resume", run, "--json", *arguments)
-        assert outcome.code == outcome.document["exit_code"] == 2
-        assert words in outcome.err
-        assert cell_folder.snapshot() == before
-
-    def test_a_run_that_does_not_exist(self, typed_here, cell_folder):
-        words = f"there is no run 'lost'. The cell's runs are in {cell_folder.path / 'runs'}"
-        self.refused(typed_here, cell_folder, "lost", words)
-
-    def test_a_run_that_is_over(self, typed_here, demo):
-        outcome = typed_here("run", demo.cell, "--resume", demo.run)
-        assert outcome.code == 2
-        assert f"the run {demo.run} is over: 35 parameters" in outcome.err
-
-    def test_a_run_of_another_cell_file(self, typed_here, cell_folder, rewound):
-        cell_folder.cell.write_text(cell_folder.cell.read_text() + "\n")
-        self.refused(typed_here, cell_folder, rewound, "has changed since the run began")
-
-    def test_a_run_in_another_mode(self, typed_here, cell_folder, rewound):
-        words = "the run was begun in the mode optimise"
-        self.refused(typed_here, cell_folder, rewound, words, "--mode", "check")
-
-    def test_a_damaged_journal(self, typed_here, cell_folder, rewound):
-        lines = (rewound / "journal.jsonl").read_text().splitlines(keepends=True)
-        lines[7] = lines[7].replace("0", "1", 1)
-        (rewound / "journal.jsonl").write_text("".join(lines))
-        words = f"{rewound / 'journal.jsonl'}:8: this line of the journal is damaged"
-        self.refused(typed_here, cell_folder, rewound, words)
-
-    def test_an_empty_journal(self, typed_here, cell_folder, rewound):
-        (rewound / "journal.jsonl").write_text("")
-        self.refused(typed_here, cell_folder, rewound, "the journal is empty")
-
-
-def test_the_output_of_a_run_agrees_with_its_journal(demo):
-    ended = history(demo.run)[-1]
-    assert isinstance(ended, events.Ended)
-    assert json.loads(demo.outcome.out)["line"] == ended.line
 
 
 LOST = """

@@ -108,33 +108,6 @@ def test_a_kill_between_the_two_is_undone_by_the_next_command(
     assert "interrupted" not in typed_here("status", cell.path).err
 
 
-def test_a_kill_behind_the_second_one_is_finished(cell, run, typed_here, tmp_path) -> None:
-    kill_after(tmp_path, 2, "apply", run.folder.path)
-    assert found(cell) == run.change.after_contents
-    told = typed_here("apply", run.folder.path)
-    assert told.code == 0
-    assert "was interrupted when all of them were new: it is complete" in told.err
-    assert "nothing was written" in told.out
-    undone = typed_here("rollback", cell.path)
-    assert (undone.code, found(cell)) == (0, run.change.before_contents)
-
-
-def test_a_killed_apply_is_repeated_by_one_command(cell, run, typed_here, tmp_path) -> None:
-    kill_after(tmp_path, 1, "apply", run.folder.path)
-    again = typed_here("apply", run.folder.path)
-    assert "got the old content back" in again.err
-    assert (again.code, found(cell)) == (0, run.change.after_contents)
-
-
-def test_a_rollback_is_killed_too(cell, run, typed_here, tmp_path) -> None:
-    assert typed_here("apply", run.folder.path).code == 0
-    kill_after(tmp_path, 1, "rollback", cell.path)
-    assert found(cell) == (run.change.before_contents[0], run.change.after_contents[1])
-    again = typed_here("rollback", cell.path)
-    assert "hexapod.hal got the old content back" in again.err
-    assert (again.code, found(cell)) == (0, run.change.before_contents)
-
-
 def test_an_edit_of_the_second_file_is_shown_with_its_name(cell, run, typed_here) -> None:
     ini = cell.config_paths[1]
     ini.write_bytes(ini.read_bytes() + b"# mine\r\n")

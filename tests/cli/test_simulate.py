@@ -112,12 +112,6 @@ def test_a_signal_ends_simulate_without_leftovers(start, cell_folder, number):
         assert port.startswith("/dev/pts/") or not Path(port).exists()
 
 
-def test_simulate_starts_no_other_processes(shared):
-    _, process, _ = shared
-    pid = process.popen.pid
-    assert Path(f"/proc/{pid}/task/{pid}/children").read_text() == ""
-
-
 def test_simulate_ends_while_a_run_is_connected(served, start):
     """The run then reports which device is lost, and that it can be resumed."""
     simulation, printed = served
@@ -134,14 +128,6 @@ def test_simulate_ends_while_a_run_is_connected(served, start):
 
 def names_below(folder: Path) -> set[str]:
     return {path.stem for path in folder.rglob("*")}
-
-
-def test_output_goes_to_the_named_file(start, cell_folder):
-    process = start("simulate", cell_folder.cell, "--output", "served.toml")
-    process.wait_for("serving", lambda: process.err)
-    assert process.out == ""
-    written = cell_folder.path.parent / "served.toml"
-    assert Path(tomllib.loads(written.read_text())["controller"]["config"]) == cell_folder.controller
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -46,30 +45,6 @@ def test_results_are_those_of_processes_though_a_worker_is_killed(
     kept = sorted(results(tmp_path / "dask"))
     assert kept == sorted(results(tmp_path / "processes"))
     assert len(kept) == len({json.loads(line)["key"] for line in kept}) == 21
-
-
-@pytest.mark.slow
-def test_an_interrupted_study_on_a_cluster_goes_on_by_processes(start, cluster, tmp_path: Path) -> None:
-    study = start(*PAPER, "--scheduler", cluster.address, "--folder", "kept")
-    study.wait_until(lambda: len(results(tmp_path / "kept")) >= 2, "results")
-    ended = study.stopped(signal.SIGINT)
-    assert ended.code == ExitCode.INTERRUPTED
-    kept = results(tmp_path / "kept")
-    study = start(*PAPER, "--processes", "1", "--folder", "kept")
-    study.wait_until(lambda: len(results(tmp_path / "kept")) > len(kept), "more results")
-    study.stopped(signal.SIGINT)
-    assert results(tmp_path / "kept")[: len(kept)] == kept
-
-
-@pytest.mark.slow
-def test_a_lost_scheduler_ends_the_command_with_what_to_do(start, cluster, tmp_path: Path) -> None:
-    study = start(*PAPER, "--scheduler", cluster.address, "--folder", "kept")
-    study.wait_until(lambda: len(results(tmp_path / "kept")) >= 1, "results")
-    cluster.scheduler.kill()
-    ended = study.ended()
-    assert ended.code == ExitCode.HARDWARE
-    assert f"{cluster.address}: no Dask scheduler answers. Start one there" in " ".join(ended.err.split())
-    assert results(tmp_path / "kept")
 
 
 @pytest.mark.parametrize(

@@ -87,56 +87,13 @@ def test_too_few_records_are_refused(typed_here, cell_folder, tmp_path, records)
     assert "Measure" in outcome.err
 
 
-def replaced(line: str, column: str, cell: str) -> str:
-    cells = line.split(",")
-    cells[HEADER.index(column)] = cell
-    return ",".join(cells)
-
-
-def without(line: str, column: str) -> str:
-    cells = line.split(",")
-    del cells[HEADER.index(column)]
-    return ",".join(cells)
-
-
 MISTAKES = {
     "text": (
-        lambda r: [*r[:4], replaced(r[4], "q3", "abc"), *r[5:]],
-        ':5: q3 is "abc", but must be a finite',
-    ),
-    "NaN": (
-        lambda r: [*r[:4], replaced(r[4], "dx", "nan"), *r[5:]],
-        ':5: dx is "nan", but must be a finite',
-    ),
-    "infinity": (lambda r: [*r[:4], replaced(r[4], "a", "-inf"), *r[5:]], ':5: a is "-inf", but must be'),
-    "empty cell": (lambda r: [*r[:4], replaced(r[4], "z", ""), *r[5:]], ":5: z is empty, but must be"),
-    "point 0": (lambda r: [*r[:4], replaced(r[4], "point", "0"), *r[5:]], ':5: point is "0", but must be'),
-    "half a point": (
-        lambda r: [*r[:4], replaced(r[4], "orientation", "1.5"), *r[5:]],
-        ":5: orientation is",
-    ),
-    "missing columns": (
-        lambda r: [without(without(line, "dy"), "q6") for line in r],
-        ":1: columns are missing: q6, dy",
+        lambda r: [*r[:4], r[4].replace(",550.0,", ",abc,"), *r[5:]],
+        ':5: z is "abc", but must be a finite',
     ),
     "no header": (lambda r: r[1:], ":1: columns are missing: point, orientation"),
-    "duplicate row": (lambda r: [*r, r[7]], ":57: point 1, orientation 7 is here and in line 8"),
     "point with one row": (lambda r: r[:13], ":13: point 2 has one row, and at least two are needed"),
-    "header only": (lambda r: r[:1], "m.csv: there are no measurements in it"),
-    "empty": (lambda _: [], "m.csv:1: is empty"),
-    "short row": (
-        lambda r: [*r[:4], r[4].rpartition(",")[0], *r[5:]],
-        ":5: the row has 16 cells, the header 17",
-    ),
-    "decimal comma": (
-        lambda r: [*r[:4], r[4].replace(".", ","), *r[5:]],
-        "the header 17; is the decimal sign a comma?",
-    ),
-    "semicolons": (
-        lambda r: [line.replace(",", ";") for line in r],
-        ":1: columns are separated by semicolons",
-    ),
-    "quote left open": (lambda r: [*r[:4], '"' + r[4], *r[5:]], "is not valid CSV"),
 }
 
 

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import re
-from functools import partial
 
 import pytest
 
 from procedures.journal.journal import read_journal
 from procedures.steps import events
 from tests.cli.cell_folder import ASK, BY_HAND
-from tests.cli.commands import Process
 from tests.cli.terminal import ended, start_at
 from tests.waiting import wait_until
 
 pytestmark = pytest.mark.usefixtures("lines_only")
-
-TOLD = "Letters, each with Enter"
 PLACED = "Press Enter when they are in place, or type a to abort: "
 
 
@@ -86,21 +82,3 @@ def answer_everything(process, terminal) -> None:
             return
         terminal.seen = found.end()
         terminal.type("\n" if found.group() == PLACED else "yes\n")
-
-
-def _is_told_again(process: Process, before: int) -> bool:
-    return process.out.count(TOLD) > before
-
-
-@pytest.mark.slow
-def test_what_is_no_letter_tells_all_of_them(quick_cell, start, terminal) -> None:
-    quick_cell.edit(BY_HAND)
-    process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
-    terminal.read_until(PLACED)
-    for typed in ("m x\n", "u 3\n", "?\n"):
-        before = process.out.count(TOLD)
-        terminal.type(typed)
-        process.wait_until(partial(_is_told_again, process, before), typed)
-        terminal.read_until(PLACED)
-    terminal.type("a\n")
-    assert ended(process, terminal) == 130

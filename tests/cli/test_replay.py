@@ -12,31 +12,6 @@ from procedures.steps import events
 
 
 @pytest.fixture
-def run(typed_here, quick_cell, few_candidates):
-    """A quick run on the simulated cell."""
-    outcome = typed_here("run", quick_cell.cell, "--mode", "optimise", "--unattended")
-    assert outcome.code in {0, 1}, outcome.err
-    [folder] = quick_cell.runs()
-    return folder
-
-
-@pytest.mark.slow
-def test_a_run_is_the_same_again_and_nothing_is_touched(typed_here, quick_cell, run):
-    before = quick_cell.snapshot()
-    outcome = typed_here("replay", run, "--json")
-    assert outcome.code == 0, outcome.err
-    found = outcome.document
-    entries = read_entries(run / "journal.jsonl")
-    assert found["same"] is True
-    assert found["differences"] == []
-    assert found["events"] == len(entries)
-    assert found["decisions"] == sum(isinstance(entry.event, events.StepBegun) for entry in entries)
-    assert found["decisions"] + found["results"] + found["taken"] >= found["events"]
-    assert outcome.err.endswith(f" of {len(entries)} events: the same as recorded\n")
-    assert quick_cell.snapshot() == before
-
-
-@pytest.fixture
 def manipulated(demo, tmp_path):
     """The demo's journal with another verdict and other words, all checksums right."""
     entries = list(read_entries(demo.run / "journal.jsonl"))

@@ -125,18 +125,6 @@ def test_a_closed_terminal_stops_the_run_with_a_json_document(start, good_cell):
     assert "To continue:" in outcome.err
 
 
-@pytest.mark.slow
-def test_repeated_ctrl_c_changes_nothing(start, good_cell):
-    """Ctrl-C several times while it stops."""
-    process = start("run", good_cell.cell, "--unattended")
-    under_way(process, good_cell, 1)
-    for _ in range(5):
-        process.popen.send_signal(signal.SIGINT)
-    outcome = process.ended()
-    assert outcome.code == 130
-    assert isinstance(history(good_cell.runs()[0])[-1], events.Interrupted)
-
-
 def test_sigterm_stops_a_run_that_ignores_ctrl_c(start, good_cell):
     """As in the background job of a shell script."""
     process = start("run", good_cell.cell, "--unattended", through="trap '' INT; exec \"$@\"")

@@ -8,7 +8,6 @@ import signal
 
 import pytest
 
-from hexacell.cell.loader import load_cell
 from hexacell.errors import ExitCode
 from hexacell.runs.cell_lock import cell_lock
 
@@ -98,19 +97,6 @@ def test_a_signal_ends_the_waiting(start, short_cell) -> None:
     process = start("run", short_cell.cell, "--unattended")
     process.wait_for("tried again in", lambda: process.err)
     assert process.stopped(signal.SIGTERM).code == ExitCode.INTERRUPTED
-
-
-@pytest.mark.slow
-def test_a_run_that_lasts_too_long_ends_at_its_reference_and_is_resumed(typed_here, quick_cell) -> None:
-    stated(quick_cell, "longest_minutes = 4")
-    ended = typed_here("run", quick_cell.cell, "--unattended", "--mode", "optimise")
-    assert ended.code == ExitCode.OUT_OF_TIME
-    assert "it lasted longer than longest_minutes = 4" in " ".join(ended.err.split())
-    assert "To continue:" in ended.out
-    cell = load_cell(quick_cell.cell)
-    assert cell.settings.unattended.longest_minutes == 4.0
-    resumed = typed_here("run", quick_cell.cell, "--resume", "--mode", "optimise")
-    assert resumed.code == ExitCode.DONE, resumed.err
 
 
 def test_a_schedule_leaves_the_run_its_window(typed_here, short_cell, tmp_path) -> None:

@@ -248,16 +248,6 @@ async def test_a_pause_is_not_ended_while_somebody_is_there(hosted) -> None:
         await client.connection.leave(keep_running=False)
 
 
-async def test_leaving_stops_motion_at_once(hosted) -> None:
-    async with hosted() as run:
-        client = await run.client()
-        await place(client)
-        await client.until(told_of(events.RecordTaken))
-        await client.connection.leave(keep_running=False)
-        assert await run.serving is ExitCode.INTERRUPTED
-    assert run.history[-1] == events.Interrupted(reason="stopped by who left it", exit_code=130)
-
-
 async def test_a_run_that_cannot_begin_says_why(hosted, cell) -> None:
     cell.config_path.write_text("nothing\n")
     async with hosted() as run:

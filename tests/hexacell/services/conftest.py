@@ -21,6 +21,7 @@ from procedures.engine.engine import Listener
 from procedures.journal.journal import Journal, read_journal
 from procedures.run.questions import Question
 from procedures.steps import events
+from tests.hexacell.services.proposed_runs import a_cell
 from tests.made_once import made_once
 from tests.native_config import NATIVE
 from tests.small_cell import SMALL, few_candidates, history_until, write_small_cell
@@ -57,6 +58,12 @@ def maker(folder: Path) -> MakeCell:
 @pytest.fixture
 def make_cell(tmp_path: Path) -> MakeCell:
     return maker(tmp_path)
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Cell:
+    """The bundled cell in a folder of its own, for tests that measure nothing."""
+    return a_cell(tmp_path)
 
 
 @pytest.fixture(autouse=True)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.change import RECEIPT, Receipt
 from hexacell.config.layout import fingerprint
@@ -24,14 +22,6 @@ from tests.procedures.identified import an_identification
 
 IDENTIFIED = events.Identified(result=an_identification(), held_out=())
 PASSED = events.ResultValidated(verdict=Verdict.PASS, line="it is good")
-
-
-@pytest.fixture
-def cell(tmp_path: Path) -> Cell:
-    source = load_cell(bundled_config("simulated-hexaglide"))
-    shutil.copy(source.path, tmp_path)
-    shutil.copy(source.config_path, tmp_path)
-    return load_cell(tmp_path / source.path.name)
 
 
 def run(cell: Cell, name: str, *history: events.Event) -> RunFolder:

@@ -191,18 +191,18 @@ async def test_a_run_is_resumed_with_the_cell_file_it_began_with(make_site, fini
         await site.calibrate(resume=True)
 
 
-async def test_a_run_is_resumed_in_its_mode(make_site, finished) -> None:
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ({"mode": Mode.CHECK}, "begun in the mode optimise"),
+        ({"length_check": True}, "begun without a length check"),
+    ],
+)
+async def test_a_run_is_resumed_as_what_it_was_begun(make_site, finished, wanted, words: str) -> None:
     site = make_site()
     site.write(finished.until(events.RecordTaken), finished)
-    with pytest.raises(UsageError, match="begun in the mode optimise"):
-        await site.calibrate(resume=True, mode=Mode.CHECK)
-
-
-async def test_a_run_gets_no_length_check_when_it_is_resumed(make_site, finished) -> None:
-    site = make_site()
-    site.write(finished.until(events.RecordTaken), finished)
-    with pytest.raises(UsageError, match="begun without a length check"):
-        await site.calibrate(resume=True, length_check=True)
+    with pytest.raises(UsageError, match=words):
+        await site.calibrate(resume=True, **wanted)
 
 
 async def test_a_damaged_journal_is_not_resumed(make_site, finished) -> None:

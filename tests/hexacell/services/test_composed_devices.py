@@ -6,31 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.encoders.cia406 import Cia406Bank
-from drivers.gauges.mux10 import Mux10Gauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.wire_trace import WireTrace
-from hexacell.errors import DeviceError, UsageError
+from hexacell.errors import DeviceError
 from hexacell.services.devices.device_setup import device_addresses, devices_of, open_devices
 from procedures.devices.settling import read_all
-
-
-def settings_of(make_cell, **changes):
-    return make_cell(**changes).settings
-
-
-async def test_drivers_are_those_that_the_file_names(make_site) -> None:
-    settings = make_site().simulated.settings
-    links = SharedSerialPorts()
-    devices = devices_of(settings, links, WireTrace())
-    assert [(mounted.axis.index, mounted.axis.sign) for mounted in devices.gauges] == [
-        (0, 1),
-        (1, 1),
-        (2, 1),
-    ]
-    assert isinstance(devices.gauges[1].gauge, Mux10Gauge)
-    assert isinstance(devices.encoders, Cia406Bank)
-    await links.close()
 
 
 def test_axes_and_signs_are_the_files(make_site) -> None:
@@ -48,14 +28,6 @@ def test_axes_and_signs_are_the_files(make_site) -> None:
         (1, 1),
         (0, 1),
     ]
-
-
-@pytest.mark.parametrize("section", ["encoders", "controller"])
-def test_a_protocol_without_a_driver_is_refused(make_site, section: str) -> None:
-    settings = make_site().simulated.settings
-    strange = getattr(settings, section).model_copy(update={"protocol": "telepathy"})
-    with pytest.raises(UsageError, match="telepathy"):
-        devices_of(settings.model_copy(update={section: strange}), SharedSerialPorts(), WireTrace())
 
 
 async def test_connected_devices_answer_and_their_traffic_is_kept(make_site) -> None:
@@ -104,10 +76,3 @@ def test_a_simulated_cell_is_served_while_the_context_lasts(make_cell) -> None:
         assert (settings.encoders.bus or {})["interface"] == "virtual"
     with device_addresses(cell, other_processes=True) as settings:
         assert (settings.encoders.bus or {})["interface"] == "slcan"
-
-
-def test_a_simulated_cell_differs_in_its_settings_only(make_site) -> None:
-    site = make_site()
-    cell = replace(site.cell, settings=site.simulated.settings)
-    assert (cell.path, cell.text) == (site.cell.path, site.cell.text)
-    assert cell.settings is site.simulated.settings

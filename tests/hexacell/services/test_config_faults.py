@@ -20,18 +20,13 @@ from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, read_proposal
 from procedures.engine.commands import UnattendedOperator
 from tests.hexacell.config.conftest import Faults
-from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
+from tests.hexacell.services.proposed_runs import ProposedRun, propose_run
 
 Job = Callable[[], object]
 
 
 class PowerCut(BaseException):
     """From here on this process does nothing any more."""
-
-
-@pytest.fixture
-def cell(tmp_path: Path) -> Cell:
-    return a_cell(tmp_path)
 
 
 def cut_at_calls(cell: Cell, prepare: Job, job: Job, stride: int) -> dict[bytes, int]:

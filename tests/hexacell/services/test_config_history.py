@@ -18,10 +18,9 @@ from hexacell.config.write_record import (
     THE_RUN,
     WriteCause,
     WriteKind,
-    read_records,
     recorded_write,
 )
-from hexacell.errors import FileError, UsageError
+from hexacell.errors import UsageError
 from hexacell.robot.model import config_layout
 from hexacell.runs.cell_lock import user_name
 from hexacell.runs.run_folder import runs_folder
@@ -33,12 +32,7 @@ from procedures.engine.commands import UnattendedOperator
 from procedures.journal import journal as journals
 from procedures.journal.journal import Journal
 from procedures.steps import events
-from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
-
-
-@pytest.fixture
-def cell(tmp_path: Path) -> Cell:
-    return a_cell(tmp_path)
+from tests.hexacell.services.proposed_runs import ProposedRun, propose_run
 
 
 @pytest.fixture
@@ -119,15 +113,6 @@ async def test_a_torn_last_line_costs_no_other(cell, records) -> None:
     found = config_history(cell)
     assert [one.record.kind for one in found.writes] == [WriteKind.ROLLED_BACK, WriteKind.APPLIED]
     assert found.damaged == (2,)
-
-
-async def test_a_line_without_its_end_counts_if_it_is_whole(cell, records) -> None:
-    await apply(propose_run(cell))
-    records.write_bytes(records.read_bytes().removesuffix(b"\n"))
-    assert kinds(cell) == [WriteKind.APPLIED]
-    roll_back_config(cell)
-    assert kinds(cell) == [WriteKind.ROLLED_BACK, WriteKind.APPLIED]
-    assert read_records(runs_folder(cell))[1] == ()
 
 
 async def test_a_write_that_cannot_be_recorded_stays_and_is_told(cell, records) -> None:
@@ -218,22 +203,8 @@ def test_writes_within_a_millisecond_stay_in_their_order_and_are_told_once(
     assert kinds(cell) == [WriteKind.TAKEN_BACK, WriteKind.RESULT]
 
 
-async def test_a_write_that_was_recorded_is_not_told_twice(cell, records) -> None:
-    run = propose_run(cell)
-    await apply(run)
-    roll_back_config(cell)
-    await apply(run)
-    assert kinds(cell) == [WriteKind.APPLIED, WriteKind.ROLLED_BACK, WriteKind.APPLIED]
-
-
 def test_records_of_a_newer_program_are_left_out_and_numbered(cell, records) -> None:
     records.parent.mkdir(parents=True)
     records.write_bytes(b'{"version": 2, "novelty": 1}\n')
     found = config_history(cell)
     assert (found.writes, found.damaged) == ((), (1,))
-
-
-def test_records_that_cannot_be_read_are_an_error(cell, records) -> None:
-    records.mkdir(parents=True)
-    with pytest.raises(FileError, match="not a file"):
-        config_history(cell)

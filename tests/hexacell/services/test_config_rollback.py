@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import pytest
 
@@ -16,11 +15,6 @@ from hexacell.services.write_back.config_rollback import roll_back_config
 from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
 
 NAMES = ("2026-11-20T100000Z", "2026-11-21T100000Z", "2026-11-22T100000Z")
-
-
-@pytest.fixture
-def cell(tmp_path: Path) -> Cell:
-    return a_cell(tmp_path)
 
 
 @pytest.fixture

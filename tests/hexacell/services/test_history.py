@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -24,12 +22,7 @@ from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import Journal, read_journal
 from procedures.steps import events
 from tests.hexacell.results.test_run_comparison import covariance, result
-from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
-
-
-@pytest.fixture
-def cell(tmp_path: Path) -> Cell:
-    return a_cell(tmp_path)
+from tests.hexacell.services.proposed_runs import ProposedRun, propose_run
 
 
 def identified(cell: Cell, name: str, shift_mm: float = 0.0) -> ProposedRun:
@@ -114,15 +107,3 @@ def test_a_run_without_a_result_is_not_compared(cell) -> None:
         compare_runs(cell, "a", "b")
     with pytest.raises(UsageError, match="there is no run 'c'"):
         compare_runs(cell, "a", "c")
-
-
-def test_drift_is_told_from_three_runs_on(cell) -> None:
-    for name, shift in (("a", 0.0), ("b", 0.0)):
-        identified(cell, name, shift)
-    assert parameter_trends(cell, past_runs(cell)) == ()
-    identified(cell, "c", 0.0)
-    found = parameter_trends(cell, past_runs(cell))
-    assert len(found) == 35
-    text = drift_text(found)
-    assert text.startswith("No parameter walks.")
-    assert max(map(len, text.splitlines())) <= 80

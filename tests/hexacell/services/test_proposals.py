@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from hexacell.cell.loader import Cell
 from hexacell.config.change import ConfigEditedSince, Receipt
 from hexacell.errors import (
     AnswerNeeded,
@@ -26,7 +25,7 @@ from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from procedures.engine.commands import UnattendedOperator
 from procedures.run.questions import PendingChange, Question
-from tests.hexacell.services.proposed_runs import MET, ProposedRun, a_cell, propose_run
+from tests.hexacell.services.proposed_runs import MET, ProposedRun, propose_run
 
 DOUBTFUL = AcceptanceGate(
     name="agrees with the noise", passed=False, sentence="Doubtful: 1.4 times.", needs_person=True
@@ -47,11 +46,6 @@ class Person:
     async def ask(self, question: Question) -> str | None:
         self.asked.append(question)
         return self.name
-
-
-@pytest.fixture
-def cell(tmp_path: Path) -> Cell:
-    return a_cell(tmp_path)
 
 
 async def apply(run: ProposedRun, person: Person | UnattendedOperator | None = None) -> str:

@@ -6,7 +6,6 @@ import shutil
 
 import pytest
 
-from hexacell.errors import UsageError
 from hexacell.runs.run_folder import RunFolder
 from hexacell.services.history.run_export import export_run
 from hexacell.services.run.replay_run import replay
@@ -54,14 +53,6 @@ async def test_an_export_has_no_password_and_is_the_same_run(untidy_run, tmp_pat
     assert copied["measurements.csv"] == untidy_run.measurements.read_bytes()
     assert copied["journal.jsonl"] == untidy_run.journal.read_bytes()
     assert (await replay(target, Scope.RESULTS)).is_same
-
-
-async def test_a_folder_with_something_in_it_is_not_written_to(untidy_run, tmp_path) -> None:
-    (tmp_path / "there").mkdir()
-    (tmp_path / "there" / "file").touch()
-    with pytest.raises(UsageError, match="something is there already"):
-        export_run(untidy_run.path, tmp_path / "there")
-    assert [path.name for path in (tmp_path / "there").iterdir()] == ["file"]
 
 
 async def test_a_secret_in_the_controllers_config_is_masked_in_the_proposal(untidy_run, tmp_path) -> None:

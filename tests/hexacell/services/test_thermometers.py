@@ -5,11 +5,7 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
-import pytest
-
 from hexacell.cell.devices import ThermometerSettings
-from hexacell.cell.loader import require_plugins
-from hexacell.errors import FileError
 from hexacell.services.run.calibration_run import preflight
 from hexacell.services.run.replay_run import replay
 from procedures.calibration.calibration import Mode
@@ -47,9 +43,3 @@ async def test_preflight_names_the_thermometers_that_answer(make_site, tmp_path)
     site = make_site(thermometers=(in_the_room(tmp_path),))
     found = await preflight(site.order().cell, Mode.CHECK, unattended=True)
     assert found[-1].name == "thermometer room"
-
-
-def test_a_protocol_without_a_driver_is_refused(make_cell, tmp_path) -> None:
-    strange = in_the_room(tmp_path).model_copy(update={"protocol": "sysfz"})
-    with pytest.raises(FileError, match=r"no thermometer protocol 'sysfz'. Did you mean 'sysfs'\?"):
-        require_plugins(make_cell(thermometers=(strange,)))

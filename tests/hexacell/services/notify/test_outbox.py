@@ -6,7 +6,6 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from hexacell.errors import FileError
 from hexacell.services.notify.notice import PendingNotice
 from hexacell.services.notify.outbox import FOLDER, LONGEST_KEPT, MOST_KEPT, NoticeOutbox
 from tests.hexacell.services.notify.notices import a_notice
@@ -26,13 +25,6 @@ def test_it_is_found_again_in_order_until_it_is_told(tmp_path) -> None:
     NoticeOutbox(tmp_path).forget(waiting[1])
     NoticeOutbox(tmp_path).forget(waiting[1])
     assert NoticeOutbox(tmp_path).pending() == (waiting[0], waiting[2])
-
-
-def test_the_same_again_is_kept_once(tmp_path) -> None:
-    for _ in range(3):
-        NoticeOutbox(tmp_path).keep(pending(1))
-    NoticeOutbox(tmp_path).keep(pending(1, to="other"))
-    assert len(NoticeOutbox(tmp_path).pending()) == 2
 
 
 def test_half_a_file_and_foreign_ones_are_no_notice(tmp_path) -> None:
@@ -93,12 +85,3 @@ def test_only_one_process_sends(tmp_path) -> None:
         assert (first, second) == (True, False)
     with NoticeOutbox(tmp_path).held() as later:
         assert later
-
-
-def test_a_full_disk_says_so(tmp_path, monkeypatch) -> None:
-    def full(path, *_, **__):
-        raise FileError("the disk is full", subject=path)
-
-    monkeypatch.setattr("hexacell.storage.atomic_files.write_atomically", full)
-    with pytest.raises(FileError, match="full"):
-        NoticeOutbox(tmp_path).keep(pending(1))

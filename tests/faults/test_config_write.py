@@ -55,9 +55,7 @@ class Cutter:
         return f"{found}, leftover" if left else found
 
 
-def test_a_kill_before_the_replacement_leaves_the_old_config(
-    program: Any, new_site: Any, undisturbed: Any
-) -> None:
+def test_a_kill_before_the_replacement_leaves_the_old_config(program, new_site, undisturbed):
     calls = undisturbed.ended.calls
     replaced = next(number for number, call in enumerate(calls) if call.other.endswith(CONFIG))
     cutter = Cutter(program, new_site, undisturbed)

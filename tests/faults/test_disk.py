@@ -121,9 +121,7 @@ def the(writes: Sequence[Write], name: str, file: str, step: str = "") -> Write:
     return next(w for w in writes if (w.name, w.file) == (name, file) and step in {"", w.step})
 
 
-def test_a_disk_full_while_measuring_is_reported_as_the_journal(
-    disk: Disk, writes: Sequence[Write]
-) -> None:
+def test_a_disk_full_while_measuring_is_reported_as_the_journal(disk, writes):
     words = disk.fail(the(writes, "write", "journal.jsonl", "sampling"), errno.ENOSPC)
     assert "journal.jsonl: the journal cannot be written" in words, "not what failed afterwards"
 
@@ -131,9 +129,7 @@ def test_a_disk_full_while_measuring_is_reported_as_the_journal(
 @pytest.mark.slow
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("code", ERRORS, ids=[words for words, _ in ERRORS.values()])
-def test_a_failure_of_any_write_leaves_a_valid_config(
-    code: int, disk: Disk, writes: Sequence[Write]
-) -> None:
+def test_a_failure_of_any_write_leaves_a_valid_config(code, disk, writes):
     """All later writes fail too; for the first write of a kind the run is also finished on a good disk."""
     kinds = of_each_kind(writes)
     for write in writes:
@@ -155,8 +151,6 @@ def test_a_full_disk_at_any_write_of_a_config_reversal_leaves_a_valid_config(
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_a_single_disk_error_in_any_kind_of_write_leaves_a_valid_config(
-    disk: Disk, writes: Sequence[Write]
-) -> None:
+def test_a_single_disk_error_in_any_kind_of_write_leaves_a_valid_config(disk, writes):
     for write in of_each_kind(writes):
         disk.fail(write, errno.EIO, width=1)

@@ -30,14 +30,8 @@ def kill(program: Any, new_site: Any, undisturbed: Any) -> Break:
     return broken
 
 
-class TestSelectedKills:
-    def test_a_run_killed_with_an_unverified_config_is_resumed(self, undisturbed: Any, kill: Break) -> None:
-        kill(after(places(undisturbed.history)["after"]))
-
-    def test_a_run_killed_within_a_record_and_again_after_resuming_is_resumed(
-        self, undisturbed: Any, kill: Break
-    ) -> None:
-        kill(within(places(undisturbed.history)["committing"]), after(1))
+def test_a_run_killed_within_a_record_and_again_after_resuming_is_resumed(undisturbed, kill):
+    kill(within(places(undisturbed.history)["committing"]), after(1))
 
 
 @pytest.mark.slow
@@ -47,9 +41,7 @@ class TestAllKills:
         for records in range(1, len(undisturbed.history) + 1):
             kill(after(records))
 
-    def test_a_run_killed_within_a_record_of_any_kind_of_step_is_resumed(
-        self, undisturbed: Any, kill: Break
-    ) -> None:
+    def test_a_run_killed_within_a_record_of_any_kind_of_step_is_resumed(self, undisturbed, kill):
         for record in places(undisturbed.history).values():
             kill(within(record))
             kill(within(record + 1))
@@ -80,9 +72,7 @@ def test_a_result_to_be_rolled_back_is_rolled_back_after_a_kill_at_any_record(
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_a_provisional_geometry_is_reverted_after_a_kill_at_any_record(
-    program: Any, new_site: Any, lent: Any
-) -> None:
+def test_a_provisional_geometry_is_reverted_after_a_kill_at_any_record(program, new_site, lent):
     begun = places(lent.history)
     for first in (begun["lending"], begun["taking back"]):
         for records in range(first - 1, first + 4):
@@ -104,9 +94,7 @@ def noise_records(whole: Any) -> range:
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_a_run_killed_after_any_record_of_the_noise_is_resumed(
-    program: Any, new_site: Any, noise_measured: Any
-) -> None:
+def test_a_run_killed_after_any_record_of_the_noise_is_resumed(program, new_site, noise_measured):
     for records in noise_records(noise_measured):
         site = new_site(*noise_measured.changes)
         assert program.run(site, **after(records)).code == KILLED

@@ -11,19 +11,15 @@ from tests.faults.killing import KILLED, finish
 from tests.faults.promises import require_identical
 
 INSTANTS = 200
-SAMPLE = 1
 
 SOONER = 0.95
 
 
-@pytest.mark.parametrize(
-    "number", [SAMPLE, pytest.param(INSTANTS, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])]
-)
-def test_a_run_killed_at_a_random_instant_is_resumed(
-    number: int, program: Any, new_site: Any, undisturbed: Any
-) -> None:
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_a_run_killed_at_a_random_instant_is_resumed(program: Any, new_site: Any, undisturbed: Any) -> None:
     duration_s = undisturbed.ended.seconds
-    for share in instants(number):
+    for share in instants(INSTANTS):
         site, duration_s = killed(program, new_site, share, duration_s)
         finish(program, site)
         require_identical(site, undisturbed.site)

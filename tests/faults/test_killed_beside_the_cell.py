@@ -50,17 +50,10 @@ def run_over_killed(records: int, program: Any, site: Site, whole: Any) -> None:
         require_identical(site, whole.site)
 
 
-def test_a_run_killed_within_a_set_is_resumed(program: Any, new_site: Any, undisturbed: Any) -> None:
-    records = places(undisturbed.history)["sampling"] + 20
-    run_over_killed(records, program, new_site(), undisturbed)
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("step", STEPS_OF_A_RUN)
-def test_a_run_killed_at_any_kind_of_step_is_resumed(
-    step: str, program: Any, new_site: Any, whole_with: Any
-) -> None:
+def test_a_run_killed_at_any_kind_of_step_is_resumed(step, program, new_site, whole_with):
     whole = whole_with(step)
     records = places(whole.history)[step]
     run_over_killed(records, program, new_site(*whole.changes), whole)

@@ -93,7 +93,5 @@ def cut_everywhere(story: Story) -> None:
         pytest.param(NEVER_GOOD_ENOUGH, 1, id="a bad result", marks=pytest.mark.slow),
     ],
 )
-def test_a_run_survives_a_power_cut_at_any_file_operation(
-    changes: dict[str, Any], code: int, program: Any, ground: Path
-) -> None:
+def test_a_run_survives_a_power_cut_at_any_file_operation(changes, code, program, ground):
     cut_everywhere(Story(program, make_site(ground / "cell", changes), code))

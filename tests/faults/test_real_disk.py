@@ -82,9 +82,7 @@ def fill_up(left: int, small_disk: Any, undisturbed: Any) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_a_run_on_a_disk_that_fills_up_at_any_size_can_be_resumed(
-    small_disk: Any, undisturbed: Any
-) -> None:
+def test_a_run_on_a_disk_that_fills_up_at_any_size_can_be_resumed(small_disk, undisturbed):
     used = sum(path.stat().st_size for path in undisturbed.folder.path.iterdir())
     for left in range(0, used - undisturbed.folder.wire.stat().st_size, 12_288):
         fill_up(left, small_disk, undisturbed)
@@ -93,9 +91,7 @@ def test_a_run_on_a_disk_that_fills_up_at_any_size_can_be_resumed(
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
-def test_a_run_ended_by_the_file_size_limit_can_be_resumed(
-    share: float, program: Any, new_site: Any, undisturbed: Any
-) -> None:
+def test_a_run_ended_by_the_file_size_limit_can_be_resumed(share, program, new_site, undisturbed):
     """The kernel writes what still fits: half a record."""
     site = new_site()
     limit = int(share * undisturbed.folder.journal.stat().st_size)

@@ -71,8 +71,6 @@ def test_a_controller_left_unplugged_ends_the_run_with_the_old_config(puller: Pu
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("back", [True, False], ids=["put back", "left out"])
 @pytest.mark.parametrize("device", DEVICES)
-def test_any_device_unplugged_at_any_kind_of_step_is_handled(
-    device: str, back: bool, puller: Puller
-) -> None:
+def test_any_device_unplugged_at_any_kind_of_step_is_handled(device, back, puller):
     for step in PULLED:
         puller.pull(device, step, back=back)

@@ -8,7 +8,7 @@ import pytest
 
 from tests.mutations.kinds import SHARES
 
-SAMPLE, EACH = 3, 20
+SAMPLE, EACH = 2, 20
 """Trials of each kind in ``make test`` and in ``make test-full``."""
 
 

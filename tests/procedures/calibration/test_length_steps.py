@@ -195,9 +195,7 @@ async def test_gauges_that_are_zeroed_between_the_seats_are_told(make_length_rig
     assert "they were zeroed in between" in found.result.reason
 
 
-async def test_a_ball_outside_the_travel_in_the_second_seat_is_told_with_what_to_check(
-    make_length_rig,
-) -> None:
+async def test_a_ball_outside_the_travel_in_the_second_seat_is_told_with_what_to_check(make_length_rig):
     rig = make_length_rig(simulation__fixture__yaw_deg=2.0)
     with pytest.raises(HexacellError, match="L2: the ball left the gauges' travel in seat 2") as failure:
         await rig.run()
@@ -229,9 +227,7 @@ def killed(rig: Rig) -> None:
 @pytest.mark.sample("2-True", "3-False")
 @pytest.mark.parametrize("is_killed", [False, True])
 @pytest.mark.parametrize("mounting", [2, 3])
-async def test_a_check_resumed_between_the_seats_goes_on_there(
-    make_length_rig, mounting: int, is_killed: bool
-) -> None:
+async def test_a_check_resumed_between_the_seats_goes_on_there(make_length_rig, mounting, is_killed):
     person = LeavesBefore(mounting)
     rig = make_length_rig(person, length_check__mounting="by-hand")
     with pytest.raises(AnswerNeeded):

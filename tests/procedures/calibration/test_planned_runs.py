@@ -31,9 +31,7 @@ def test_every_chosen_move_has_a_forecast_of_its_gain_and_of_the_remaining_recor
     assert all(f and f.end_mm <= f.next_mm <= f.now_mm and f.minutes > 0.0 for f in forecasts)
 
 
-def test_with_the_target_reached_the_set_is_closed_and_the_geometry_identified(
-    recording, make_rig, story
-) -> None:
+def test_with_the_target_reached_the_set_is_closed_and_the_geometry_identified(recording, make_rig, story):
     step, before = [*moves(recording)][-2]
     now = step.expected.forecast.now_mm
     assert next_step(make_rig(identification__target_mm=0.99 * now).calibration, fold(before)) is not None

@@ -96,9 +96,7 @@ async def test_an_abort_at_a_reference_pose_reverts_the_provisional_geometry(rig
 
 @pytest.mark.sample("2")
 @pytest.mark.parametrize("count", [2, 5])
-async def test_an_abort_within_a_set_leaves_the_provisional_geometry_until_the_run_resumes(
-    rig, count
-) -> None:
+async def test_an_abort_within_a_set_leaves_the_provisional_geometry_until_the_run_resumes(rig, count):
     before = rig.config
     with pytest.raises(Interruption):
         await rig.run(on(events.RecordTaken, lambda: rig.engine.command(Abort()), count))
@@ -108,9 +106,7 @@ async def test_an_abort_within_a_set_leaves_the_provisional_geometry_until_the_r
 
 @pytest.mark.sample("take back")
 @pytest.mark.parametrize("step", ["lend", "take back"])
-async def test_a_run_resumes_after_a_power_cut_before_the_provisional_geometry_is_written(
-    rig, step
-) -> None:
+async def test_a_run_resumes_after_a_power_cut_before_the_provisional_geometry_is_written(rig, step):
     before = rig.config
     with pytest.raises(PowerCut):
         await rig.run(at_step(step, cut_power))
@@ -120,9 +116,7 @@ async def test_a_run_resumes_after_a_power_cut_before_the_provisional_geometry_i
     assert rig.config != before
 
 
-async def test_a_run_resumes_after_a_power_cut_with_the_provisional_geometry_written(
-    rig, monkeypatch
-) -> None:
+async def test_a_run_resumes_after_a_power_cut_with_the_provisional_geometry_written(rig, monkeypatch):
     before = rig.config
 
     kept: list[bytes] = []

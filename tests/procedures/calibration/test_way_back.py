@@ -102,9 +102,7 @@ def test_a_return_path_is_not_planned_again_at_its_waypoint(make_rig, story, mon
     assert asked == pytest.approx([ORIENTATIONS - 1.0])
 
 
-def test_without_a_clear_line_the_return_visits_the_waypoints_passed_before(
-    make_rig, story, monkeypatch
-) -> None:
+def test_without_a_clear_line_the_return_visits_the_waypoints_passed_before(make_rig, story, monkeypatch):
     ClearLines(monkeypatch)
     stop = (100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
     s = story()

@@ -54,9 +54,7 @@ async def test_all_thermometers_are_read_in_their_order() -> None:
 
 
 @pytest.mark.parametrize("failure", [GONE, ZeroDivisionError("in a stranger's driver")])
-async def test_a_failing_thermometer_gives_no_temperature_and_one_warning(
-    caplog, failure: Exception
-) -> None:
+async def test_a_failing_thermometer_gives_no_temperature_and_one_warning(caplog, failure):
     rails = FakeThermometer("rails", failure, failure, failure, 21.0, failure)
     thermometers = Thermometers([rails, FakeThermometer("room", 20.5)])
     with caplog.at_level(logging.WARNING):

@@ -38,9 +38,7 @@ async def test_a_robot_at_rest_is_settled_after_one_window(bench, interval_s: fl
 
 
 @pytest.mark.parametrize("reading_s", [0.0, 0.04, 0.1, 0.25])
-async def test_readings_begin_an_interval_apart_or_as_soon_as_the_devices_are_ready(
-    bench, reading_s: float
-) -> None:
+async def test_readings_begin_an_interval_apart_or_as_soon_as_the_devices_are_ready(bench, reading_s):
     def slow() -> float:
         bench.clock.time_s += reading_s
         return 0.0

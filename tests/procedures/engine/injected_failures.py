@@ -5,21 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import pytest
-
 from drivers.errors import (
     GaugeSilent,
 )
 from hexacell.cell.recovery import RecoverySettings
-from hexacell.errors import (
-    Interruption,
-)
-from procedures.engine.commands import Stop
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events
+from tests.procedures.runs.listening import run_until
 
 UNATTENDED = RecoveryPolicy.of(RecoverySettings(), attended=False)
 ATTENDED = RecoveryPolicy.of(RecoverySettings(), attended=True)
@@ -42,11 +37,5 @@ def failing(key: str, action: Callable[[], Any], times: int = 1) -> Any:
 
 async def until_closed(rig: Any, *listeners: Any, policy: RecoveryPolicy) -> bool:
     """Run until the second point is measured; whether it came to that."""
-
-    def stop(event: events.Event, _: RunState) -> None:
-        if isinstance(event, events.SetClosed):
-            rig.engine.command(Stop())
-
-    with pytest.raises(Interruption):
-        await rig.run(*listeners, stop, policy=policy)
+    await run_until(rig, events.SetClosed, *listeners, policy=policy)
     return fold(read_journal(rig.folder.journal)).set(P2).closed

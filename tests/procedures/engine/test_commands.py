@@ -199,9 +199,7 @@ async def test_two_undo_commands_discard_two_records(stage: Stage) -> None:
         (MeasureAgain(P1), events.SetInvalidated(at=P1, reason="a person asked for it")),
     ],
 )
-async def test_measure_again_discards_the_record_or_the_set(
-    stage: Stage, command: MeasureAgain, event: events.Event
-) -> None:
+async def test_measure_again_discards_the_record_or_the_set(stage, command, event):
     await stage.held_at("P1/o03/sample")
     stage.engine.command(command)
     await stage.over()

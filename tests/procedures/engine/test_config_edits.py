@@ -10,7 +10,7 @@ from hexacell.errors import ExitCode, FileError, HexacellError
 from procedures.engine.commands import UnattendedOperator
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.steps import events
-from tests.procedures.runs.listening import happened, on
+from tests.procedures.runs.listening import happened, on, run_until
 
 
 def edits(rig: Any, kind: type[Any], count: int) -> Any:
@@ -49,7 +49,7 @@ async def test_an_unattended_run_ends_and_is_resumed_once_the_edit_is_undone(rec
     assert rig.controller.log[len(log) :] == ["stop"], "not even prepared"
     rig.cell.config_path.write_bytes(before)
     rig.operator.name = None
-    assert (await rig.run(policy=policy)).exit_code == ExitCode.DONE
+    await run_until(rig, events.SetClosed, policy=policy)
 
 
 async def test_an_edit_of_the_written_config_is_noticed_too(recording, replayed) -> None:
@@ -59,9 +59,7 @@ async def test_an_edit_of_the_written_config_is_noticed_too(recording, replayed)
     assert not happened(rig, events.ResultValidated)
 
 
-async def test_an_edited_provisional_config_is_not_loaded_in_place_of_the_old_one(
-    recording, replayed
-) -> None:
+async def test_an_edited_provisional_config_is_not_loaded_in_place_of_the_old_one(recording, replayed):
     rig = replayed(recording.until(events.SetClosed), identification__provisional=True)
     with pytest.raises(FileError, match="Undo the edit and retry"):
         await rig.run(edits(rig, events.SetClosed, 1))

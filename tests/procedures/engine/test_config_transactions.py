@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 from hexacell.errors import DeviceError, Interruption
@@ -51,9 +49,7 @@ def step_at_end(history: list[events.Event], error: BaseException) -> BaseStep |
         ([APPLIED, events.ProvisionalReverted(), arrived(1)], FAILURE, None),
     ],
 )
-def test_an_early_end_reverts_unverified_and_provisional_geometries(
-    history: Any, error: BaseException, step: BaseStep | None
-) -> None:
+def test_an_early_end_reverts_unverified_and_provisional_geometries(history, error, step):
     assert step_at_end(history, error) == step
 
 

@@ -82,9 +82,7 @@ def script(bench) -> Script:
     return Script(bench.devices, list(MOVES))
 
 
-async def test_a_step_is_journalled_before_it_is_performed_and_its_event_afterwards(
-    script, journal, path
-) -> None:
+async def test_a_step_is_journalled_before_it_is_performed_and_its_event_afterwards(script, journal, path):
     seen: list[tuple[int, int]] = []
     real = script.perform
 
@@ -126,9 +124,7 @@ async def test_listeners_receive_events_that_are_on_the_disk(script, journal, pa
         (ZeroDivisionError("division by zero"), ExitCode.FAULT),
     ],
 )
-async def test_an_error_stops_motion_before_it_is_journalled(
-    script, journal, bench, error: Exception, code: ExitCode
-) -> None:
+async def test_an_error_stops_motion_before_it_is_journalled(script, journal, bench, error, code):
     script.failure = error
     done: list[str] = []
 
@@ -198,9 +194,7 @@ async def test_if_stopping_fails_too_that_is_said_first(script, journal, bench) 
     assert journal.events[-1] == events.Interrupted(reason=str(failure.value), exit_code=3)
 
 
-async def test_an_interruption_with_a_stop_that_fails_is_a_failure_of_the_hardware(
-    script, journal, bench
-) -> None:
+async def test_an_interruption_with_a_stop_that_fails_is_a_failure_of_the_hardware(script, journal, bench):
     script.failure = Interruption("aborted")
     bench.controller.failures["stop"] = DeviceError("connection lost", subject="controller")
     with pytest.raises(RobotNotStopped, match=r"^PRESS THE EMERGENCY STOP") as failure:

@@ -61,33 +61,19 @@ async def interrupted_twice(rig: Any, how: str, first: int, second: int) -> None
     assert set(voided) <= {"the run was interrupted in this set"}, "no set with a record was measured anew"
 
 
-HERE_AND_THERE = [("power cut", 7, 5), ("aborted", 16, 4), ("power cut", 3, 9)]
-"""From the drawing, the last one's records lead to another robot, whose gauges would read in inches."""
-
-LATER = [pytest.param("power cut", 1, 27, 3, marks=pytest.mark.slow), ("aborted", 2, 14, 6)]
-"""The first number is of sets that are measured already."""
-
-
-@pytest.mark.sample("power cut-3-9")
-@pytest.mark.parametrize(("how", "first", "second"), HERE_AND_THERE)
-async def test_a_run_interrupted_twice_from_its_beginning_finishes_with_every_record_once(
-    make_rig, how: str, first: int, second: int
-) -> None:
-    await interrupted_twice(make_rig(), how, first, second)
+@pytest.mark.sample("3", "16")
+@pytest.mark.parametrize("first", range(1, TELLING))
+async def test_a_run_interrupted_after_any_event_and_again_finishes_with_every_record_once(make_rig, first):
+    how = list(WAYS)[first % 2]
+    await interrupted_twice(make_rig(), how, first, 1 + (7 * first) % 13)
 
 
-@pytest.mark.parametrize(("how", "sets", "first", "second"), LATER)
+@pytest.mark.parametrize(
+    ("how", "sets", "first", "second"),
+    [pytest.param("power cut", 1, 27, 3, marks=pytest.mark.slow), ("aborted", 2, 14, 6)],
+)
 async def test_a_run_interrupted_twice_after_whole_sets_finishes_with_every_record_once(
     recording, replayed, how: str, sets: int, first: int, second: int
 ) -> None:
     rig = replayed(recording.until(events.SetClosed, count=sets))
     await interrupted_twice(rig, how, first, second)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("first", range(1, TELLING))
-async def test_a_run_interrupted_after_any_event_and_again_finishes_with_every_record_once(
-    make_rig, first: int
-) -> None:
-    how = list(WAYS)[first % 2]
-    await interrupted_twice(make_rig(), how, first, 1 + (7 * first) % 13)

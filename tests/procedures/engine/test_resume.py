@@ -105,9 +105,7 @@ async def test_a_run_cancelled_after_any_event_resumes(recording, replayed, numb
     require_whole_sets(history)
 
 
-async def test_a_write_back_in_progress_is_completed_despite_cancellation(
-    recording, replayed, monkeypatch
-) -> None:
+async def test_a_write_back_in_progress_is_completed_despite_cancellation(recording, replayed, monkeypatch):
     rig = replayed(recording.until(events.Proposed))
     running = asyncio.create_task(rig.run())
     cancelled = threading.Event()

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, ZeroVoid
 from hexacell.cell.devices import GaugeAxis
-from hexacell.errors import HexacellError, LimitError, SeveralErrors
+from hexacell.errors import LimitError, SeveralErrors
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
@@ -90,9 +90,7 @@ MOUNTINGS = [
 
 
 @pytest.mark.parametrize(("mounting", "expected"), MOUNTINGS)
-async def test_gauges_are_turned_onto_the_bases_axes(
-    station: Station, mounting: Any, expected: Any
-) -> None:
+async def test_gauges_are_turned_onto_the_bases_axes(station, mounting, expected):
     station.mount(*mounting)
     zero = fold([await station.do(SAMPLE)])
     station.shown[:] = [1.0, 2.0, 3.0]
@@ -121,9 +119,7 @@ async def test_a_ball_outside_the_travel_is_refused(station: Station, axis: int,
     assert (event.at, event.orientation) == (P1, 2)
 
 
-async def test_gauges_at_their_ends_are_a_refusal_that_names_all(
-    station: Station, zeroed: RunState
-) -> None:
+async def test_gauges_at_their_ends_are_a_refusal_that_names_all(station, zeroed):
     station.shown[2] = 7.0
     reason = "gauge z: is at an end of its travel"
     assert await station.do(SECOND, zeroed) == events.RecordRejected(at=P1, orientation=2, reason=reason)
@@ -141,9 +137,7 @@ async def test_gauges_at_their_ends_are_a_refusal_that_names_all(
         [GaugeSilent("does not answer", subject="gauge x"), GaugeAtEnd("at an end", subject="gauge y")],
     ],
 )
-async def test_other_failures_are_no_refusals(
-    station: Station, zeroed: RunState, errors: list[HexacellError]
-) -> None:
+async def test_other_failures_are_no_refusals(station, zeroed, errors):
     for gauge, error in zip(station.rig.gauges, errors, strict=False):
         gauge.failures = [error]
     with pytest.raises(GaugeSilent if len(errors) == 1 else SeveralErrors):
@@ -160,9 +154,7 @@ async def test_a_drift_within_the_limit_closes_the_set(station: Station, zeroed:
 
 
 @pytest.mark.parametrize(("axis", "drift"), [(0, 0.11), (1, -0.11), (2, 0.5)])
-async def test_a_reference_that_drifted_is_not_closed(
-    station: Station, zeroed: RunState, axis: int, drift: float
-) -> None:
+async def test_a_reference_that_drifted_is_not_closed(station, zeroed, axis, drift):
     station.shown[axis] += drift
     with pytest.raises(LimitError, match=r"P1: back at the reference .*more than 0\.1 mm") as refusal:
         await station.do(CloseSet(at=P1), zeroed)

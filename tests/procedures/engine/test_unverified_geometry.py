@@ -14,7 +14,7 @@ from hexacell.errors import (
     WriteBackUndone,
 )
 from procedures.engine.commands import Abort
-from procedures.engine.recovery import GIVE_UP, RecoveryPolicy
+from procedures.engine.recovery import GIVE_UP
 from procedures.journal.journal import read_journal
 from procedures.run.state import RunState, fold
 from procedures.steps import events
@@ -42,9 +42,7 @@ def slip_farther(rig: Any) -> Any:
 
 
 @pytest.mark.parametrize("policy", [GIVE_UP, UNATTENDED])
-async def test_a_geometry_that_cannot_be_verified_is_rolled_back(
-    rig, recording, policy: RecoveryPolicy
-) -> None:
+async def test_a_geometry_that_cannot_be_verified_is_rolled_back(rig, recording, policy):
     sound = rig.gauges[2].shown
     with pytest.raises(WriteBackUndone, match=r"could not be verified; .* back\. after-V2: ") as undone:
         await rig.run(slip_farther(rig), policy=policy)

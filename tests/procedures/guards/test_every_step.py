@@ -192,9 +192,7 @@ def names(cases: list[tuple[Any, Fault]]) -> list[str]:
     [*SOME, *(pytest.param(*case, marks=pytest.mark.slow) for case in THE_REST)],
     ids=names([*SOME, *THE_REST]),
 )
-async def test_the_robot_stops_within_the_limit_for_each_guard_and_step(
-    stage: Any, step: Any, fault: Fault
-) -> None:
+async def test_the_robot_stops_within_the_limit_for_each_guard_and_step(stage, step, fault):
     scene = stage(step)
     config = scene.rig.config
     doing = await step(scene)

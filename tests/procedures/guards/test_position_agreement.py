@@ -70,9 +70,7 @@ OUT_OF_REACH = Pose(0.0, 0.0, 2000.0)
         ({"pose": HOME, "joints": None}, None),
     ],
 )
-def test_the_report_that_the_two_others_contradict_is_odd(
-    changes: dict[str, Any], odd: PositionSource | None
-) -> None:
+def test_the_report_that_the_two_others_contradict_is_odd(changes, odd):
     shown = reports(**changes)
     found = mismatch(shown)
     assert found is not None

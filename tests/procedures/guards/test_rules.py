@@ -106,9 +106,7 @@ def test_the_stop_line_gives_its_reason() -> None:
         (status("a", "Joint 0 Following Error", enabled=False), Guard.FOLLOWING, "Joint 0 Following Error"),
     ],
 )
-def test_a_controller_that_forbids_motion_trips_with_its_reason(
-    heard: Any, guard: Guard, words: str
-) -> None:
+def test_a_controller_that_forbids_motion_trips_with_its_reason(heard, guard, words):
     trip = tripped(controller=heard)
     assert (trip.guard, trip.device) == (guard, "controller")
     assert words in trip.problem
@@ -144,9 +142,7 @@ def test_the_ball_may_go_as_far_as_each_side_has_room() -> None:
 
 
 @given(deviation=st.floats(-20.0, 20.0), first=st.floats(-20.0, 20.0), axis=st.sampled_from([0, 1, 2]))
-def test_a_ball_must_not_go_farther_than_allowed_nor_than_it_was(
-    deviation: float, first: float, axis: int
-) -> None:
+def test_a_ball_must_not_go_farther_than_allowed_nor_than_it_was(deviation, first, axis):
     trip = first_trip(PolledDevices((gauge(deviation, first, axis),)), LIMITS)
     if abs(deviation) > max(5.5, abs(first)):
         assert trip is not None
@@ -235,9 +231,7 @@ def test_a_slider_beyond_the_following_limit_is_named() -> None:
         ((), 1.5, False),
     ],
 )
-def test_an_unchanged_gauge_trips_if_the_ball_should_have_moved(
-    shown: tuple[str, ...], expected_mm: float, trips: bool
-) -> None:
+def test_an_unchanged_gauge_trips_if_the_ball_should_have_moved(shown, expected_mm, trips):
     trip = stuck_gauge("gauge y", shown, expected_mm)
     assert (trip is not None) is trips
     if trip:

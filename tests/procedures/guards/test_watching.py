@@ -248,9 +248,7 @@ EXPECTED = Expectation(deviation_mm=(0.0, 0.0, 3.0), sigma_mm=(0.1, 0.1, 0.1), g
 
 
 @pytest.mark.parametrize(("sigma", "trips"), [(0.1, True), (0.5, False)])
-async def test_a_gauge_that_does_not_change_during_a_move_trips_the_stale_guard(
-    scene, sigma: float, trips: bool
-) -> None:
+async def test_a_gauge_that_does_not_change_during_a_move_trips_the_stale_guard(scene, sigma, trips):
     stage = await reference(scene())
     stage.frozen["z"] = stage.rig.gauges[2].shown()
     step = move(2, expected=EXPECTED.model_copy(update={"sigma_mm": (sigma,) * 3}))

@@ -16,9 +16,7 @@ from tests.procedures.journal.told import TOLD, checked, write_told
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
-def test_a_damaged_line_before_the_last_is_refused_with_its_number(
-    path: Path, written: bytes, number: int
-) -> None:
+def test_a_damaged_line_before_the_last_is_refused_with_its_number(path, written, number):
     lines = written.split(b"\n")
     for place in range(0, len(lines[number - 1]), 7):
         line = bytearray(lines[number - 1])

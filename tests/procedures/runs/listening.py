@@ -8,7 +8,10 @@ from typing import Any
 
 import pytest
 
+from hexacell.errors import Interruption
 from hexacell.verdict.acceptance_gates import AcceptanceGate
+from procedures.engine.commands import Stop
+from procedures.engine.recovery import GIVE_UP, RecoveryPolicy
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase
 from procedures.run.state import RunState
@@ -61,6 +64,15 @@ async def cancelled(rig: Any, when: Callable[..., Any], *listeners: Any) -> None
     tasks.append(asyncio.create_task(rig.run(*listeners, when(action=cancel))))
     with pytest.raises(asyncio.CancelledError):
         await tasks[0]
+
+
+async def run_until(
+    rig: Any, kind: type[Any], *listeners: Any, count: int = 1, policy: RecoveryPolicy = GIVE_UP
+) -> None:
+    """Run up to the ``count``-th event of a kind; it can be resumed."""
+    enough = on(kind, lambda: rig.engine.command(Stop()), count)
+    with pytest.raises(Interruption):
+        await rig.run(*listeners, enough, policy=policy)
 
 
 def happened(rig: Any, kind: type[Any]) -> list[Any]:

@@ -42,9 +42,7 @@ async def test_a_gate_that_requires_approval_ends_an_unattended_run(recording, r
         ),
     ],
 )
-async def test_a_geometry_far_from_the_old_one_waits_for_a_person(
-    recording, replayed, changes, words
-) -> None:
+async def test_a_geometry_far_from_the_old_one_waits_for_a_person(recording, replayed, changes, words):
     rig = replayed(recording.until(events.SetClosed, count=4), **changes)
     object.__setattr__(rig.performer, "operator", UnattendedOperator())
     with pytest.raises(AnswerNeeded, match=words):

@@ -72,9 +72,7 @@ async def test_confirming_records_that_do_not_agree_leave_the_result_not_evaluat
     assert rig.config == recording.config_before
 
 
-async def test_a_failure_beyond_chance_asks_for_no_confirming_records(
-    recording, replayed, monkeypatch
-) -> None:
+async def test_a_failure_beyond_chance_asks_for_no_confirming_records(recording, replayed, monkeypatch):
     monkeypatch.setattr(model_evidence, "BEYOND_CHANCE", 1.0)
     rig = nobody_keeps(replayed(recording.until(events.Proposed)))
     await rig.run()
@@ -82,9 +80,7 @@ async def test_a_failure_beyond_chance_asks_for_no_confirming_records(
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.NOT_EVALUATED
 
 
-async def test_where_no_confirming_pose_can_be_taken_the_verdict_stays(
-    recording, replayed, monkeypatch
-) -> None:
+async def test_where_no_confirming_pose_can_be_taken_the_verdict_stays(recording, replayed, monkeypatch):
     monkeypatch.setattr(HeldOutPoses, "confirming", lambda *_: ((), ()))
     rig = nobody_keeps(replayed(recording.until(events.Proposed)))
     await rig.run()

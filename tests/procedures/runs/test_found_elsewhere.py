@@ -7,7 +7,7 @@ import pytest
 from hexacell.errors import ExitCode
 from procedures.steps import events
 from procedures.steps.move import Move
-from tests.procedures.runs.listening import happened
+from tests.procedures.runs.listening import happened, run_until
 
 
 def returns(rig, since: int) -> list[Move]:
@@ -30,8 +30,7 @@ async def test_only_a_robot_far_from_the_gauges_returns_without_them(
     """The simulated robot is at its home when a run is resumed, which is the first point."""
     history = recording.until(events.RecordTaken, count=records)
     rig = replayed(history)
-    ended = await rig.run()
-    assert ended.exit_code == ExitCode.DONE
+    await run_until(rig, events.SetClosed)
     moves = returns(rig, len(history))
     assert moves
     assert moves[0].from_elsewhere is from_elsewhere

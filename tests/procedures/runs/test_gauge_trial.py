@@ -14,7 +14,7 @@ from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
 from procedures.steps.move import Move
 from tests.procedures.runs.gauge_mistakes import MISTAKES, corrected, make_mistake
-from tests.procedures.runs.listening import at_step, happened, on, steps_of
+from tests.procedures.runs.listening import at_step, happened, on, run_until, steps_of
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 
@@ -36,8 +36,9 @@ async def test_a_person_puts_it_right_and_the_station_begins_again(make_rig) -> 
     make_mistake(rig, "x and y exchanged")
     rig.operator.decisions = [Action.REDO_SET]
     policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=True)
-    ended = await rig.run(on(events.Failed, lambda: corrected(rig)), policy=policy)
-    assert ended.exit_code == ExitCode.DONE
+    await run_until(
+        rig, events.GaugesPlaced, on(events.Failed, lambda: corrected(rig)), count=3, policy=policy
+    )
     (problem,) = rig.operator.problems
     assert "gauges x, y: are exchanged" in problem
     assert "Exchange their cables" in problem
@@ -80,9 +81,7 @@ async def test_a_gauge_that_was_connected_again_is_tried_again(make_rig) -> None
     assert happened(rig, events.SetInvalidated), "its zero was void"
 
 
-async def test_after_an_interruption_the_gauges_are_tried_again_before_the_set_continues(
-    make_rig,
-) -> None:
+async def test_after_an_interruption_the_gauges_are_tried_again_before_the_set_continues(make_rig):
     rig = make_rig(stations__trial_mm=1.0)
 
     def stop() -> None:
@@ -90,7 +89,7 @@ async def test_after_an_interruption_the_gauges_are_tried_again_before_the_set_c
 
     with pytest.raises(LimitError, match="stop here"):
         await rig.run(at_step("P1/o04/sample", stop))
-    await rig.run()
+    await run_until(rig, events.SetClosed)
     history = read_journal(rig.folder.journal)
     confirmed = next(n for n, event in enumerate(history) if isinstance(event, events.ReferenceConfirmed))
     after = [event.step.key for event in history[confirmed:] if isinstance(event, events.StepBegun)]

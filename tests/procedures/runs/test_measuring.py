@@ -9,7 +9,7 @@ from hexacell.errors import AnswerNeeded, ExitCode, HexacellError, LimitError
 from hexacell.measurements.csv_file import read_measurements
 from procedures.engine.commands import UnattendedOperator
 from procedures.steps import events
-from tests.procedures.runs.listening import at_step, happened, on
+from tests.procedures.runs.listening import at_step, happened, on, run_until
 
 
 async def test_after_a_rejected_record_another_pose_is_measured(make_rig) -> None:
@@ -20,8 +20,7 @@ async def test_after_a_rejected_record_another_pose_is_measured(make_rig) -> Non
         for gauge in rig.gauges[: len(at_ends)]:
             gauge.failures.append(at_ends.pop(0))
 
-    ended = await rig.run(at_step("P1/o03/sample", once))
-    assert ended.exit_code == ExitCode.DONE
+    await run_until(rig, events.SetClosed, at_step("P1/o03/sample", once))
     (refused,) = happened(rig, events.RecordRejected)
     assert (str(refused.at), refused.orientation) == ("P1", 3)
     begun = [event.step for event in happened(rig, events.StepBegun)]
@@ -42,8 +41,7 @@ async def test_a_slipped_gauge_stops_the_run_and_the_point_is_measured_again(rec
         await rig.run(on(events.RecordTaken, slip, count=5))
     assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.OUT_OF_LIMITS
     assert rig.controller.log[-1] == "stop"
-    ended = await rig.run()
-    assert ended.exit_code == ExitCode.DONE
+    await run_until(rig, events.SetClosed)
     assert [str(event.at) for event in happened(rig, events.SetInvalidated)] == ["P2"]
 
 

@@ -35,7 +35,7 @@ from procedures.steps.repeat import Repeat
 from procedures.steps.standstill import Standstill
 from tests.procedures.replay.test_replayer import numbered
 from tests.procedures.rig import MakeRig, Rig, new_rig
-from tests.procedures.runs.listening import PowerCut, happened, on, steps_of
+from tests.procedures.runs.listening import PowerCut, happened, on, run_until, steps_of
 from tests.small_cell import choose_among_few
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
@@ -73,9 +73,7 @@ def well_known(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(planner, "is_well_known", lambda *_: True)
 
 
-async def test_it_is_read_at_rest_left_in_all_directions_and_evaluated(
-    asked: Rig, well_known: None
-) -> None:
+async def test_it_is_read_at_rest_left_in_all_directions_and_evaluated(asked, well_known):
     await measure_noise(asked)
     steps = steps_of(asked)
     (first,) = (place for place, step in enumerate(steps) if isinstance(step, Standstill))
@@ -93,12 +91,21 @@ async def test_it_is_read_at_rest_left_in_all_directions_and_evaluated(
     assert np.linalg.matrix_rank(moved) == 3
 
 
-async def test_the_reference_is_left_for_pilot_poses(asked: Rig) -> None:
+@pytest.fixture(scope="module")
+def quiet(tmp_path_factory: pytest.TempPathFactory) -> Rig:
+    """A run that has just measured the noise, which is as small as stated."""
+    with pytest.MonkeyPatch.context() as patch:
+        choose_among_few(patch)
+        rig = new_rig(tmp_path_factory.mktemp("quiet"), **ASKED)
+        asyncio.run(measure_noise(rig))
+    return rig
+
+
+def test_the_reference_is_left_for_pilot_poses(quiet: Rig) -> None:
     """They are farther and farther away, stay inside the travel, and count for nothing."""
-    await measure_noise(asked)
-    pilots, visits = happened(asked, events.PilotTaken), happened(asked, events.ReferenceRepeated)
+    pilots, visits = happened(quiet, events.PilotTaken), happened(quiet, events.ReferenceRepeated)
     assert [one.orientation for one in pilots] == [*range(FIRST_PILOT, FIRST_PILOT + len(pilots))]
-    history = read_journal(asked.folder.journal)
+    history = read_journal(quiet.folder.journal)
     kinds = [event.kind for event in history if event.kind in {"piloted", "repeated"}]
     departures = "".join("." if kind == "piloted" else " " for kind in kinds).removesuffix(" ").split(" ")
     assert departures[:2] == ["..."] * 2
@@ -108,10 +115,9 @@ async def test_the_reference_is_left_for_pilot_poses(asked: Rig) -> None:
     assert np.mean(turned[6:]) > 2.0 * np.mean(turned[:3])
     state = fold(history)
     assert len(state.pilots) == len(pilots)
-    travel = asked.cell.settings.limits.gauge_travel_mm
+    travel = quiet.cell.settings.limits.gauge_travel_mm
     assert max(np.abs(one.deviation).max() for one in state.pilots) < travel
     assert {one.orientation for one in state.measurements().records} == {1, 2}
-    assert len(happened(asked, events.NoiseMeasured)) == 1
     assert len(visits) == 6
 
 
@@ -128,17 +134,15 @@ async def test_a_pilot_pose_outside_the_travel_is_the_last_one(asked: Rig) -> No
     def listener(event: events.Event, _: RunState) -> None:
         is_third = isinstance(event, events.StepBegun) and event.step.key == "P1/pilot03/pilot"
         far[0] = 20.0 if is_third else 0.0
-        if isinstance(event, events.NoiseMeasured):
-            asked.engine.command(Stop())
 
-    with pytest.raises(Interruption):
-        await asked.run(listener)
+    await run_until(asked, events.NoiseMeasured, listener)
     assert len(happened(asked, events.PilotTaken)) == 2
     assert len(happened(asked, events.ReferenceRepeated)) == 6
 
 
-async def test_the_quiet_simulation_is_as_noisy_as_stated(asked: Rig) -> None:
-    found = (await measure_noise(asked)).noise
+def test_the_quiet_simulation_is_as_noisy_as_stated(quiet: Rig) -> None:
+    (measured,) = happened(quiet, events.NoiseMeasured)
+    found = measured.noise
     assert not found.is_larger
     assert {one.record for one in (*found.gauges, *found.encoders)} == {0.0012}
     readings = [one.reading or 1.0 for one in (*found.gauges, *found.encoders)]
@@ -179,8 +183,7 @@ async def test_encoders_that_show_other_places_each_time_are_told(make_rig: Make
     moved = on(
         events.Arrived, lambda: shift.__setitem__(slice(None), 0.03 * random.standard_normal(6)), None
     )
-    with pytest.raises(Interruption):
-        await rig.run(moved, on(events.NoiseMeasured, lambda: rig.engine.command(Stop())))
+    await run_until(rig, events.NoiseMeasured, moved)
     (found,) = happened(rig, events.NoiseMeasured)
     assert len(happened(rig, events.PilotTaken)) == 6, "until three visits show it"
     assert found.noise.approaches.source == "encoders"
@@ -200,9 +203,7 @@ AVERAGED = ASKED | {
 }
 
 
-async def test_records_are_means_of_several_windows_where_that_is_allowed_and_pays(
-    make_rig: MakeRig,
-) -> None:
+async def test_records_are_means_of_several_windows_where_that_is_allowed_and_pays(make_rig):
     rig = make_rig(**AVERAGED)
     found = await measure_noise(rig)
     assert found.noise.windows == 4
@@ -265,9 +266,7 @@ def test_the_run_is_reproduced(whole: Rig, few_candidates: None, tmp_path: Path)
     ("command", "step"),
     [(Abort(), 27), *(pytest.param(one, 3, marks=pytest.mark.slow) for one in (Abort(), None))],
 )
-async def test_interrupted_anywhere_it_is_measured_once(
-    make_rig: MakeRig, few_candidates: None, tmp_path: Path, command: Abort | None, step: int
-) -> None:
+async def test_interrupted_anywhere_it_is_measured_once(make_rig, few_candidates, tmp_path, command, step):
     """After a stop, and after a death that leaves no word, at some events until the noise is measured."""
     for number in range(2, 110, 2 * step):
         folder = tmp_path / f"{number}"
@@ -305,9 +304,7 @@ FAILING = (Standstill, Pilot, Repeat)
 @pytest.mark.sample("retry-Repeat", "redo-set-Standstill", "measure-again-Repeat")
 @pytest.mark.parametrize("kind", FAILING)
 @pytest.mark.parametrize("action", ["retry", "measure-again", "redo-set"])
-async def test_a_device_that_fails_meanwhile_costs_no_more_than_its_recovery(
-    asked: Rig, kind: type[Any], action: str
-) -> None:
+async def test_a_device_that_fails_meanwhile_costs_no_more_than_its_recovery(asked, kind, action):
     """A gauge is silent once while the noise is measured."""
     silent = GaugeSilent("does not answer", subject="gauge y")
 

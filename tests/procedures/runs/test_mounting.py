@@ -13,7 +13,7 @@ from hexacell.errors import ExitCode
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.steps import events
 from procedures.steps.place import MountingError
-from tests.procedures.runs.listening import happened, on
+from tests.procedures.runs.listening import happened, on, run_until
 
 OFF_MM = 3.8
 
@@ -45,8 +45,7 @@ async def test_a_person_is_told_how_to_move_the_gauge_and_the_set_begins_again(m
     correct = off_the_middle(rig.gauges[0], OFF_MM)
     rig.operator.decisions = [Action.REDO_SET]
     policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=True)
-    ended = await rig.run(on(events.Failed, correct), policy=policy)
-    assert ended.exit_code == ExitCode.DONE
+    await run_until(rig, events.GaugesPlaced, on(events.Failed, correct), count=3, policy=policy)
     (problem,) = rig.operator.problems
     assert "Move the gauge by " in problem
     assert "along +x" in problem
@@ -71,8 +70,7 @@ async def test_no_record_leaves_the_room_of_gauges_zeroed_off_the_middle(make_ri
     rig = make_rig(simulation__gauges__placing_mm=0.0)
     for gauge, off_mm in zip(rig.gauges, (0.9, -0.9, 0.9), strict=True):
         off_the_middle(gauge, off_mm)
-    ended = await rig.run()
-    assert ended.exit_code == ExitCode.DONE
+    await run_until(rig, events.Identified)
     assert not happened(rig, events.RecordRejected)
     for taken in happened(rig, events.RecordTaken):
         assert np.abs(taken.reading.gauges_mm).max() <= 5.0, "beyond the plates"

@@ -7,12 +7,11 @@ from typing import Any
 import pytest
 
 from hexacell.cell.recovery import Action
-from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
-from tests.procedures.runs.listening import happened, on
+from tests.procedures.runs.listening import happened, on, run_until
 
 
 def jogs(rig: Any) -> Any:
@@ -43,7 +42,6 @@ async def test_a_person_retries_and_the_run_plans_from_where_the_robot_is(make_r
     rig = make_rig()
     rig.operator.decisions = [Action.RETRY]
     policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=True)
-    ended = await rig.run(jogs(rig), policy=policy)
-    assert ended.exit_code == ExitCode.DONE, ended.line
+    await run_until(rig, events.SetClosed, jogs(rig), policy=policy)
     assert len(happened(rig, events.Located)) > 1
     assert len(rig.operator.problems) == 1

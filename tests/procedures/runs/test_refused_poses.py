@@ -12,15 +12,14 @@ from drivers.errors import PoseRefused
 from hexacell.campaign import planner
 from hexacell.campaign.pilots import FIRST_PILOT
 from hexacell.cell.simulation import SoftLimits
-from hexacell.errors import ExitCode, IdentifiabilityError, Interruption
+from hexacell.errors import ExitCode, IdentifiabilityError
 from hexacell.kinematics.pose import Pose
-from procedures.engine.commands import Abort
 from procedures.run.keys import Phase
 from procedures.run.state import fold
 from procedures.steps import events
 from procedures.steps import move as move_step
 from tests.procedures.fakes import refused
-from tests.procedures.runs.listening import happened, on
+from tests.procedures.runs.listening import happened, run_until
 
 WIDE = 1e6
 
@@ -61,13 +60,9 @@ async def test_a_run_within_narrow_limits_of_the_controller_ends_well(make_rig) 
 
 async def test_a_resumed_run_does_not_send_it_again(make_rig) -> None:
     rig = make_rig(**limits(c=(-5.0, 5.0)))
-    abort = on(events.PoseExcluded, lambda: rig.engine.command(Abort()))
-    with pytest.raises(Interruption):
-        await rig.run(abort)
+    await run_until(rig, events.PoseExcluded)
     (refusal,) = excluded(rig)
-    enough = on(events.SetClosed, lambda: rig.engine.command(Abort()))
-    with pytest.raises(Interruption):
-        await rig.run(enough)
+    await run_until(rig, events.SetClosed)
     assert sent(rig)[f"move {Pose(*refusal.pose)}"] == 1
     assert len(happened(rig, events.RecordTaken)) >= 9
 
@@ -77,8 +72,7 @@ POINTS = ((100.0, -100.0, 500.0), (0.0, 150.0, 520.0), (-100.0, 100.0, 500.0))
 
 async def test_a_point_whose_reference_is_refused_is_left(make_rig) -> None:
     rig = make_rig(**limits(y=(-120.0, 120.0)), identification__points=POINTS)
-    ended = await rig.run()
-    assert ended.exit_code == ExitCode.DONE, ended.line
+    await run_until(rig, events.Identified)
     (refusal,) = [one for one in excluded(rig) if one.orientation == 1]
     assert (refusal.at.phase, refusal.at.point) == (Phase.IDENTIFY, 2)
     keys = {taken.at for taken in happened(rig, events.RecordTaken)}
@@ -130,23 +124,17 @@ async def test_a_held_out_point_whose_reference_is_refused_is_left(recording, re
 
 async def test_a_refused_pilot_pose_is_replaced_by_another(make_rig) -> None:
     rig = make_rig(**limits(x=(-500.0, 100.5)), noise__revisits=6)
-    enough = on(events.NoiseMeasured, lambda: rig.engine.command(Abort()))
-    with pytest.raises(Interruption):
-        await rig.run(enough)
+    await run_until(rig, events.NoiseMeasured)
     assert {refusal.axis for refusal in excluded(rig)} == {"x"}
     assert all(refusal.orientation >= FIRST_PILOT for refusal in excluded(rig))
     assert len(happened(rig, events.PilotTaken)) == 14
     assert len(happened(rig, events.ReferenceRepeated)) == 6
 
 
-async def test_a_refused_visit_of_the_noise_measurement_is_replaced_by_another(
-    make_rig, monkeypatch
-) -> None:
+async def test_a_refused_visit_of_the_noise_measurement_is_replaced_by_another(make_rig, monkeypatch):
     monkeypatch.setattr(planner, "is_well_known", lambda *_: True)
     rig = make_rig(**limits(x=(-500.0, 100.5)), noise__revisits=6)
-    enough = on(events.NoiseMeasured, lambda: rig.engine.command(Abort()))
-    with pytest.raises(Interruption):
-        await rig.run(enough)
+    await run_until(rig, events.NoiseMeasured)
     (refusal,) = excluded(rig)
     assert (refusal.orientation, refusal.axis) == (0, "x")
     assert len(happened(rig, events.ReferenceRepeated)) == 6
@@ -172,9 +160,7 @@ async def test_a_robot_that_moved_was_not_refused(make_rig) -> None:
     assert not excluded(rig)
 
 
-async def test_a_controller_that_refuses_one_pose_after_another_ends_the_run(
-    make_rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_a_controller_that_refuses_one_pose_after_another_ends_the_run(make_rig, monkeypatch):
     monkeypatch.setattr(move_step, "MOST_REFUSALS", 3)
     rig = make_rig()
     controller, machine = rig.controller, rig.machine

@@ -97,9 +97,7 @@ def raise_(error: BaseException) -> None:
 
 
 @pytest.mark.parametrize("key", ["after-V2/o03/sample"])
-async def test_a_ball_outside_the_travel_twice_at_verification_causes_a_rollback(
-    recording, replayed, key: str
-) -> None:
+async def test_a_ball_outside_the_travel_twice_at_verification_causes_a_rollback(recording, replayed, key):
     rig = replayed(recording.until(events.Proposed))
     at_end = GaugeAtEnd("is at an end of its travel", subject="gauge x")
     fault = at_step(key, lambda: rig.gauges[0].failures.append(at_end))
@@ -153,9 +151,7 @@ async def test_a_failed_reload_restores_the_config(recording, replayed) -> None:
     assert rig.config == recording.config_after
 
 
-async def test_a_controller_that_cannot_reload_the_old_config_is_reported(
-    recording, replayed, monkeypatch
-) -> None:
+async def test_a_controller_that_cannot_reload_the_old_config_is_reported(recording, replayed, monkeypatch):
     rig = replayed(recording.until(events.Proposed))
 
     async def broken(_: object) -> None:

@@ -43,9 +43,7 @@ def test_the_written_geometry_agrees_with_the_true_one_within_five_sigma(recordi
     assert (np.abs(found - expected) <= 5.0 * sigma + 1e-6).all()
 
 
-def test_the_config_has_the_geometry_that_was_proposed_in_frames_near_those_of_before(
-    recording, tmp_path
-) -> None:
+def test_the_config_has_the_geometry_that_was_proposed_in_frames_near_those_of_before(recording, tmp_path):
     """The journal has it, and says how far it moves what was taught."""
     config = tmp_path / "after.toml"
     config.write_bytes(recording.config_after)

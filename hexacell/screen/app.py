@@ -139,9 +139,15 @@ class TechnicianApp(App[int]):
             if isinstance(screen, TabScreen | DigitsScreen | PlanScreen | QuestionOverlay):
                 with suppress(NoMatches):  # it is being composed, or taken away
                     screen.draw(self._model)
-        if not self._goes_to_new_run(self._model) and self._is_whole:
+        if self._model.runs_followed != self._runs_seen:  # a new run is shown; overlays come after that
+            self._runs_seen = self._model.runs_followed
+            self.action_show("measure")
+        elif self._is_whole:
             self._overlay_question(self._model)
-            self._overlay_fault(self._model)
+            view, number = self._model.fault(), self._model.fault_number
+            if view is not None and number != self._fault_seen:
+                self.push_screen(FaultOverlay(view))
+            self._fault_seen = number
 
     @property
     def _is_whole(self) -> bool:
@@ -149,14 +155,6 @@ class TechnicianApp(App[int]):
         if not isinstance(self.screen, TabScreen):
             return True
         return any(line.outer_size.width == self.size.width for line in self.screen.query(KeyLine))
-
-    def _goes_to_new_run(self, model: ScreenModel) -> bool:
-        """Whether the screen changes because a run is followed anew; overlays come after that."""
-        is_new = model.runs_followed != self._runs_seen
-        if is_new:
-            self._runs_seen = model.runs_followed
-            self.action_show("measure")
-        return is_new
 
     def _overlay_question(self, model: ScreenModel) -> None:
         """Show a new question; take away one that was answered."""
@@ -167,12 +165,6 @@ class TechnicianApp(App[int]):
         if view is not None and number != self._question_seen:
             self._question_seen = number
             self.push_screen(QuestionOverlay(view, number, self._answer))
-
-    def _overlay_fault(self, model: ScreenModel) -> None:
-        view, number = model.fault(), model.fault_number
-        if view is not None and number != self._fault_seen:
-            self.push_screen(FaultOverlay(view))
-        self._fault_seen = number
 
     async def _answer(self, value: str | None) -> None:
         if self._model is not None:

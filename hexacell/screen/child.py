@@ -3,28 +3,47 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import sys
 from asyncio.subprocess import DEVNULL, PIPE
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal
+from typing import TypeVar
 
+from hexacell.cell.fields import Frozen
 from hexacell.cell.loader import load_cell
+from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import HexacellError
 from hexacell.services.offline import try_plan
 from hexacell.services.run.calibration_run import preflight
 from hexacell.text.planning import device_line, plan_trial_lines
 from hexacell.text.screens.live import failed_items, passed_items
+from hexacell.text.screens.views import ChecklistItem
 from procedures.calibration.calibration import Mode
 
 
-async def run_child(what: Literal["preflight", "plan"], cell: Path, mode: str = "") -> Any:  # noqa: ANN401 - what JSON can hold
-    """The document of a computation about a cell, made by another process.
+class Preflight(Frozen):
+    """What a preflight found, and whether a run may begin."""
+
+    items: tuple[ChecklistItem, ...]
+    is_ready: bool
+
+
+class TriedPlan(Frozen):
+    """The forecast of a plan in lines of text, and its poses; empty where it could not be tried."""
+
+    lines: tuple[str, ...] = ()
+    poses: tuple[VisitedPose, ...] = ()
+
+
+Found = TypeVar("Found", Preflight, TriedPlan)
+
+
+async def run_child(wanted: type[Found], cell: Path, mode: str = "") -> Found:
+    """What a computation about a cell found, made by another process.
 
     Raises:
-        HexacellError: it gave no document.
+        HexacellError: it gave nothing.
     """
+    what = "plan" if wanted is TriedPlan else "preflight"
     command = (sys.executable, "-m", __name__, what, str(cell), mode)
     process = await asyncio.create_subprocess_exec(*command, stdin=DEVNULL, stdout=PIPE, stderr=DEVNULL)
     try:
@@ -34,38 +53,32 @@ async def run_child(what: Literal["preflight", "plan"], cell: Path, mode: str = 
             process.kill()
             await process.wait()
     try:
-        return json.loads(printed)
+        return wanted.model_validate_json(printed)
     except ValueError as error:
         raise HexacellError(
             "the computation ended without a result", action="Try `hexacell preflight` in another terminal"
         ) from error
 
 
-def preflight_document(path: Path, mode: Mode) -> dict[str, Any]:
+def find_preflight(path: Path, mode: Mode) -> Preflight:
     """The findings of a preflight, and whether a run may begin."""
     try:
         devices = asyncio.run(preflight(load_cell(path), mode, unattended=False))
     except HexacellError as error:
-        return {"items": [asdict(item) for item in failed_items(error)], "is_ready": False}
-    items = passed_items([device_line(one) for one in devices])
-    return {"items": [asdict(item) for item in items], "is_ready": True}
+        return Preflight(items=failed_items(error), is_ready=False)
+    return Preflight(items=passed_items([device_line(one) for one in devices]), is_ready=True)
 
 
-def tried_plan_document(path: Path) -> dict[str, Any]:
+def find_plan(path: Path) -> TriedPlan:
     """The forecast of the plan on simulated robots, and its poses; or why it cannot be tried."""
     try:
         trial = try_plan(load_cell(path))
     except HexacellError as error:
-        return {"lines": [str(error)], "poses": []}
-    poses = [(point, number, pose.as_tuple()) for point, number, pose in trial.result.visited]
-    return {"lines": list(plan_trial_lines(trial)), "poses": poses}
+        return TriedPlan(lines=(str(error),))
+    return TriedPlan(lines=tuple(plan_trial_lines(trial)), poses=trial.result.visited)
 
 
 if __name__ == "__main__":
     named, file, mode_name = sys.argv[1:]
-    found = (
-        tried_plan_document(Path(file))
-        if named == "plan"
-        else preflight_document(Path(file), Mode(mode_name))
-    )
-    sys.stdout.write(json.dumps(found))
+    found = find_plan(Path(file)) if named == "plan" else find_preflight(Path(file), Mode(mode_name))
+    sys.stdout.write(found.model_dump_json())

@@ -14,9 +14,10 @@ from hexacell.config.change import ConfigEditedSince
 from hexacell.errors import HexacellError, UsageError
 from hexacell.run_process.messages import LiveSnapshot
 from hexacell.run_process.recorded import RecordedRun
+from hexacell.screen.child import TriedPlan
 from hexacell.screen.preferences import ONCE, ScreenAction
 from hexacell.screen.watching import DeviceWatcher, RunFollower
-from hexacell.screen.workplace import TriedPlan, Workplace
+from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun
 from hexacell.text.config_changes import RELOAD, versions_text
 from hexacell.text.history import NO_RUNS, history_head, history_line

@@ -15,7 +15,7 @@ from textual.widgets import Input
 
 from hexacell.screen.preferences import KEYS, preferences_path, shown_path
 from hexacell.screen.widgets import DevicePanel, TextList, TextPanel
-from hexacell.text.screens.help_texts import KEYS_NOTE, KEYS_TITLE, REPLAY_HELP, SCREEN_HELP, reflowed
+from hexacell.text.screens.help_texts import KEYS_NOTE, KEYS_TITLE, REPLAY_HELP, SCREEN_HELP
 from hexacell.text.screens.views import FaultView, QuestionView
 
 if TYPE_CHECKING:
@@ -174,8 +174,8 @@ class HelpOverlay(ModalScreen[None]):
         """Show the texts."""
         keys = [f"  {self._keys[str(one.id)]:8} {one.description}" for one in KEYS]
         note = KEYS_NOTE.format(path=shown_path(preferences_path()))
-        about = [*reflowed(SCREEN_HELP[self._tab]), ""]
-        replay = ["", *reflowed(REPLAY_HELP)]
+        about = [*SCREEN_HELP[self._tab].splitlines(), ""]
+        replay = ["", *REPLAY_HELP.splitlines()]
         self.query_one(TextList).show([*about, f"{KEYS_TITLE}:", *keys, "", note, *replay])
 
 

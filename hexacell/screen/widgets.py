@@ -232,15 +232,16 @@ class KeyLine(Static):
             self.update(self._content())
 
     def _content(self) -> Content:
-        parts = [self._part(str(one.id), one.action, one.description) for one in KEYS if one.show]
+        parts = []
+        for one in KEYS:
+            if one.show:
+                call = one.action if one.action.endswith(")") else f"{one.action}()"
+                has_effect = one.action not in _ACTIONS or self._has_effect[_ACTIONS[one.action]]
+                text = "[b]$key[/b] $word" if has_effect else "[dim][b]$key[/b] $word[/dim]"
+                key, word = self._keys[str(one.id)], one.description
+                parts.append(Content.from_markup(f"[@click=app.{call}]{text}[/]", key=key, word=word))
         palette = Content.from_markup("[@click=app.command_palette()]^p palette[/]")
         return Content("  ").join([*parts, palette])
-
-    def _part(self, name: str, action: str, word: str) -> Content:
-        call = action if action.endswith(")") else f"{action}()"
-        has_effect = action not in _ACTIONS or self._has_effect[_ACTIONS[action]]
-        text = "[b]$key[/b] $word" if has_effect else "[dim][b]$key[/b] $word[/dim]"
-        return Content.from_markup(f"[@click=app.{call}]{text}[/]", key=self._keys[name], word=word)
 
 
 def show_parts(screen: Screen[Any], model: ScreenModel, name: str) -> None:

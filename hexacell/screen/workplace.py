@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from hexacell.cell.loader import Cell, load_cell
@@ -12,14 +11,13 @@ from hexacell.cell.passwords import password_warnings
 from hexacell.config.pending_write import settle_config
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.errors import UsageError
-from hexacell.kinematics.pose import Pose
 from hexacell.run_process.client import RunConnection, connect_to_run, start_host
 from hexacell.run_process.live_devices import watch_devices
 from hexacell.run_process.messages import LiveSnapshot
 from hexacell.run_process.recorded import RecordedRun
 from hexacell.run_process.run_socket import socket_path
 from hexacell.runs.run_folder import find_run, new_run
-from hexacell.screen.child import run_child
+from hexacell.screen.child import Preflight, TriedPlan, run_child
 from hexacell.screen.preferences import RESUME, WITH_LENGTH
 from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
 from hexacell.services.history.run_index import PastRun
@@ -30,27 +28,10 @@ from hexacell.services.write_back.config_rollback import roll_back_config
 from hexacell.services.write_back.proposals import apply_proposal, approval_question, read_proposal
 from hexacell.text.config_changes import applied_text, rollback_text
 from hexacell.text.history import comparison_text, drift_text
-from hexacell.text.screens.views import ChecklistItem, Mark
 from procedures.calibration.calibration import Mode
 from procedures.journal.journal import read_journal
 from procedures.run.questions import Question
 from procedures.steps.events import RunStarted
-
-
-@dataclass(frozen=True, slots=True)
-class Preflight:
-    """What a preflight found, and whether a run may begin."""
-
-    items: tuple[ChecklistItem, ...]
-    is_ready: bool
-
-
-@dataclass(frozen=True, slots=True)
-class TriedPlan:
-    """The forecast of a plan in lines of text, and its poses; empty where it could not be tried."""
-
-    lines: tuple[str, ...] = ()
-    poses: tuple[VisitedPose, ...] = ()
 
 
 def mode_of(what: str) -> Mode:
@@ -113,15 +94,11 @@ class Workplace:
 
     async def check(self, what: str) -> Preflight:
         """Check everything that must hold before the motion of a mode; needs the devices."""
-        found = await run_child("preflight", self.cell.path, mode_of(what).value)
-        items = tuple(ChecklistItem(**{**one, "mark": Mark(one["mark"])}) for one in found["items"])
-        return Preflight(items, bool(found["is_ready"]))
+        return await run_child(Preflight, self.cell.path, mode_of(what).value)
 
     async def preview(self) -> TriedPlan:
         """Carry the plan out on simulated robots."""
-        found = await run_child("plan", self.cell.path)
-        poses = tuple((point, number, Pose(*pose)) for point, number, pose in found["poses"])
-        return TriedPlan(tuple(found["lines"]), poses)
+        return await run_child(TriedPlan, self.cell.path)
 
     async def toggle_exclusion(self, name: str, planned: tuple[VisitedPose, ...]) -> None:
         """Write an exclusion into the cell file, or remove it."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from hexacell.campaign.decisions import Finished, MeasurePose, StartPoint
+from hexacell.campaign.decisions import Finished, StartPoint
 from hexacell.text.layout import iso
 from hexacell.text.verdict import teaching_sentence
 
@@ -39,11 +39,24 @@ def next_document(proposed: NextPose) -> dict[str, Any]:
     }
     if isinstance(decision, Finished):
         return {"done": True, "reason": decision.reason, **now}
+    if isinstance(decision, StartPoint):
+        zero = [0.0, 0.0, 0.0]
+        found = {"predicted_deviation": zero, "sigma": zero, "gain": 0.0, "via": []}
+        record = {"orientation": 1, "reference": True, **found}
+    else:
+        record = {
+            "orientation": decision.orientation,
+            "reference": False,
+            "predicted_deviation": list(decision.deviation),
+            "sigma": list(decision.sigma),
+            "gain": decision.gain,
+            "via": [asdict(pose) for pose in decision.via],
+        }
     return {
         "done": False,
         **now,
         "point": decision.point,
-        **_expected_record(decision),
+        **record,
         "pose": asdict(decision.pose),
         "joint_targets": list(decision.joints),
         "predicted_worst_sigma_mm": forecast and forecast.next_mm,
@@ -55,21 +68,6 @@ def next_document(proposed: NextPose) -> dict[str, Any]:
             "expanded_mm": forecast.expanded_mm(forecast.end_mm),
             "gain_mm": forecast.gain_mm,
         },
-    }
-
-
-def _expected_record(decision: StartPoint | MeasurePose) -> dict[str, Any]:
-    if isinstance(decision, StartPoint):
-        zero = [0.0, 0.0, 0.0]
-        found = {"predicted_deviation": zero, "sigma": zero, "gain": 0.0, "via": []}
-        return {"orientation": 1, "reference": True, **found}
-    return {
-        "orientation": decision.orientation,
-        "reference": False,
-        "predicted_deviation": list(decision.deviation),
-        "sigma": list(decision.sigma),
-        "gain": decision.gain,
-        "via": [asdict(pose) for pose in decision.via],
     }
 
 
@@ -141,7 +139,7 @@ def applied_document(applied: AppliedProposal) -> dict[str, Any]:
         "further_configs": [str(path) for path in change.paths[1:]],
         "run": str(applied.proposal.folder.path),
         "sha256": change.sha256_after,
-        "teach": None if moved is None else teaching_sentence(moved),
+        "teach": teaching_sentence(moved) or None,
         "recorded": not applied.unrecorded,
     }
 

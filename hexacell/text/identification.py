@@ -13,7 +13,7 @@ from hexacell.noise.record_noise import NoiseLevels, Repeatability
 from hexacell.text.layout import wrapped
 from hexacell.text.measured_noise import measured_noise_text
 from hexacell.text.parameters import parameter_rows, parameter_table
-from hexacell.uncertainty.budget import BudgetLine, UncertaintyBudget
+from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.verdict.assessment import Assessment
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.findings import findings, noise_sentence, pair_sentences, residual_sentence
@@ -176,12 +176,11 @@ def budget_table(budget: UncertaintyBudget | None) -> str:
             lines.append(f"  {line.effect.name:42}{size:>12}{through}{direct}{line.combined_mm:8.3f}")
     lines.append(f"  {'standard uncertainty (root of the squares)':70}{budget.standard_mm:8.3f}")
     lines.append(f"  {expanded:70}{budget.expanded_mm:8.3f}")
-    if unseen := ", ".join(f"{one.effect.name} ({_by_one_unit(one)})" for one in budget.unseen):
-        lines.append(wrapped(f"Not checked, as no record shows it: {unseen}.", indent=2))
+    unseen = []
+    for line in budget.unseen:
+        mm = line.per_unit_mm
+        shown = f"{mm:.2g} mm" if mm >= 0.1 else f"{1e3 * mm:.2g} um"
+        unseen.append(f"{line.effect.name} ({shown} by 1 {line.effect.unit})")
+    if unseen:
+        lines.append(wrapped(f"Not checked, as no record shows it: {', '.join(unseen)}.", indent=2))
     return "\n".join(lines)
-
-
-def _by_one_unit(line: BudgetLine) -> str:
-    length_mm = line.per_unit_mm
-    shown = f"{length_mm:.2g} mm" if length_mm >= 0.1 else f"{1e3 * length_mm:.2g} um"
-    return f"{shown} by 1 {line.effect.unit}"

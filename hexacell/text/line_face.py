@@ -171,18 +171,12 @@ def event_text(event: events.Event, state: RunState) -> str | None:
         case events.Identified(quick=quick):
             return None if quick is None else quick_accuracy_text(quick)
         case events.ResultValidated():
-            return _verdict_text(event)
+            if event.verification is not None:
+                return verification_text(event.verification)
+            check = None if event.check is None else check_text(event.check)
+            return check if event.length is None else length_text(event.length)
     text = event.text(state)
     return None if text is None else "\n".join(wrapped(line, indent=2) for line in text.splitlines())
-
-
-def _verdict_text(judged: events.ResultValidated) -> str | None:
-    """The verdict of a calibration, of a length check, or of a check."""
-    if judged.verification is not None:
-        return verification_text(judged.verification)
-    if judged.length is not None:
-        return length_text(judged.length)
-    return None if judged.check is None else check_text(judged.check)
 
 
 def run_story(entries: Iterable[Entry]) -> Iterator[tuple[Entry, str]]:

@@ -5,7 +5,7 @@ All geometries are in the mechanism's frame convention, so that a choice of fram
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -127,11 +127,9 @@ def rows_of_changes(changes: Sequence[ParameterChange | ParameterDifference]) ->
 def parameter_table(rows: Sequence[ParameterRow], old: str = "old", new: str = "new") -> tuple[str, ...]:
     """A header and a line for each parameter, in at most 80 columns."""
     width = max([6, *(len(one.label) + 1 for one in rows)])
-    return f"{'':{width}}{old:>12}{new:>12}{'change':>10}{'sigma':>9}", *_lines(rows, width)
-
-
-def _lines(rows: Sequence[ParameterRow], width: int) -> Iterator[str]:
+    lines = [f"{'':{width}}{old:>12}{new:>12}{'change':>10}{'sigma':>9}"]
     for one in rows:
         values = f"{one.figure(one.old):>12}{one.figure(one.new):>12}"
         sizes = f"{one.figure(one.change, '+'):>10}{one.figure(one.sigma):>9}"
-        yield f"{one.label:{width}}{values}{sizes}  {one.meaning}"
+        lines.append(f"{one.label:{width}}{values}{sizes}  {one.meaning}")
+    return tuple(lines)

@@ -7,12 +7,10 @@ from pathlib import Path
 
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
-from hexacell.results.result import ExpectedImprovement
-from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.text.layout import duration, wrapped
 from hexacell.text.line_face import request_text
-from hexacell.text.verdict import teaching_line, teaching_sentence
+from hexacell.text.verdict import gate_lines, improvement_sentence, teaching_line, teaching_sentence
 from procedures.calibration.calibration import Mode
 from procedures.replay.replayer import Aspect, ReplayReport
 from procedures.run.questions import (
@@ -89,13 +87,14 @@ def question_text(question: Question) -> str:
                 f"{request_text(question)}"
             )
         case PendingChange(gates=gates, diff=diff, displacement=moved, improvement=improvement):
-            outcomes = "".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}\n" for gate in gates)
-            expected = "" if improvement is None else f"{_expected(improvement)}\n"
-            write = f"{_teaching(moved)}Write this into the controller's config? {request_text(question)}"
-            return f"\n{diff}\n{outcomes}{expected}{write}"
+            sentences = filter(None, (improvement_sentence(improvement), teaching_sentence(moved)))
+            facts = [gate_lines(gates), *(wrapped(one, indent=4) for one in sentences)]
+            asked = f"Write this into the controller's config? {request_text(question)}"
+            return "\n".join(["", diff, *filter(None, facts), asked])
         case WrittenResult(line=line, displacement=moved):
             keep = f"The new geometry is in the controller's config. Keep it? {request_text(question)}"
-            return f"\n{line}.\n{_teaching(moved)}{keep}"
+            taught = wrapped(teaching_sentence(moved), indent=4)
+            return "\n".join(["", f"{line}.", *filter(None, [taught]), keep])
         case UnreadyController(problem=problem, request=request):
             return f"\n{wrapped(f'{problem}. {request}')}\n{request_text(question)}"
         case StepFailure(problem=problem):
@@ -115,18 +114,6 @@ def _mounting_text(mounting: int, seat: int, pose: Pose) -> str:
         f"{where}Mount the gauges in seat {seat}, the same way round. Do not zero them, and leave the\n"
         "fixture where it is.\n"
     )
-
-
-def _expected(improvement: ExpectedImprovement) -> str:
-    """What the change improves."""
-    now, then = f"{improvement.now_mm:.3g}", f"0 +- {improvement.expanded_mm:.2g}"
-    errors = f"{now} mm with the current config, {then} mm with this one"
-    return wrapped(f"Largest position error at the task poses: {errors}.", indent=4)
-
-
-def _teaching(moved: TaskDisplacement | None) -> str:
-    """What must be taught anew, in lines of its own."""
-    return "" if moved is None else f"{wrapped(teaching_sentence(moved), indent=4)}\n"
 
 
 def replay_report(replayed: ReplayReport) -> str:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from hexacell.checks.change_alarm import ChangeAlarm
 from hexacell.checks.check_result import CheckResult
-from hexacell.results.result import AcceptedResult, LengthResult
+from hexacell.results.result import AcceptedResult, ExpectedImprovement, LengthResult
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.layout import wrapped
+from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict, VerifiedAccuracy
 from hexacell.verdict.length_check import LengthStatement
 from hexacell.verdict.outcome import scale_words
@@ -146,8 +147,25 @@ def length_text(stated: LengthStatement) -> str:
     return "\n".join([*lines, wrapped(f"  uncertainty, um/m, 1 sigma: {named}", indent=2)])
 
 
-def teaching_sentence(moved: TaskDisplacement) -> str:
-    """What must be taught anew because of a new geometry, and what not."""
+def gate_lines(gates: Sequence[AcceptanceGate]) -> str:
+    """Each gate before a write-back, whether it is passed, in a line."""
+    return "\n".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}" for gate in gates)
+
+
+def improvement_sentence(expected: ExpectedImprovement | None) -> str:
+    """What a change of the controller's config improves; empty if that is not known."""
+    if expected is None:
+        return ""
+    return (
+        f"Largest position error at the task poses: {expected.now_mm:.3g} mm with the current config, "
+        f"0 +- {expected.expanded_mm:.2g} mm with this one."
+    )
+
+
+def teaching_sentence(moved: TaskDisplacement | None) -> str:
+    """What must be taught anew because of a new geometry, and what not; empty if that is not known."""
+    if moved is None:
+        return ""
     how_far = f"{_how_far(moved)} at the task poses"
     if moved.is_within_limits:
         return f"Nothing need be taught anew: taught points and frames move by at most {how_far}."

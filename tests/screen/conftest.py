@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import re
 from collections.abc import AsyncIterator, Callable
@@ -19,6 +20,7 @@ from hexacell.screen.app import TechnicianApp
 from hexacell.screen.model import ScreenModel
 from hexacell.screen.preferences import ScreenPreferences
 from hexacell.screen.widgets import TextList
+from procedures.run.cancellation import cancel_and_wait
 from procedures.steps.events import Event
 from tests.screen.drawing import is_all_drawn
 from tests.screen.told_run import ToldWorkplace
@@ -70,6 +72,17 @@ def opened() -> Opened:
             yield pilot
 
     return opened_app
+
+
+@asynccontextmanager
+async def attended(workplace: ToldWorkplace) -> AsyncIterator[ScreenModel]:
+    """The model over a workplace, without an application; its clock stands still."""
+    model = ScreenModel(workplace, lambda: 0.0)
+    attending = asyncio.create_task(model.attend())
+    try:
+        yield model
+    finally:
+        await cancel_and_wait(attending)
 
 
 async def settled(pilot: Pilot[int]) -> None:

@@ -9,25 +9,34 @@ from textual.pilot import Pilot
 
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import Cell
-from hexacell.cell.recovery import Action, FailureKind
+from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
-from hexacell.run_process.messages import ControlChanged, HostFailed, StatusChanged
+from hexacell.run_process.messages import (
+    ControlChanged,
+    EventRecorded,
+    HostFailed,
+    HostMessage,
+    StatusChanged,
+)
 from hexacell.screen.app import TechnicianApp
+from hexacell.screen.child import Preflight
 from hexacell.screen.overlays import FaultOverlay, QuestionOverlay
+from hexacell.screen.watching import GONE
 from hexacell.screen.widgets import TextList, TextPanel
-from hexacell.screen.workplace import Preflight
+from hexacell.text.screens.measuring import RESUMABLE
 from hexacell.text.screens.views import ChecklistItem, Mark
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.command_loop import Status
-from procedures.engine.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo
+from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resume, Undo
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import PLACED, ask_approval, ask_placement, ask_recovery, ask_startup
 from procedures.run.trips import Guard
 from procedures.steps import events
-from tests.screen.conftest import Opened, settled
-from tests.screen.told_run import ToldRun, ToldWorkplace, past_run, snapshot
+from tests.screen.conftest import Opened, attended, settled
+from tests.screen.told_run import BEGUN, ToldRun, ToldWorkplace, past_run, snapshot
 from tests.waiting import until
 
+ABORTED = events.Interrupted(reason="aborted", exit_code=130)
 PLACED_AT, IDENTIFIED, PROPOSED = 6, 333, 455
 """Events before the gauges are placed, until the geometry is identified, until the change is proposed."""
 
@@ -99,91 +108,26 @@ async def test_from_mounting_to_approval(
         assert "S1y       -155.000    -160.751    -5.751    0.095  changed (60." in shown(pilot)
 
 
-@pytest.mark.parametrize(
-    ("key", "command"),
-    [
-        ("p", Pause()),
-        ("P", Pause(at_once=True)),
-        ("u", Undo()),
-        ("m", MeasureAgain(SetKey(phase=Phase.IDENTIFY, point=5))),
-        ("a", Abort()),
-    ],
-)
-async def test_one_key_each(
-    key: str,
-    command: Command,
-    cell: Cell,
-    run: ToldRun,
-    history: tuple[events.Event, ...],
-    opened: Opened,
+async def test_one_key_each_for_who_is_in_control(
+    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
 ) -> None:
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         await until_shown(pilot, "point 5")
-        await press(pilot, key)
-        assert run.given == [command]
-
-
-async def test_the_same_key_goes_on_after_a_pause(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
-    async with opened(workplace_of(cell, run, history[:300])) as pilot:
+        await press(pilot, "P", "u", "m", "p", "a")
+        again = MeasureAgain(SetKey(phase=Phase.IDENTIFY, point=5))
+        assert run.given == [Pause(at_once=True), Undo(), again, Pause(), Abort()]
         run.tell(StatusChanged(status=Status.PAUSED))
         await until_shown(pilot, "paused: the robot stands still")
         await press(pilot, "p")
-        assert run.given == [Resume()]
-
-
-async def test_keys_of_a_run_do_nothing_without_one(cell: Cell, opened: Opened) -> None:
-    async with opened(ToldWorkplace(cell, live=[snapshot()])) as pilot:
-        await press(pilot, "p", "u", "m", "a")
-        assert not isinstance(pilot.app.screen, FaultOverlay)
-
-
-async def test_who_only_watches_gives_no_commands_until_taking_over(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
-    async with opened(workplace_of(cell, run, history[:300])) as pilot:
+        assert run.given.pop() == Resume()
         run.tell(ControlChanged(is_in_control=False, who="grace"))
         await until_shown(pilot, "you only watch: grace is in control; c takes over")
-        await press(pilot, "p")
-        assert run.given == []
-        await press(pilot, "c")
+        await press(pilot, "p", "c")
+        assert len(run.given) == 5
         assert run.taken == 1
 
 
-async def test_a_gate_that_failed_greys_the_approval_and_says_why(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
-    failed = AcceptanceGate(name="converged", passed=False, sentence="The solver ended too early.")
-    async with opened(workplace_of(cell, run, history[:PROPOSED])) as pilot:
-        run.ask(ask_approval([failed], "-  old\n+  new", cell=cell.settings.name))
-        await until_shown(pilot, "It cannot be approved. The solver ended too early.")
-        await press(pilot, "y")
-        assert run.given == []
-        await press(pilot, "n")
-        assert run.given == [Answer(None)]
-
-
-async def test_a_grave_change_needs_the_name_of_the_cell(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
-    far = AcceptanceGate(name="far", passed=False, sentence="Far.", needs_person=True, needs_cell_name=True)
-    async with opened(workplace_of(cell, run, history[:PROPOSED])) as pilot:
-        run.ask(ask_approval([far], "-  old\n+  new", cell=cell.settings.name))
-        await until_shown(pilot, f"Type the cell's name, {cell.settings.name}")
-        await pilot.press("y", "e", "s", "enter")
-        await settled(pilot)
-        assert run.given == []
-        await pilot.press("backspace", "backspace", "backspace")
-        await press(
-            pilot, *("minus" if letter == "-" else letter for letter in cell.settings.name), "enter"
-        )
-        assert run.given == [Answer("a person at the screen")]
-
-
-@pytest.mark.sample("*-size0")
-@pytest.mark.parametrize("size", [(80, 24), (100, 32), (140, 40)])
-@pytest.mark.parametrize("is_grave", [False, True])
+@pytest.mark.parametrize(("size", "is_grave"), [((80, 24), False), ((80, 24), True), ((140, 40), True)])
 async def test_a_long_change_leaves_in_sight_what_to_press(
     size: tuple[int, int],
     is_grave: bool,
@@ -219,136 +163,124 @@ async def test_a_question_may_wait_while_one_looks_at_the_screens(
         await until(lambda: not isinstance(pilot.app.screen, QuestionOverlay))
 
 
-async def test_the_robot_moves_only_after_an_explicit_yes(
+async def test_motion_begins_on_an_explicit_yes_and_a_recovery_has_a_number(
     cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
 ) -> None:
-    async with opened(workplace_of(cell, run, history[:2])) as pilot:
+    async with opened(workplace_of(cell, run, history[:300])) as pilot:
         run.ask(ask_startup(StartupAction.SWITCH_ON, "the machine is off", is_theirs=False))
         await until_shown(pilot, "Is nobody within its reach? Switch the machine on?")
         await press(pilot, "enter", "space", "x")
         assert run.given == []
         await press(pilot, "y")
-        assert run.given == [Answer("yes")]
-
-
-async def test_a_failure_offers_its_recoveries_by_number(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
-    async with opened(workplace_of(cell, run, history[:300])) as pilot:
+        run.close_question()
+        await until(lambda: not isinstance(pilot.app.screen, QuestionOverlay))
         run.ask(ask_recovery("gauge y answers in inch. Press the in/mm key", (Action.RETRY, Action.ABORT)))
         await until_shown(pilot, "retry: try the same again")
         await press(pilot, "1")
-        assert run.given == [Answer("retry")]
+        assert run.given == [Answer("yes"), Answer("retry")]
 
 
-async def test_every_guard_says_what_to_do(
+async def test_each_fault_is_shown_with_what_to_do(
     cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
 ) -> None:
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
-        for guard in Guard:
-            tripped = events.Tripped(guard=guard, device="gauge y", problem="it is so", action="Mend it")
-            run.record([tripped])
+        for guard in (Guard.DRIFT, Guard.GAUGE_END):
+            run.record([tripped_by(guard)])
             await until_shown(pilot, f"Stopped by a guard: {guard.value}")
             assert "What to do: Mend it" in shown(pilot)
             await press(pilot, "enter")
             assert not isinstance(pilot.app.screen, FaultOverlay)
 
 
+def tripped_by(guard: Guard) -> events.Tripped:
+    return events.Tripped(guard=guard, device="gauge y", problem="it is so", action="Mend it")
+
+
 async def test_a_fault_that_the_run_has_left_behind_is_not_shown_on_attaching(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
+    cell: Cell, run: ToldRun, history: tuple[events.Event, ...]
 ) -> None:
-    tripped = events.Tripped(guard=Guard.DRIFT, device="gauge y", problem="it drifts", action="Mend it")
-    told = [*history[:100], tripped, events.Interrupted(reason="it drifts", exit_code=1), *history[100:300]]
-    async with opened(workplace_of(cell, run, told)) as pilot:
-        await until_shown(pilot, "point 5")
-        assert not isinstance(pilot.app.screen, FaultOverlay)
+    interrupted = events.Interrupted(reason="it drifts", exit_code=1)
+    told = [*history[:100], tripped_by(Guard.DRIFT), interrupted, *history[100:300]]
+    async with attended(workplace_of(cell, run, told)) as model:
+        await until(lambda: "point 5" in model.shown("measure")["guidance"][0]["Now"])
+        assert model.fault() is None
 
 
-async def test_every_kind_of_failure_says_what_the_run_does(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
+@pytest.mark.parametrize(
+    ("ending", "fault", "now"),
+    [
+        (
+            (
+                HostFailed(problem="the cell is in use", action="Wait for it", exit_code=5),
+                StatusChanged(status=Status.ENDED),
+            ),
+            ("The run could not go on", "the cell is in use", "Wait for it"),
+            "ended early: the cell is in use",
+        ),
+        (
+            (
+                EventRecorded(
+                    sequence=999, at=BEGUN, event=events.Interrupted(reason="aborted", exit_code=130)
+                ),
+                StatusChanged(status=Status.ENDED),
+                HostFailed(problem="aborted", exit_code=130),
+            ),
+            ("The run ended early", "aborted", RESUMABLE),
+            "ended early: aborted",
+        ),
+        ((), ("That was refused", GONE.problem, GONE.action), f"ended early: {GONE.problem}"),
+    ],
+    ids=["it could not begin", "it was aborted", "its process died"],
+)
+async def test_the_end_of_a_run_is_a_single_fault_and_it_is_not_shown_as_running(
+    ending: tuple[HostMessage, ...],
+    fault: tuple[str, str, str],
+    now: str,
+    cell: Cell,
+    run: ToldRun,
+    history: tuple[events.Event, ...],
 ) -> None:
-    async with opened(workplace_of(cell, run, history[:300])) as pilot:
-        for kind in FailureKind:
-            reason = f"gauge y: {kind.value}. Mend it"
-            run.record(
-                [events.Failed(step=None, failure=kind, attempt=2, reason=reason, action=Action.REDO_SET)]
-            )
-            await until_shown(pilot, reason)
-            assert "What to do: The run does this now: redo-set (attempt 2)." in shown(pilot)
-            await press(pilot, "enter")
-
-
-async def test_a_run_that_could_not_begin_says_why(cell: Cell, run: ToldRun, opened: Opened) -> None:
-    run.begin(cell)
-    run.tell(HostFailed(problem="the cell is in use", action="Wait for it", exit_code=5))
-    async with opened(ToldWorkplace(cell, run=run)) as pilot:
-        await until_shown(pilot, "What to do: Wait for it")
-
-
-async def test_the_end_of_a_run_is_told_once_and_how_to_go_on(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
-    async with opened(workplace_of(cell, run, history[:300])) as pilot:
-        run.record([events.Interrupted(reason="aborted", exit_code=130)])
-        run.tell(StatusChanged(status=Status.ENDED), HostFailed(problem="aborted", exit_code=130))
-        await until_shown(pilot, "The run ended early")
-        await press(pilot, "enter")
-        await until_shown(pilot, "ended early: aborted")
-        assert "2 Preflight resumes it with r" in shown(pilot)
-
-
-async def test_a_run_whose_process_dies_is_not_shown_as_running(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
-    async with opened(workplace_of(cell, run, history[:300])) as pilot:
+    async with attended(workplace_of(cell, run, history[:300])) as model:
+        run.tell(*ending)
         run.end()
-        await until_shown(pilot, "the process of the run is gone without a word")
-        await press(pilot, "enter")
-        await until_shown(pilot, "ENDED")
+        await until(lambda: "ENDED" in model.header()[1])
+        shown_fault = model.fault()
+        assert shown_fault is not None
+        assert (shown_fault.title, shown_fault.cause, shown_fault.action) == fault
+        assert model.fault_number == 1001
+        guidance = model.shown("measure")["guidance"][0]
+        assert guidance["Now"] == now
+        assert guidance["Next"].startswith("2 Preflight resumes it with r")
 
 
+@pytest.mark.parametrize(("key", "keeps_running"), [("l", True), ("s", False)])
 async def test_quitting_asks_what_becomes_of_the_run(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
+    key: str,
+    keeps_running: bool,
+    cell: Cell,
+    run: ToldRun,
+    history: tuple[events.Event, ...],
+    opened: Opened,
 ) -> None:
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         await until_shown(pilot, "point 5")
         await press(pilot, "q", "escape")
         assert run.left == []
-        await press(pilot, "q", "l")
-        await until(lambda: run.left == [True])
+        await press(pilot, "q", key)
+        await until(lambda: run.left == [keeps_running])
 
 
-async def test_quitting_may_stop_the_run(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
-    async with opened(workplace_of(cell, run, history[:300])) as pilot:
-        await until_shown(pilot, "point 5")
-        await press(pilot, "q", "s")
-        await until(lambda: run.left == [False])
-
-
-@pytest.mark.sample("s-optimise", "r-resume")
-@pytest.mark.parametrize(
-    ("key", "what"),
-    [
-        ("s", "optimise"),
-        ("k", "check"),
-        ("K", "quick"),
-        ("r", "resume"),
-        ("l", "length"),
-        ("L", "optimise with length check"),
-    ],
-)
-async def test_a_run_begins_only_after_everything_was_looked_at(
-    key: str, what: str, cell: Cell, run: ToldRun, opened: Opened
+async def test_a_run_begins_after_everything_was_looked_at(
+    cell: Cell, run: ToldRun, opened: Opened
 ) -> None:
     run.begin(cell)
     workplace = ToldWorkplace(cell, live=[snapshot()], started=run)
     async with opened(workplace) as pilot:
-        await press(pilot, "2", key)
+        await press(pilot, "p", "u", "m", "a")  # these do nothing without a run
+        assert not isinstance(pilot.app.screen, FaultOverlay)
+        await press(pilot, "2", "s")
         await until_shown(pilot, "calibration")
-        assert workplace.begun == [what]
-        assert workplace.checked == [what]
+        assert workplace.begun == workplace.checked == ["optimise"]
         assert pilot.app.current_mode == "measure"
 
 
@@ -356,35 +288,33 @@ async def test_no_run_begins_while_something_does_not_hold(
     cell: Cell, run: ToldRun, opened: Opened
 ) -> None:
     found = ChecklistItem(Mark.FAILED, "gauge y", "it answers in inch", "Press the in/mm key")
-    workplace = ToldWorkplace(cell, started=run, preflight=Preflight((found,), is_ready=False))
+    workplace = ToldWorkplace(cell, started=run, preflight=Preflight(items=(found,), is_ready=False))
     async with opened(workplace) as pilot:
-        await press(pilot, "2", "s")
-        await until_shown(pilot, "not everything holds that must hold")
-        await press(pilot, "enter")
-        assert "NO  gauge y: it answers in inch" in shown_list(pilot, "#checklist")
-        assert "-> Press the in/mm key" in shown_list(pilot, "#checklist")
+        await press(pilot, "2")
+        for key in ("s", "k", "K", "r", "l", "L"):
+            await press(pilot, key)
+            await until_shown(pilot, "not everything holds that must hold")
+            await press(pilot, "enter")
+        wanted = ["optimise", "check", "quick", "resume", "length", "optimise with length check"]
+        assert workplace.checked == wanted
+        listed = pilot.app.screen.query_one("#checklist", TextList).text
+        assert "NO  gauge y: it answers in inch" in listed
+        assert "-> Press the in/mm key" in listed
         assert workplace.begun == []
 
 
-async def test_a_run_that_is_over_is_in_the_history(cell: Cell, run: ToldRun, opened: Opened) -> None:
+async def test_a_run_that_is_over_is_in_the_history(cell: Cell, run: ToldRun) -> None:
     run.begin(cell)
     workplace = ToldWorkplace(cell, run=run)
-    async with opened(workplace) as pilot:
-        app = pilot.app
-        assert isinstance(app, TechnicianApp)
-        assert app.model is not None
+    async with attended(workplace) as model:
+        await until(lambda: model.runs == ())
         workplace.entries = (past_run("2026-03-02T080000Z"),)
         run.tell(StatusChanged(status=Status.ENDED))
         run.end()
-        backend = app.model
-        await until(lambda: backend.runs == workplace.entries)
+        await until(lambda: model.runs == workplace.entries)
 
 
 async def test_quitting_without_a_run_asks_nothing(cell: Cell, opened: Opened) -> None:
     async with opened(ToldWorkplace(cell, live=[snapshot()])) as pilot:
         await pilot.press("q")
         await until(lambda: pilot.app.return_code == 0)
-
-
-def shown_list(pilot: Pilot[int], place: str) -> str:
-    return pilot.app.screen.query_one(place, TextList).text

@@ -12,10 +12,10 @@ from textual.pilot import Pilot
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.dry_run.campaign import VisitedPose
 from hexacell.kinematics.pose import Pose
+from hexacell.screen.child import TriedPlan
 from hexacell.screen.further_screens import PlanScreen
 from hexacell.screen.overlays import FaultOverlay
 from hexacell.screen.widgets import RowList
-from hexacell.screen.workplace import TriedPlan
 from hexacell.services.preflight import toggle_exclusion
 from tests.screen.conftest import Opened, settled
 from tests.screen.test_job import press, shown, until_shown
@@ -30,7 +30,7 @@ def tried(cell: Cell, error_mm: float = 0.075) -> TriedPlan:
         for point, at in enumerate(cell.settings.identification.points, start=1)
         for row, tilt in enumerate((0.0, 12.0, -25.0), start=1)
     )
-    return TriedPlan((f"15 records give {error_mm:.3f} mm.",), poses)
+    return TriedPlan(lines=(f"15 records give {error_mm:.3f} mm.",), poses=poses)
 
 
 class FileWorkplace(ToldWorkplace):
@@ -118,7 +118,7 @@ async def test_the_latest_trial_counts_and_keys_are_heard_meanwhile(
 
 
 async def test_a_plan_that_cannot_be_tried_says_why(cell: Cell, opened: Opened) -> None:
-    workplace = ToldWorkplace(cell, live=[snapshot()], plan=TriedPlan(("The config is not there.",)))
+    workplace = ToldWorkplace(cell, live=[snapshot()], plan=TriedPlan(lines=("The config is not there.",)))
     async with opened(workplace) as pilot:
         await press(pilot, "2", "x")
         assert isinstance(pilot.app.screen, PlanScreen)

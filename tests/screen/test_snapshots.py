@@ -15,9 +15,9 @@ from hexacell.cell.loader import Cell
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import StatusChanged
 from hexacell.screen.app import TechnicianApp
+from hexacell.screen.child import Preflight, TriedPlan
 from hexacell.screen.further_screens import AssistantScreen
 from hexacell.screen.preferences import THEMES
-from hexacell.screen.workplace import Preflight, TriedPlan
 from hexacell.services.history.run_index import PastRun
 from hexacell.text.screens.views import ChecklistItem, Mark
 from hexacell.verdict.acceptance_gates import AcceptanceGate
@@ -71,7 +71,7 @@ def idle(cell: Cell) -> ToldWorkplace:
         live=[snapshot(y={"problem": "gauge y: it does not answer. Look at its cable"})],
         entries=entries,
         preflight=Preflight(
-            (
+            items=(
                 ChecklistItem(
                     Mark.FAILED, "gauge y", "it answers in inch", "Press the in/mm key, then Enter"
                 ),
@@ -80,7 +80,9 @@ def idle(cell: Cell) -> ToldWorkplace:
             is_ready=False,
         ),
         plan=TriedPlan(
-            ("55 records will give about 0.062 mm at the worst of your task poses, in about 24 minutes.",)
+            lines=(
+                "55 records will give about 0.062 mm at the worst of your task poses, in about 24 minutes.",
+            )
         ),
         compared=("changed most: B2y by +0.021 mm (sigma 0.009)", "compared with"),
     )

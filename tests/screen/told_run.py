@@ -25,7 +25,8 @@ from hexacell.run_process.messages import (
     StatusChanged,
 )
 from hexacell.runs.run_folder import RunFolder
-from hexacell.screen.workplace import Preflight, TriedPlan, Workplace
+from hexacell.screen.child import Preflight, TriedPlan
+from hexacell.screen.workplace import Workplace
 from hexacell.services.history.run_index import PastRun, RunSummary
 from hexacell.text.screens.views import ChecklistItem, Mark
 from procedures.engine.command_loop import Status
@@ -146,9 +147,9 @@ class ToldWorkplace(Workplace):
     warnings: tuple[str, ...] = ()
     live: Sequence[LiveSnapshot] = ()
     preflight: Preflight = field(
-        default_factory=lambda: Preflight((ChecklistItem(Mark.DONE, "all"),), is_ready=True)
+        default_factory=lambda: Preflight(items=(ChecklistItem(Mark.DONE, "all"),), is_ready=True)
     )
-    plan: TriedPlan = field(default_factory=lambda: TriedPlan(()))
+    plan: TriedPlan = field(default_factory=TriedPlan)
     entries: tuple[PastRun, ...] = ()
     compared: tuple[str, ...] = ()
     started: RunConnection | None = None

@@ -44,10 +44,20 @@ def verdict_of(run: ReportedRun) -> Verdict | None:
 
 def statement_chapter(run: ReportedRun) -> Chapter:
     """The verdict, the errors that it is on, its reasons, scope and rule."""
-    verdict, accuracy = verdict_of(run), judged_accuracy(run.state.judged)
+    judged, verdict, accuracy = run.state.judged, verdict_of(run), judged_accuracy(run.state.judged)
+    meaning = "The run ended before anything could be said of the robot."
+    if verdict is not None:
+        is_of_length = judged is not None and judged.length is not None
+        meaning = f"{'Of the length scale alone: ' if is_of_length else ''}{VERDICT_MEANINGS[verdict]}"
+    errors = () if accuracy is None else accuracy.errors
+    rows = tuple(
+        (f"{name}, {unit}", f"{one.value:.3f}", f"{one.expanded:.3f}", f"{one.limit:g}", one.verdict.value)
+        for name, unit, one in errors
+    )
+    title = "" if accuracy is None else f"Largest error at {accuracy.poses} task poses"
     blocks: list[Block] = [
-        Paragraph(_meaning(run, verdict), is_strong=True),
-        *([] if accuracy is None else [_error_table(accuracy)]),
+        Paragraph(meaning, is_strong=True),
+        *([Table((title, "error", "U (k = 2)", "limit", "verdict"), rows)] if rows else []),
         _reasons(run),
         Paragraph(scope_sentences(accuracy)),
         Paragraph(decision_rule(accuracy)),
@@ -95,23 +105,6 @@ def method_sentences(run: ReportedRun) -> str:
         "show is recorded. From the records the geometry follows by weighted least squares, with its "
         f"covariance (after Abtahi, Pendar, Alasty and Vossoughi, 2010). {MODELS[run.started.mode]}"
     )
-
-
-def _meaning(run: ReportedRun, verdict: Verdict | None) -> str:
-    if verdict is None:
-        return "The run ended before anything could be said of the robot."
-    if run.state.judged is not None and run.state.judged.length is not None:
-        return f"Of the length scale alone: {VERDICT_MEANINGS[verdict]}"
-    return VERDICT_MEANINGS[verdict]
-
-
-def _error_table(accuracy: VerifiedAccuracy) -> Table:
-    columns = (f"Largest error at {accuracy.poses} task poses", "error", "U (k = 2)", "limit", "verdict")
-    rows = (
-        (f"{name}, {unit}", f"{one.value:.3f}", f"{one.expanded:.3f}", f"{one.limit:g}", one.verdict.value)
-        for name, unit, one in accuracy.errors
-    )
-    return Table(columns, tuple(rows))
 
 
 def _reasons(run: ReportedRun) -> Block:

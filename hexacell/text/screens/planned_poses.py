@@ -18,9 +18,18 @@ def plan_note(planned: Sequence[VisitedPose], *, is_trying: bool) -> str:
     return " ".join([*notes, *([TRYING] if is_trying else [])])
 
 
-def plan_rows(settings: CellSettings, planned: Sequence[VisitedPose]) -> list[tuple[str, str]]:
+def plan_rows(settings: CellSettings, planned: Sequence[VisitedPose]) -> Iterator[tuple[str, str]]:
     """Name and line of each exclusion of the cell file and, once the plan was tried, of its poses."""
-    return [*_exclusions(settings), *(_poses(settings, planned) if planned else ())]
+    points = settings.identification.points
+    for number, one in enumerate(settings.exclusions, start=1):
+        if one.pose is None:
+            what = f"point {one.point}, {_place(points[(one.point or 1) - 1])}"
+        else:
+            what = " ".join(f"{axis} {value:.1f}" for axis, value in zip("xyzabc", one.pose, strict=True))
+            what += f", within {one.within_mm:g} mm, {one.within_deg:g} deg" if one.within_deg else ""
+        yield f"e{number}", f"OUT  e{number}  {what}"
+    if planned:
+        yield from _poses(settings, planned)
 
 
 def plan_lines(settings: CellSettings, tried: Sequence[str], *, is_trying: bool) -> list[str]:
@@ -37,17 +46,6 @@ def exclusions_text(settings: CellSettings) -> str:
     return f"Excluded by the cell file: {', '.join(parts)}." if parts else ""
 
 
-def _exclusions(settings: CellSettings) -> Iterator[tuple[str, str]]:
-    points = settings.identification.points
-    for number, one in enumerate(settings.exclusions, start=1):
-        if one.pose is None:
-            what = f"point {one.point}, {_place(points[(one.point or 1) - 1])}"
-        else:
-            what = " ".join(f"{axis} {value:.1f}" for axis, value in zip("xyzabc", one.pose, strict=True))
-            what += f", within {one.within_mm:g} mm, {one.within_deg:g} deg" if one.within_deg else ""
-        yield f"e{number}", f"OUT  e{number}  {what}"
-
-
 def _poses(settings: CellSettings, planned: Sequence[VisitedPose]) -> Iterator[tuple[str, str]]:
     """A row for each point that is measured, and below it one for each of its poses."""
     excluded = settings.excluded_commands
@@ -59,12 +57,10 @@ def _poses(settings: CellSettings, planned: Sequence[VisitedPose]) -> Iterator[t
         for _, orientation, pose in here:
             name = f"{number}.{orientation}"
             reference = "  reference" if orientation == 1 else ""
-            yield name, f"     {name:>7}  {_angles(pose.as_tuple())}{reference}"
+            angles = zip("abc", pose.as_tuple()[3:], strict=True)
+            shown = "  ".join(f"{axis} {value:6.1f}" for axis, value in angles)
+            yield name, f"     {name:>7}  {shown} deg{reference}"
 
 
 def _place(pose: Sequence[float]) -> str:
     return "  ".join(f"{axis} {value:.1f}" for axis, value in zip("xyz", pose[:3], strict=True))
-
-
-def _angles(pose: Sequence[float]) -> str:
-    return "  ".join(f"{axis} {value:6.1f}" for axis, value in zip("abc", pose[3:], strict=True)) + " deg"

@@ -26,20 +26,19 @@ class _Scale:
 
     def cell(self, value: float) -> int:
         """The cell of a value, from 0."""
-        share = (self._place(value) - self._place(self.low)) / (
-            self._place(self.high) - self._place(self.low)
+        low, high, place = (
+            log10(one) if self.is_logarithmic else one for one in (self.low, self.high, value)
         )
+        share = (place - low) / (high - low)
         return round(min(max(share, 0.0), 1.0) * (self.cells - 1))
-
-    def _place(self, value: float) -> float:
-        return log10(value) if self.is_logarithmic else value
 
 
 def plot_lines(view: PlotView, columns: int, rows: int) -> list[str]:
     """A picture of ``rows`` lines and ``columns`` columns; empty where there is no room or no point."""
     if view.is_empty or columns < FEWEST_COLUMNS or rows < FEWEST_ROWS:
         return []
-    across = _across(view, columns - LABEL_COLUMNS - 1)
+    xs = [x for series in view.series for x in series.xs]
+    across = _Scale(min(xs), max(xs) if max(xs) > min(xs) else min(xs) + 1.0, columns - LABEL_COLUMNS - 1)
     down = _down(view, rows - 2)
     cells = [[" "] * across.cells for _ in range(down.cells)]
     if view.level is not None:
@@ -50,13 +49,10 @@ def plot_lines(view: PlotView, columns: int, rows: int) -> list[str]:
     labels = _labels(down)
     drawn = [f"{labels.get(row, ''):>{LABEL_COLUMNS}}|{''.join(cells[row])}" for row in range(down.cells)]
     drawn.reverse()
-    return [*drawn, f"{'':{LABEL_COLUMNS}}+{'-' * across.cells}", _below(across, view.x_label)]
-
-
-def _across(view: PlotView, cells: int) -> _Scale:
-    xs = [x for series in view.series for x in series.xs]
-    low, high = min(xs), max(xs)
-    return _Scale(low, high if high > low else low + 1.0, cells)
+    first, last = f"{across.low:g}", f"{across.high:g}"
+    middle = view.x_label.center(max(0, across.cells - len(first) - len(last)))
+    below = f"{'':{LABEL_COLUMNS + 1}}{first}{middle}{last}"[: LABEL_COLUMNS + 1 + across.cells]
+    return [*drawn, f"{'':{LABEL_COLUMNS}}+{'-' * across.cells}", below]
 
 
 def _down(view: PlotView, cells: int) -> _Scale:
@@ -65,20 +61,17 @@ def _down(view: PlotView, cells: int) -> _Scale:
     ys += [] if view.level is None else [view.level]
     low, high = min(ys), max(ys)
     if view.is_logarithmic:
-        first, last = _round_below(low), _round_above(high)
+        power = 10.0 ** floor(log10(low))
+        first = max(part * power for part in (1.0, 2.0, 5.0) if part * power <= low * (1.0 + 1e-9))
+        last = _round_above(high)
         return _Scale(first, last if last > first else 10.0 * first, cells, is_logarithmic=True)
     step = _step(high - low, cells)
     first, last = step * floor(low / step), step * ceil(high / step)
     return _Scale(first, last if last > first else first + step, cells)
 
 
-def _round_below(value: float) -> float:
-    """The largest 1, 2 or 5 times a power of ten that is not above a value."""
-    power = 10.0 ** floor(log10(value))
-    return max(part * power for part in (1.0, 2.0, 5.0) if part * power <= value * (1.0 + 1e-9))
-
-
 def _round_above(value: float) -> float:
+    """The smallest 1, 2 or 5 times a power of ten that is not below a value."""
     power = 10.0 ** floor(log10(value))
     return min(part * power for part in (1.0, 2.0, 5.0, 10.0) if part * power >= value * (1.0 - 1e-9))
 
@@ -100,9 +93,3 @@ def _labels(scale: _Scale) -> dict[int, str]:
     ends = (scale.low, scale.high)
     inside = [value for value in values if scale.low <= value <= scale.high]
     return {scale.cell(value): f"{value:.3g}" for value in (*inside, *ends)}
-
-
-def _below(across: _Scale, name: str) -> str:
-    first, last = f"{across.low:g}", f"{across.high:g}"
-    middle = name.center(max(0, across.cells - len(first) - len(last)))
-    return f"{'':{LABEL_COLUMNS + 1}}{first}{middle}{last}"[: LABEL_COLUMNS + 1 + across.cells]

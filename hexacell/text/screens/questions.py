@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from hexacell.run_process.messages import LiveSnapshot
 from hexacell.text.screens.views import Choice, QuestionView, Urgency
-from hexacell.text.verdict import teaching_sentence
+from hexacell.text.verdict import gate_lines, improvement_sentence, teaching_sentence
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.run.questions import (
     NO,
@@ -36,14 +36,39 @@ def question_view(question: Question, live: LiveSnapshot | None) -> QuestionView
     match question.subject:
         case GaugePlacement() as place:
             return _placement(place, live)
-        case PendingChange() as change:
-            return _approval(question, change)
-        case WrittenResult() as result:
-            return _keeping(question, result)
+        case PendingChange(gates=gates, diff=diff, displacement=moved, improvement=improvement):
+            facts = (gate_lines(gates), improvement_sentence(improvement), teaching_sentence(moved))
+            view = _consenting(question, "write it", "Write the new geometry into the controller's config?")
+            shown = (*filter(None, facts), f"The change:\n{diff.rstrip()}")
+            return replace(view, paragraphs=shown, refusal=approval_refusal(gates))
+        case WrittenResult(line=line, displacement=moved):
+            title, otherwise = "The result did not pass. Keep it all the same?", "restore the old config"
+            view = _consenting(question, "keep it", title, otherwise)
+            stands = (
+                "The new geometry is in the controller's config. Without your word the old one is restored."
+            )
+            shown = tuple(filter(None, (f"{line}.", teaching_sentence(moved), stands)))
+            return replace(view, paragraphs=shown, urgency=Urgency.ALARM)
         case StepFailure(problem=problem):
-            return _recovery(question, problem)
-        case UnreadyController() as controller:
-            return _startup(controller)
+            choices = (
+                Choice(str(number), f"{choice}: {RECOVERIES.get(choice, 'do that')}", choice)
+                for number, choice in enumerate(question.choices, start=1)
+            )
+            return QuestionView(
+                title="The robot stands still: this went wrong",
+                paragraphs=(problem,),
+                instruction="Mend it, then press a number:",
+                choices=tuple(choices),
+                shows_gauges=True,
+                urgency=Urgency.ALARM,
+            )
+        case UnreadyController(problem=problem, request=request):
+            return QuestionView(
+                title="The controller is not ready",
+                paragraphs=(f"{problem}.", request),
+                instruction="Press y or n.",
+                choices=(Choice("y", "yes", YES, is_consent=True), Choice("n", "no", NO)),
+            )
 
 
 def _placement(place: GaugePlacement, live: LiveSnapshot | None) -> QuestionView:
@@ -54,43 +79,17 @@ def _placement(place: GaugePlacement, live: LiveSnapshot | None) -> QuestionView
     else:
         title = f"Mount the gauges in seat {place.seat} of the fixture ({place.station})"
         how = "Zero them." if place.point == 1 else "Do not zero them, and leave the fixture where it is."
-    sides = _sides(live)
-    paragraphs = tuple(text for text in (where, sides, how) if text)
+    sides = [
+        f"the {one.name} gauge on its {'+' if one.sign > 0 else '-'}{one.axis} side"
+        for one in (live.gauges if live is not None else ())
+    ]
+    all_sides = [f"All plungers point to the ball: {', '.join(sides)}."] if live is not None else []
     return QuestionView(
         title=title,
-        paragraphs=paragraphs,
+        paragraphs=(where, *all_sides, how),
         instruction="Press Enter when all gauges say ok.",
         choices=(Choice("enter", "they are in place: measure", PLACED, is_consent=True),),
         shows_gauges=True,
-    )
-
-
-def _sides(live: LiveSnapshot | None) -> str:
-    """Which way each plunger points."""
-    if live is None:
-        return ""
-    places = [
-        f"the {one.name} gauge on its {'+' if one.sign > 0 else '-'}{one.axis} side" for one in live.gauges
-    ]
-    return f"All plungers point to the ball: {', '.join(places)}."
-
-
-def _approval(question: Question, change: PendingChange) -> QuestionView:
-    gates = "\n".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}" for gate in change.gates)
-    taught = "" if change.displacement is None else teaching_sentence(change.displacement)
-    paragraphs = [gates, _improvement(change), taught, f"The change:\n{change.diff.rstrip()}"]
-    view = _consenting(question, "write it", "Write the new geometry into the controller's config?")
-    shown = tuple(text for text in paragraphs if text)
-    return replace(view, paragraphs=shown, refusal=approval_refusal(change.gates))
-
-
-def _improvement(change: PendingChange) -> str:
-    expected = change.improvement
-    if expected is None:
-        return ""
-    return (
-        f"Largest position error at the task poses: {expected.now_mm:.3g} mm with the current config, "
-        f"0 +- {expected.expanded_mm:.2g} mm with this one."
     )
 
 
@@ -113,36 +112,3 @@ def _consenting(
         "Tab, then n declines; page up and page down scroll."
     )
     return QuestionView(title, (), instruction, (decline,), typed=question.consent, consent=PERSON)
-
-
-def _keeping(question: Question, result: WrittenResult) -> QuestionView:
-    taught = "" if result.displacement is None else teaching_sentence(result.displacement)
-    stands = "The new geometry is in the controller's config. Without your word the old one is restored."
-    title = "The result did not pass. Keep it all the same?"
-    view = _consenting(question, "keep it", title, "restore the old config")
-    shown = tuple(text for text in (f"{result.line}.", taught, stands) if text)
-    return replace(view, paragraphs=shown, urgency=Urgency.ALARM)
-
-
-def _recovery(question: Question, problem: str) -> QuestionView:
-    choices = [
-        Choice(str(number), f"{choice}: {RECOVERIES.get(choice, 'do that')}", choice)
-        for number, choice in enumerate(question.choices, start=1)
-    ]
-    return QuestionView(
-        title="The robot stands still: this went wrong",
-        paragraphs=(problem,),
-        instruction="Mend it, then press a number:",
-        choices=tuple(choices),
-        shows_gauges=True,
-        urgency=Urgency.ALARM,
-    )
-
-
-def _startup(controller: UnreadyController) -> QuestionView:
-    return QuestionView(
-        title="The controller is not ready",
-        paragraphs=(f"{controller.problem}.", controller.request),
-        instruction="Press y or n.",
-        choices=(Choice("y", "yes", YES, is_consent=True), Choice("n", "no", NO)),
-    )

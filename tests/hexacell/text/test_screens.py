@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from drivers.interfaces import StartupAction
+from hexacell.cell.recovery import Action, FailureKind
 from hexacell.checks.check_result import CheckResult, ParameterChange
 from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import (
@@ -28,7 +29,7 @@ from hexacell.text.screens.live import device_lines, mounting_advice, travel_bar
 from hexacell.text.screens.measuring import fault_view, guidance, record_lines
 from hexacell.text.screens.questions import question_view
 from hexacell.text.screens.reviewing import review_texts
-from hexacell.text.screens.run_picture import RunPicture, picture_after
+from hexacell.text.screens.run_picture import RunPicture, Setback, picture_after
 from hexacell.text.screens.views import Urgency
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
@@ -36,6 +37,7 @@ from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import ask_acceptance, ask_mounting, ask_startup
 from procedures.run.state import fold
+from procedures.run.trips import Guard
 from procedures.steps import events
 from procedures.steps.move import Expectation, Move
 from tests.procedures.story import Story
@@ -207,13 +209,32 @@ def test_going_back_in_a_recorded_run_forgets_what_came_later() -> None:
     assert record_lines(pictured(*told, described(is_recorded=True))) == ()
 
 
-def test_a_fault_has_its_cause_and_the_next_action() -> None:
-    view = fault_view(HostFailed(problem="the cell is in use", action="Wait", exit_code=5))
-    assert (view.title, view.cause, view.action) == (
-        "The run could not go on",
-        "the cell is in use",
-        "Wait",
-    )
+@pytest.mark.parametrize(
+    ("setback", "title", "action"),
+    [
+        *(
+            (
+                events.Tripped(guard=guard, device="gauge y", problem="why", action="Mend it"),
+                f"Stopped by a guard: {guard.value}",
+                "Mend it",
+            )
+            for guard in Guard
+        ),
+        *(
+            (
+                events.Failed(step=None, failure=kind, attempt=2, reason="why", action=Action.REDO_SET),
+                "A step failed, the robot was stopped",
+                "The run does this now: redo-set (attempt 2).",
+            )
+            for kind in FailureKind
+        ),
+        (HostFailed(problem="why", action="Wait", exit_code=5), "The run could not go on", "Wait"),
+    ],
+)
+def test_a_fault_has_its_cause_and_the_next_action(setback: Setback, title: str, action: str) -> None:
+    view = fault_view(setback)
+    assert (view.title, view.action) == (title, action)
+    assert view.cause.endswith("why")
 
 
 def test_a_check_shows_what_has_changed() -> None:

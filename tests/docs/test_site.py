@@ -13,11 +13,6 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 ROOT = Path(__file__).parents[2]
-DRAWN = {
-    "screen-measure.svg": "measure-140x40-dark.svg",
-    "screen-review.svg": "review-140x40-light.svg",
-}
-"""Pictures of docs, and of the screen's tests."""
 
 
 def build(source: Path, site: Path) -> subprocess.CompletedProcess[str]:
@@ -121,9 +116,3 @@ def test_mistakes_in_a_page_are_errors(tmp_path):
     made = build(tmp_path, tmp_path / "site")
     assert made.returncode != 0
     assert all(told in made.stderr for told in ("nowhere.md", "missing", "nosuchcommand"))
-
-
-@pytest.mark.parametrize(("picture", "snapshot"), DRAWN.items())
-def test_pictures_of_the_screen_are_what_its_tests_draw(picture, snapshot):
-    drawn = ROOT / "tests/screen/snapshots" / snapshot
-    assert (ROOT / "docs" / picture).read_bytes() == drawn.read_bytes()

@@ -20,6 +20,7 @@ from hexacell.screen.app import TechnicianApp
 from hexacell.screen.model import ScreenModel
 from hexacell.screen.preferences import ScreenPreferences
 from hexacell.screen.widgets import TextList
+from hexacell.screen.workplace import Workplace
 from procedures.run.cancellation import cancel_and_wait
 from procedures.steps.events import Event
 from tests.screen.drawing import is_all_drawn
@@ -75,7 +76,7 @@ def opened() -> Opened:
 
 
 @asynccontextmanager
-async def attended(workplace: ToldWorkplace) -> AsyncIterator[ScreenModel]:
+async def attended(workplace: Workplace) -> AsyncIterator[ScreenModel]:
     """The model over a workplace, without an application; its clock stands still."""
     model = ScreenModel(workplace, lambda: 0.0)
     attending = asyncio.create_task(model.attend())

@@ -12,21 +12,23 @@ import pytest
 from textual.pilot import Pilot
 
 from hexacell.cell.loader import Cell
+from hexacell.config.change import ConfigEditedSince
 from hexacell.config.write_back import commit
-from hexacell.errors import FileError
+from hexacell.errors import FileError, UsageError
 from hexacell.run_process.messages import LiveSnapshot
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.model import ScreenModel
 from hexacell.screen.overlays import ConfirmOverlay, FaultOverlay
+from hexacell.screen.preferences import ScreenAction
 from hexacell.screen.workplace import Workplace
 from hexacell.services.write_back.config_history import config_history
 from hexacell.text.config_changes import RELOAD
-from hexacell.text.history import history_line
+from hexacell.text.history import NO_DRIFT, history_line
 from hexacell.text.screens.questions import PERSON
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from tests.hexacell.services.proposed_runs import ProposedRun, a_cell, propose_run
 from tests.mutations.journals import with_checksum
-from tests.screen.conftest import settled
+from tests.screen.conftest import attended, settled
 from tests.screen.test_job import press, shown, until_shown
 from tests.waiting import until
 
@@ -71,7 +73,9 @@ async def test_the_config_of_before_the_latest_run_is_put_back(cell: Cell, runs:
         await pilot.press("b")
         await until(lambda: isinstance(pilot.app.screen, ConfirmOverlay))
         assert "Undo 2026-11-21T100000Z" in shown(pilot)
-        await press(pilot, "y")
+        await press(pilot, "n")
+        assert cell.config_path.read_bytes() == runs[1].after
+        await press(pilot, "b", "y")
         await until_shown(pilot, "again, bit for bit, which undoes the run 2026-11-21T100000Z")
         await until(lambda: [one.message for one in pilot.app._notifications] == [RELOAD])
     assert cell.config_path.read_bytes() == runs[1].before
@@ -88,52 +92,28 @@ async def test_an_earlier_config_is_gone_back_to(cell: Cell, runs: list[Proposed
     assert cell.config_path.read_bytes() == runs[0].after
 
 
-async def test_nothing_is_put_back_without_a_yes(cell: Cell, runs: list[ProposedRun]) -> None:
-    async with opened_history(cell) as pilot:
-        await pilot.press("b")
-        await until(lambda: isinstance(pilot.app.screen, ConfirmOverlay))
-        await press(pilot, "n")
-    assert cell.config_path.read_bytes() == runs[1].after
+async def test_what_is_not_done_says_why_and_changes_nothing(cell: Cell, runs: list[ProposedRun]) -> None:
+    earlier, latest = (run.folder.path.name for run in runs)
+    async with attended(WithoutDevices(cell.path)) as model:
+        await until(lambda: bool(model.runs))
+        with pytest.raises(UsageError, match=f"no run before {earlier} identified a geometry"):
+            await model.perform(ScreenAction.COMPARE, earlier)
+        await model.perform(ScreenAction.DRIFT)
+        assert model.shown("history")["comparison"][0][-1] == NO_DRIFT
+        assert cell.config_path.read_bytes() == runs[1].after
+        edited = runs[1].after + b"# by hand\n"
+        cell.config_path.write_bytes(edited)
+        with pytest.raises(ConfigEditedSince):
+            await model.perform(ScreenAction.ROLL_BACK, latest)
+        assert "+# by hand" in model.shown("history")["comparison"][0]
+        assert cell.config_path.read_bytes() == edited
 
 
-async def test_an_edited_config_is_kept_and_the_three_versions_are_shown(
-    cell: Cell, runs: list[ProposedRun]
-) -> None:
-    edited = runs[1].after + b"# by hand\n"
-    cell.config_path.write_bytes(edited)
-    async with opened_history(cell) as pilot:
-        await pilot.press("b")
-        await until(lambda: isinstance(pilot.app.screen, ConfirmOverlay))
-        await press(pilot, "y")
-        await until(lambda: isinstance(pilot.app.screen, FaultOverlay))
-        await press(pilot, "enter")
-        await until_shown(pilot, "+# by hand")
-    assert cell.config_path.read_bytes() == edited
-
-
-async def test_what_cannot_be_compared_says_why(cell: Cell, runs: list[ProposedRun]) -> None:
-    async with opened_history(cell) as pilot:
-        await pilot.press("down", "v")
-        await until(lambda: isinstance(pilot.app.screen, FaultOverlay))
-        assert "no run before 2026-11-20T100000Z identified a geometry" in shown(pilot)
-
-
-async def test_a_history_that_cannot_be_read_says_why_and_the_devices_stay(
-    cell: Cell, runs: list[ProposedRun]
-) -> None:
+async def test_a_history_that_cannot_be_read_says_why(cell: Cell, runs: list[ProposedRun]) -> None:
     cell.config_path.unlink()
-    app = TechnicianApp(lambda: ScreenModel(WithoutDevices(cell.path)))
-    async with app.run_test(size=(100, 30)) as pilot:
-        await until(lambda: app.model is not None)
-        await press(pilot, "5")
-        await until_shown(pilot, "cannot be read")
-        assert not isinstance(app.screen, FaultOverlay)
-
-
-async def test_the_drift_needs_three_calibrations(cell: Cell, runs: list[ProposedRun]) -> None:
-    async with opened_history(cell) as pilot:
-        await press(pilot, "o")
-        await until_shown(pilot, "A drift needs three calibrations of the cell.")
+    async with attended(WithoutDevices(cell.path)) as model:
+        await until(lambda: model.runs == ())
+        assert "cannot be read" in model.shown("history")["comparison"][0][-1]
 
 
 async def test_a_recorded_run_is_watched_again_with_its_cursor(cell: Cell, runs: list[ProposedRun]) -> None:
@@ -242,13 +222,9 @@ async def test_what_a_gate_refuses_cannot_be_written(cell: Cell) -> None:
 async def test_a_proposal_for_an_edited_config_is_not_written(cell: Cell, left: ProposedRun) -> None:
     edited = left.before + b"# by hand\n"
     cell.config_path.write_bytes(edited)
-    async with opened_history(cell) as pilot:
-        await pilot.press("w")
-        await until_asked(pilot)
-        await press(pilot, "y")
-        await until(lambda: isinstance(pilot.app.screen, FaultOverlay))
-        await press(pilot, "enter")
-        await until_shown(pilot, "+# by hand")
+    async with attended(WithoutDevices(cell.path)) as model:
+        with pytest.raises(ConfigEditedSince):
+            await model.perform(ScreenAction.APPLY, left.folder.path.name)
     assert cell.config_path.read_bytes() == edited
 
 

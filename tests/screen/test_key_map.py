@@ -21,11 +21,8 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "screen.toml"
 
 
-def test_without_a_file_the_keys_are_as_described(path: Path) -> None:
-    assert read_preferences(path) == ScreenPreferences({}, "dark")
-
-
 def test_keys_and_theme_are_read(path: Path) -> None:
+    assert read_preferences(path) == ScreenPreferences({}, "dark")
     path.write_text('theme = "light"\n[keys]\npause = "f5"\n')
     assert read_preferences(path) == ScreenPreferences({"pause": "f5"}, "light")
 
@@ -52,10 +49,6 @@ def test_the_file_is_where_configs_are(monkeypatch: pytest.MonkeyPatch, tmp_path
     assert preferences_path() == tmp_path / "hexacell" / "screen.toml"
 
 
-def test_every_action_has_a_name_and_a_key_of_its_own() -> None:
-    assert len({one.id for one in KEYS}) == len({one.key for one in KEYS}) == len(KEYS)
-
-
 async def test_a_chosen_key_takes_the_place_of_the_other(
     cell: Cell, history: tuple[Event, ...], opened: Opened
 ) -> None:
@@ -71,9 +64,5 @@ async def test_a_chosen_key_takes_the_place_of_the_other(
         await until(lambda: run.given == [Pause()])
         await pilot.press("f8")
         await until(lambda: pilot.app.current_mode == "review")
-
-
-async def test_the_palette_has_everything_that_a_key_does(cell: Cell, opened: Opened) -> None:
-    async with opened(ToldWorkplace(cell)) as pilot:
         named = {command.title for command in pilot.app.get_system_commands(pilot.app.screen)}
-        assert named == {one.description for one in KEYS}
+        assert named == {one.description for one in KEYS}  # the palette has everything that a key does

@@ -37,6 +37,7 @@ from tests.benchmarks.line_in_process import Damage, InstrumentLine, have_lines
 from tests.benchmarks.samples import sample
 
 FRAMES = sample(__name__, "FRAMES")
+HUNDREDTHS = sample(__name__, "HUNDREDTHS")
 SHARE = 0.01
 CHECKED_EVERY = 20
 """After so many records the settings are compared, as a run does at every reference."""
@@ -284,7 +285,7 @@ async def wrong_of(alike_share: float, monkeypatch: pytest.MonkeyPatch) -> tuple
     await cell.open()
     cell.damage.share = HUNDREDTHS_SHARE
     try:
-        while cell.damage.answers < FRAMES:
+        while cell.damage.answers < HUNDREDTHS:
             await cell.record()
     finally:
         await cell.devices.gauges[0].gauge.close()

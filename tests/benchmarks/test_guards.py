@@ -38,12 +38,13 @@ from procedures.run.state import RunState, fold
 from procedures.run.trips import Guard, GuardTripped, WatchedSet
 from procedures.steps import events
 from tests.benchmarks.figures import Figures, at_most
+from tests.benchmarks.samples import sample
 from tests.injection_times import injection_times
 from tests.native_config import NATIVE
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 MUST_S = 0.2
-TIMES = 3
+TIMES = sample(__name__, "TIMES")
 BEAT_S = 0.005
 LATE_S = 0.03
 ATTEMPTS = 5

@@ -5,6 +5,8 @@ And where the machine itself is at fault, and nothing may be named: what is list
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -14,12 +16,13 @@ from hexacell.identification.solver.result import DataFault, GaugeFaultError
 from hexacell.measurements.records import MeasurementSet
 from hexacell.uncertainty.possible_causes import possible_causes
 from tests.benchmarks.figures import at_least
+from tests.benchmarks.machines import on_all_cores
 from tests.benchmarks.samples import sample
 from tests.benchmarks.worlds.campaigns import Setting
 from tests.benchmarks.worlds.kinds import NONE, ORDINARY, PRECISION
-from tests.benchmarks.worlds.mistakes import MISTAKES, Mistake
+from tests.benchmarks.worlds.mistakes import MISTAKES
 from tests.benchmarks.worlds.table import least_by_chance
-from tests.benchmarks.worlds.trials import Trial, world_of
+from tests.benchmarks.worlds.trials import Trial, settings, world_of
 
 RUNS = sample(__name__, "RUNS")
 MACHINES = 6
@@ -53,24 +56,24 @@ def named(own: Setting, measured: MeasurementSet) -> tuple[DataFault, ...]:
         return (refused.fault,)
 
 
-def are_named(mistake: Mistake, kind: str) -> list[bool]:
-    """Of some machines."""
-    results = []
-    for number in range(MACHINES * RUNS):
-        world, own = world_of(Trial(kind, 1.0, number))
-        measured = world.records(own.commands, own.robot.commanding)
-        random = np.random.default_rng([29, number, *mistake.name.encode()])
-        wrong, concerned = mistake.make(measured, random)
-        results.append(mistake.is_named_by(named(own, wrong), concerned))
-    return results
+def is_named(kind: str, job: tuple[int, int]) -> bool:
+    """One of the mistakes, by its place among them, in the records of a machine."""
+    mistake, number = MISTAKES[job[0]], job[1]
+    world, own = world_of(Trial(kind, 1.0, number))
+    measured = world.records(own.commands, own.robot.commanding)
+    random = np.random.default_rng([29, number, *mistake.name.encode()])
+    wrong, concerned = mistake.make(measured, random)
+    return mistake.is_named_by(named(own, wrong), concerned)
 
 
 @pytest.mark.parametrize(("kind", "least"), NAMED_SHARES.items())
 def test_mistakes_are_named(figure, kind, least):
-    every: list[bool] = []
-    for mistake in MISTAKES:
-        results = are_named(mistake, kind)
-        every += results
+    settings()  # before the processes are forked, so that they share them
+    count = MACHINES * RUNS
+    jobs = [(place, number) for place in range(len(MISTAKES)) for number in range(count)]
+    every = on_all_cores(partial(is_named, kind), jobs, together=count)
+    for place, mistake in enumerate(MISTAKES):
+        results = every[place * count : (place + 1) * count]
         figure(f"{mistake.name}, {kind}: named", sum(results), f"of {len(results)}")
     target = at_least(least_by_chance(least, len(every)))
     figure(f"all mistakes, {kind}: named", sum(every), f"of {len(every)}", target)

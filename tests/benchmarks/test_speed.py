@@ -30,7 +30,7 @@ SEARCH_SECONDS = 3.0
 """Longer than this nobody waits for the next pose."""
 
 MOST_ITERATIONS = 100
-STEP = 1e-6
+STEP = np.array(1e-6)
 """Of finite differences, relative: the best for them. With scipy's own one of them does not converge."""
 
 SIZES = (1_000, 3_000, 10_000, 30_000, 100_000)

@@ -184,15 +184,6 @@ async def _carry_on(cell: Cell, before: tuple[events.Event, ...]) -> None:
     await connection.leave(keep_running=False)
 
 
-async def test_one_cell_has_one_run(cell, run) -> None:
-    connection = await start_host(socket_path(cell), arguments(cell, run))
-    with pytest.raises(HostNotStarted, match="another process runs this cell") as refusal:
-        await start_host(socket_path(cell), arguments(cell, run))
-    assert refusal.value.exit_code is ExitCode.BUSY
-    await connection.leave(keep_running=False)
-    await until(lambda: nothing_is_left(cell))
-
-
 async def test_a_host_that_cannot_begin_says_why(cell, run) -> None:
     cell.path.write_text("nothing")
     with pytest.raises(HostNotStarted, match=str(cell.path)) as refusal:

@@ -79,29 +79,6 @@ class TestAPersonAtTheTerminal:
         question = terminal.read_until("Write this into the controller's config? Type yes or no: ")
         return process, question, fast_cell
 
-    @pytest.mark.parametrize(
-        ("typed", "code"),
-        [
-            pytest.param("no\n", 1, id="no"),
-            pytest.param("simulated-hexaglide\n", 0, id="the cell's name", marks=pytest.mark.slow),
-        ],
-    )
-    def test_a_geometry_beyond_the_tolerance_needs_the_cell_s_name(
-        self, fast_cell, demo, start, terminal, typed, code
-    ):
-        fast_cell.edit(("l_mm = 7.0", "l_mm = 2.0"))
-        run = fast_cell.rewound(demo.run, before="propose")
-        process = start_at(terminal, start, "run", fast_cell.cell, "--resume", run)
-        asked = terminal.read_until("to take the responsibility, or no: ")
-        assert "NO  Beyond the drawing's tolerance: " in asked
-        assert "Type the cell's name, simulated-hexaglide" in asked
-        terminal.type("yes\n")
-        terminal.read_until("to take the responsibility, or no: ")
-        terminal.type(typed)
-        assert ended(process, terminal) == code
-        before = (demo.run / "config-before").read_bytes()
-        assert (fast_cell.controller.read_bytes() == before) == (code == 1)
-
     def test_sees_the_change_and_approves_it(self, waiting, terminal, demo):
         process, question, cell = waiting
         lines = question.replace("\r\n", "\n").splitlines()

@@ -120,11 +120,6 @@ def test_names_with_quotes_stay_names(typed_here, cell_folder, tmp_path) -> None
     assert labels == {"Zelle (3) #+"}
 
 
-def test_a_cell_file_that_is_not_there_is_named(typed_here, tmp_path) -> None:
-    outcome = typed_here("status", tmp_path / "nowhere.toml")
-    assert (outcome.code, "nowhere.toml" in outcome.err) == (2, True)
-
-
 @pytest.mark.parametrize("mistake", ["nowhere", "no TOML", "a value", "no config"])
 def test_a_broken_cell_hides_no_other(typed_here, cell_folder, tmp_path, mistake) -> None:
     broken, target = tmp_path / "broken.toml", tmp_path / "hexacell.prom"

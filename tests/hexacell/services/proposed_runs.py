@@ -10,11 +10,11 @@ from typing import Any
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.config.change import ConfigChange, propose
-from hexacell.config.interface import ControllerLimits
 from hexacell.config.layout import fingerprint
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import config_layout, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.run.calibration_run import run_started
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
@@ -83,21 +83,7 @@ def _history(
 ) -> list[events.Event]:
     calibration = Calibration(cell.settings, robot_of(cell), Mode.OPTIMISE, effort=FEW_CHOICES)
     history: list[events.Event] = [
-        events.RunStarted(
-            software="hexacell 0",
-            cell=cell.settings.name,
-            cell_text=cell.text_without_secrets,
-            mode="optimise",
-            config=str(cell.config_path),
-            further_configs=tuple(map(str, cell.config_paths[1:])),
-            config_sha256=change.sha256_before,
-            controller=calibration.robot.controller.document(),
-            branch=calibration.robot.branch,
-            devices=(),
-            taught=calibration.robot.taught.document(),
-            joint_ranges=calibration.robot.limits.joint_ranges,
-            limits=ControllerLimits(),
-        ),
+        run_started(cell, calibration, ()).model_copy(update={"software": "hexacell 0"}),
         events.Proposed(gates=gates, written=change.after),
     ]
     if verdict is not None:

@@ -11,7 +11,6 @@ import numpy as np
 
 from hexacell.cell.loader import Cell
 from hexacell.checks.check_result import CheckResult
-from hexacell.config.interface import ControllerLimits
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
@@ -20,7 +19,9 @@ from hexacell.results.result import AcceptedResult, IdentificationResult
 from hexacell.robot.model import Robot, robot_of
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.services.run.calibration_run import run_started
 from hexacell.verdict.decision import Verdict
+from procedures.calibration.calibration import Calibration, Mode
 from procedures.journal.journal import Entry, encode
 from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Reading, Temperature
@@ -94,21 +95,8 @@ class Nights:
         result: events.Event,
         accepted: AcceptedResult | None = None,
     ) -> RunFolder:
-        started = events.RunStarted(
-            software="hexacell 0",
-            cell=self.cell.settings.name,
-            cell_text=self.cell.text_without_secrets,
-            mode=mode,
-            config=str(self.cell.config_path),
-            config_sha256="",
-            controller=self.robot.controller.document(),
-            branch=self.robot.branch,
-            devices=(),
-            taught=self.robot.taught.document(),
-            joint_ranges=self.robot.limits.joint_ranges,
-            limits=ControllerLimits(),
-            accepted=accepted,
-        )
+        calibration = Calibration(self.cell.settings, self.robot, Mode(mode), accepted=accepted)
+        started = run_started(self.cell, calibration, ())
         history = [started, *map(self.taken, records), result, events.Ended(exit_code=0, line="over")]
         at = FIRST_NIGHT + timedelta(days=self.number)
         self.number += 1

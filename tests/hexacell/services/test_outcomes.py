@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -167,22 +168,16 @@ async def test_a_controller_that_never_reloads_must_be_restarted(proposed, finis
     assert site.config == finished.config_before
 
 
-async def test_a_config_edited_before_resuming_is_not_overwritten(proposed) -> None:
+@pytest.mark.parametrize("is_before", [True, False], ids=["before resuming", "during the run"])
+async def test_an_edited_config_is_not_overwritten(proposed, is_before: bool) -> None:
     site = proposed()
     edited = site.config + b"# somebody was here\n"
-    site.cell.config_path.write_bytes(edited)
+    edit = partial(site.cell.config_path.write_bytes, edited)
+    if is_before:
+        edit()
     with pytest.raises(FileError, match="changed since the run began") as refusal:
-        await site.calibrate(resume=True)
+        await site.calibrate(at(events.StepBegun, edit), resume=True)
     assert refusal.value.exit_code is ExitCode.USAGE
-    assert site.config == edited
-
-
-async def test_a_config_edited_during_the_run_is_not_overwritten(proposed) -> None:
-    site = proposed()
-    edited = site.config + b"# somebody was here\n"
-    edit = at(events.StepBegun, lambda: site.cell.config_path.write_bytes(edited))
-    with pytest.raises(FileError, match="changed since the run began"):
-        await site.calibrate(edit, resume=True)
     assert site.config == edited
 
 
@@ -212,30 +207,20 @@ async def test_two_gauges_that_fail_at_once_are_both_named(make_site) -> None:
     assert interrupted.exit_code == ExitCode.HARDWARE
 
 
-async def test_an_emergency_stop_during_a_move_stops_the_run(make_site) -> None:
+async def test_an_emergency_stop_during_a_move_stops_the_run_and_is_not_reset(
+    make_site,
+) -> None:
     site = make_site()
 
     def stop_in_the_next_move() -> None:
         schedule = site.simulated.schedule
         schedule.schedule(SimulatedFault(kind="emergency stop", at_move=schedule.move_count + 1))
 
-    fault = at(events.RecordTaken, stop_in_the_next_move)
     with pytest.raises(DeviceError, match="controller") as refusal:
-        await site.calibrate(fault)
+        await site.calibrate(at(events.RecordTaken, stop_in_the_next_move))
     assert refusal.value.exit_code is ExitCode.HARDWARE
     arrived = [event.orientation for event in site.happened(events.Arrived)]
     assert arrived in ([1], [1, 2]), "the move in which it struck may just have ended"
-
-
-async def test_an_emergency_stop_during_a_run_is_not_reset_on_resuming(make_site) -> None:
-    site = make_site()
-
-    def stop_in_the_next_move() -> None:
-        schedule = site.simulated.schedule
-        schedule.schedule(SimulatedFault(kind="emergency stop", at_move=schedule.move_count + 1))
-
-    with pytest.raises(DeviceError):
-        await site.calibrate(at(events.RecordTaken, stop_in_the_next_move))
     with pytest.raises(AnswerNeeded, match=r"is in emergency stop, .* reset it at the controller"):
         await site.calibrate(resume=True)
     assert site.simulated.controller.state.estop

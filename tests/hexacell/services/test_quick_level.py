@@ -13,7 +13,7 @@ import pytest
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
 from hexacell.config.layout import fingerprint
-from hexacell.errors import ExitCode, OutOfTime, UsageError
+from hexacell.errors import ExitCode, OutOfTime
 from hexacell.identification.estimator import identify
 from hexacell.results.result import AcceptedResult
 from hexacell.robot.model import robot_of
@@ -125,14 +125,6 @@ async def test_the_next_check_starts_from_it(corrected) -> None:
     assert state.judged.check.earlier_run == str(corrected.folder.path)
 
 
-async def test_without_an_accepted_result_it_says_what_to_do(make_cell, tmp_path) -> None:
-    cell = make_cell()
-    with pytest.raises(UsageError, match="no accepted result has this config") as refusal:
-        await calibrate(order_of(cell, RunFolder(tmp_path / "run"), mode=Mode.QUICK))
-    assert "--mode optimise" in str(refusal.value)
-    assert not (tmp_path / "run").exists()
-
-
 @pytest.mark.slow
 async def test_one_that_was_ended_in_its_midst_is_resumed(drifted) -> None:
     """With the same prior and budget: what it started from is in its journal."""
@@ -179,15 +171,3 @@ def test_what_effects_did_to_the_result_before_counts(corrected) -> None:
         np.linalg.norm(budget.systematic[:, :3], axis=(1, 2)) for budget in (whole, forgetful)
     )
     assert not np.allclose(remembered, forgotten, rtol=1e-3)
-
-
-async def test_it_is_resumed_in_its_mode(drifted, corrected) -> None:
-    folder = corrected.folder
-    lines = folder.journal.read_bytes().splitlines(keepends=True)
-    history = read_journal(folder.journal)
-    until = next(n for n, event in enumerate(history) if isinstance(event, events.Proposed))
-    again = RunFolder(runs_folder(drifted) / "again")
-    shutil.copytree(folder.path, again.path)
-    again.journal.write_bytes(b"".join(lines[:until]))
-    with pytest.raises(UsageError, match="begun in the mode quick"):
-        await calibrate(order_of(drifted, again, mode=Mode.OPTIMISE, resume=True))

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from hexacell.cell.loader import Cell, load_cell
+from hexacell.errors import FileError, HexacellError, SeveralErrors
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 
@@ -57,3 +58,16 @@ def line_with(cell_text: str) -> Callable[[str], int]:
         return next(n for n, line in enumerate(cell_text.splitlines(), start=1) if part in line)
 
     return find
+
+
+@pytest.fixture(scope="session")
+def refusal(load_text: Callable[[str], Cell]) -> Callable[[str, str, int], None]:
+    """Assert that a text is refused in these words, with lines from one on."""
+
+    def refused(text: str, words: str, first_line: int) -> None:
+        with pytest.raises(HexacellError, match=words) as caught:
+            load_text(text)
+        errors = caught.value.errors if isinstance(caught.value, SeveralErrors) else (caught.value,)
+        assert all(isinstance(error, FileError) and (error.line or 0) >= first_line for error in errors)
+
+    return refused

@@ -42,18 +42,6 @@ def test_absent_file_is_named(tmp_path):
     assert refused.value.subject == str(tmp_path / "cell.toml")
 
 
-def test_folder_is_refused(tmp_path):
-    with pytest.raises(FileError) as refused:
-        load_cell(tmp_path)
-    assert refused.value.subject == str(tmp_path)
-
-
-def test_unreadable_file_is_refused(cell_text, tmp_path):
-    (tmp_path / "file").write_text(cell_text)
-    with pytest.raises(FileError, match="cannot be read"):
-        load_cell(tmp_path / "file" / "cell.toml")
-
-
 @pytest.mark.parametrize("encoding", ["latin-1", "utf-16"])
 def test_other_encodings_are_refused(cell_text, tmp_path, encoding):
     path = tmp_path / "cell.toml"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.errors import FileError
 from hexacell.robot.model import noise_of
 
 STATED = "encoder_mm = 0.01\ngauge_mm = 0.01\n"
@@ -44,9 +43,5 @@ def test_each_instrument_may_have_its_own(load_noise) -> None:
         ("encoders_mm = [0.01]", "6"),
     ],
 )
-def test_mistakes_are_named_with_their_line(load_noise, line_with, line: str, words: str) -> None:
-    with pytest.raises(Exception, match=words) as refusal:
-        load_noise(f"{STATED}{line}\n")
-    errors = getattr(refusal.value, "errors", [refusal.value])
-    assert all(isinstance(error, FileError) for error in errors)
-    assert all(error.line >= line_with("[noise]") for error in errors)
+def test_mistakes_are_named_with_their_line(refusal, cell_text, line_with, line, words) -> None:
+    refusal(cell_text.replace(STATED, f"{STATED}{line}\n", 1), words, line_with("[noise]"))

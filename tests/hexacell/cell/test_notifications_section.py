@@ -21,6 +21,26 @@ OPEN_ADDRESSES = [
 ]
 
 
+@pytest.fixture
+def cell_with(tmp_path):
+    """The bundled cell, read with more text at its end."""
+    source = load_cell(bundled_config("simulated-hexaglide"))
+
+    def load(more: str, text: str = source.text):
+        path = tmp_path / source.path.name
+        path.write_text(f"{text}\n{more}")
+        return load_cell(path)
+
+    return load
+
+
+def section(**values: str) -> str:
+    return "[[notifications]]\n" + "".join(f"{key} = {value}\n" for key, value in values.items())
+
+
+ONE = section(name='"one"', url='"mqtt://x"')
+
+
 @pytest.mark.parametrize("url", OPEN_ADDRESSES)
 def test_addresses_without_secrets_may_stand_there(url) -> None:
     settings = NotificationSettings(name="one", url=url)
@@ -48,12 +68,9 @@ def test_runs_whose_copy_has_a_masked_address_can_still_be_read() -> None:
         ("host/x", "no address"),
     ],
 )
-def test_secrets_are_refused_and_not_shown(tmp_path, url, reason) -> None:
-    source = load_cell(bundled_config("simulated-hexaglide"))
-    path = tmp_path / source.path.name
-    path.write_text(f'{source.text}\n[[notifications]]\nname = "one"\nurl = "{url}"\n')
+def test_secrets_are_refused_and_not_shown(cell_with, url, reason) -> None:
     with pytest.raises(FileError, match=reason) as raised:
-        load_cell(path)
+        cell_with(section(name='"one"', url=f'"{url}"'))
     assert raised.value.line is not None
     assert "hidden" not in str(raised.value)
 
@@ -74,30 +91,19 @@ def test_what_makes_no_sense_is_refused(settings) -> None:
         NotificationSettings.model_validate({"name": "one", "url": "mqtt://x"} | settings)
 
 
-def test_a_word_that_is_no_occasion_is_answered_with_each_that_is_once(tmp_path) -> None:
-    source = load_cell(bundled_config("simulated-hexaglide"))
-    path = tmp_path / source.path.name
-    path.write_text(f'{source.text}\n[[notifications]]\nname = "one"\nurl = "mqtt://x"\non = ["fail"]\n')
+def test_a_word_that_is_no_occasion_is_answered_with_each_that_is_once(cell_with) -> None:
     with pytest.raises(FileError) as raised:
-        load_cell(path)
+        cell_with(ONE + 'on = ["fail"]\n')
     for word in get_args(OccasionWord):
         assert str(raised.value).count(f"'{word}'") == 1
     assert str(raised.value).count("alarm") == 1
 
 
-def test_a_first_one_can_be_added_to_a_cell_file_that_was_written_with_defaults(tmp_path) -> None:
-    source = load_cell(bundled_config("simulated-hexaglide"))
-    path = tmp_path / source.path.name
-    path.write_text(f'{dump(source.settings)}\n[[notifications]]\nname = "one"\nurl = "mqtt://x"\n')
-    assert [one.name for one in load_cell(path).settings.notifications] == ["one"]
+def test_a_first_one_can_be_added_to_a_cell_file_that_was_written_with_defaults(cell_with) -> None:
+    found = cell_with(ONE, dump(load_cell(bundled_config("simulated-hexaglide")).settings))
+    assert [one.name for one in found.settings.notifications] == ["one"]
 
 
-def test_names_differ(tmp_path) -> None:
-    source = load_cell(bundled_config("simulated-hexaglide"))
-    path = tmp_path / source.path.name
-    one = '\n[[notifications]]\nname = "one"\nurl = "mqtt://x"\n'
-    path.write_text(source.text + one)
-    assert load_cell(path).settings.notifications[0].name == "one"
-    path.write_text(source.text + one * 2)
+def test_names_differ(cell_with) -> None:
     with pytest.raises(FileError, match="the same name"):
-        load_cell(path)
+        cell_with(ONE * 2)

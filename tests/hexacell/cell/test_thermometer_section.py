@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from hexacell.cell.loader import describe
-from hexacell.errors import FileError
 
 ROOM = '\n[[thermometers]]\nname = "room"\npath = "/sys/class/hwmon/hwmon0/temp1_input"\n'
 
@@ -34,9 +33,5 @@ def test_settings_of_a_thermometer(load_text, cell_text) -> None:
         (ROOM + "legs = [4]\n" + ROOM.replace("room", "other") + "legs = [4]\n", "on the same leg"),
     ],
 )
-def test_mistakes_are_reported_with_their_line(load_text, cell_text, section: str, words: str) -> None:
-    with pytest.raises(Exception, match=words) as refusal:
-        load_text(cell_text + section)
-    errors = getattr(refusal.value, "errors", [refusal.value])
-    assert all(isinstance(error, FileError) for error in errors)
-    assert all(error.line > len(cell_text.splitlines()) for error in errors)
+def test_mistakes_are_reported_with_their_line(refusal, cell_text, section: str, words: str) -> None:
+    refusal(cell_text + section, words, len(cell_text.splitlines()) + 1)

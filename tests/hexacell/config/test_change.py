@@ -1,7 +1,5 @@
 import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -92,15 +90,6 @@ pieces = st.lists(st.sampled_from(["a\n", "b\r\n", "c\f d\n", "e\x85\u2028\n", "
     "".join
 )
 texts = st.tuples(pieces, st.sampled_from(["", "no end of line"])).map("".join)
-
-
-@pytest.mark.skipif(shutil.which("patch") is None, reason="no patch on this machine")
-def test_patch_makes_of_the_diff_what_will_be_written(tmp_path: Path, proposal: ConfigChange) -> None:
-    path = tmp_path / "patched"
-    path.write_bytes(proposal.text_before.encode())
-    command = [str(shutil.which("patch")), "--binary", "--quiet", str(path)]
-    subprocess.run(command, input=proposal.diff.encode(), check=True)
-    assert path.read_bytes() == proposal.text_after.encode()
 
 
 def patched(before: str, change: str) -> str:

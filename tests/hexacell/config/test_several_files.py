@@ -1,18 +1,15 @@
 """A write of several files leaves all of them new or all of them old, whatever fails, and when."""
 
 import errno
-import math
 import os
-from collections.abc import Callable, Iterator
-from itertools import count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from hexacell.config.change import AFTER, BEFORE, ConfigChange, Receipt, propose
-from hexacell.config.layout import Contents, fingerprint, read_contents
+from hexacell.config.change import AFTER, BEFORE, ConfigChange, Receipt
+from hexacell.config.layout import read_contents
 from hexacell.config.pending_write import (
     is_interrupted,
     note_path,
@@ -22,83 +19,8 @@ from hexacell.config.pending_write import (
 from hexacell.config.write_back import commit, restore, rollback
 from hexacell.errors import FileError, HexacellError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
-from tests.several_config_files import LAYOUT, drawn_geometry, write_config
-
-Job = Callable[[Path], object]
-
-
-class PowerCut(BaseException):
-    """From here on this process does nothing any more."""
-
-
-class Bench:
-    """Two files, one of them behind a symbolic link, and a change of both."""
-
-    def __init__(self, folder: Path, faults: Any) -> None:
-        (folder / "machine").mkdir()
-        (folder / "real").mkdir()
-        hal, ini = write_config(folder / "real")
-        self.files = folder / "machine" / "hexapod.hal", folder / "machine" / "hexapod.ini"
-        hal.rename(self.files[0])
-        self.files[1].symlink_to(ini)
-        self.change = self.changed_by(1.25)
-        self.before, self.after = self.change.before_contents, self.change.after_contents
-        self._runs = (folder / f"run-{number}" for number in count())
-        self._faults = faults
-
-    def changed_by(self, shift_mm: float) -> ConfigChange:
-        geometry = Geometry(drawn_geometry().parameters, drawn_geometry().vector + shift_mm)
-        start = fingerprint(*self.files)
-        return propose(self.files, LAYOUT, geometry, fingerprint_at_start=start)
-
-    @property
-    def found(self) -> Contents:
-        return read_contents(self.files)
-
-    def reset(self, _: Path) -> None:
-        note_path(self.files).unlink(missing_ok=True)
-        for path, data in zip(self.files, self.before, strict=True):
-            path.write_bytes(data)
-
-    def commit(self, run: Path) -> Receipt:
-        return commit(self.change, run)
-
-    def commit_afresh(self, run: Path) -> None:
-        self.reset(run)
-        self.commit(run)
-
-    def next_run(self) -> Path:
-        return next(self._runs)
-
-    def attempts(
-        self, prepare: Job, job: Job, **how: Any
-    ) -> Iterator[tuple[str, Path, BaseException | None]]:
-        """For each call to the file system that fails: which it is, the run, and what the job raised."""
-        run = self.next_run()
-        prepare(run)
-        with self._faults().active() as counter:
-            job(run)
-        assert {"open", "fsync", "replace", "unlink", "access"} <= set(counter.calls)
-        for at, name in enumerate(counter.calls):
-            run = self.next_run()
-            prepare(run)
-            raised = None
-            with self._faults(at=at, **how).active():
-                try:
-                    job(run)
-                except (FileError, WriteBackUndone, PowerCut) as error:
-                    raised = error
-            assert self.files[1].is_symlink()
-            yield f"call {at}, {name}", run, raised
-
-
-@pytest.fixture
-def bench(tmp_path: Path, faults: Any) -> Bench:
-    return Bench(tmp_path, faults)
-
-
-def mixed(bench: Bench) -> bool:
-    return bench.found not in {bench.before, bench.after}
+from tests.hexacell.config.conftest import Bench
+from tests.several_config_files import LAYOUT, drawn_geometry
 
 
 def test_both_are_written_and_undone_bit_for_bit(bench: Bench, tmp_path: Path) -> None:
@@ -139,7 +61,7 @@ def test_an_edited_change_of_the_second_file_is_refused(bench: Bench, tmp_path: 
 
 def test_the_same_geometry_writes_nothing(bench: Bench, tmp_path: Path) -> None:
     inodes = [path.stat().st_ino for path in bench.files]
-    commit(bench.changed_by(0.0), tmp_path / "run")
+    commit(bench.changed_to(drawn_geometry()), tmp_path / "run")
     assert [path.stat().st_ino for path in bench.files] == inodes
 
 
@@ -147,7 +69,7 @@ def test_a_change_of_one_file_leaves_the_other_alone(bench: Bench, tmp_path: Pat
     vector = drawn_geometry().vector.copy()
     vector[-6:] += 0.5
     geometry = Geometry(drawn_geometry().parameters, vector)
-    change = propose(bench.files, LAYOUT, geometry, fingerprint_at_start=fingerprint(*bench.files))
+    change = bench.changed_to(geometry)
     inode = bench.files[0].stat().st_ino
     assert change.diff.count("--- ") == 1
     receipt = commit(change, tmp_path / "run")
@@ -155,72 +77,6 @@ def test_a_change_of_one_file_leaves_the_other_alone(bench: Bench, tmp_path: Pat
     assert bench.found == change.after_contents
     rollback(receipt)
     assert bench.found == bench.before
-
-
-def test_any_single_failure_of_a_commit_leaves_the_old_config(bench: Bench) -> None:
-    undone = 0
-    for name, _, raised in bench.attempts(bench.reset, bench.commit):
-        assert bench.found == (bench.after if raised is None else bench.before), name
-        settle_interrupted_write(bench.files)  # a note may be left of what is undone
-        assert bench.found == (bench.after if raised is None else bench.before), name
-        undone += isinstance(raised, WriteBackUndone)
-    assert undone >= 8
-
-
-@pytest.mark.parametrize("width", [2, 5, math.inf])
-def test_consecutive_failures_leave_what_the_message_says_or_what_is_undone_next(
-    bench: Bench, width: float
-) -> None:
-    halves = 0
-    for name, run, raised in bench.attempts(bench.reset, bench.commit, width=width):
-        if raised is None:
-            assert bench.found == bench.after, name
-        elif "may hold the new geometry" in str(raised):
-            halves += mixed(bench)
-            assert f"{run / 'config-before'} and {run / 'config-before-2'}" in str(raised), name
-        else:
-            assert bench.found == bench.before, name
-        settle_interrupted_write(bench.files)
-        assert not mixed(bench), name
-    assert halves or math.isfinite(width)
-
-
-@pytest.mark.sample("commit")
-@pytest.mark.parametrize("job", ["commit", "rollback"])
-def test_a_power_cut_at_any_moment_is_settled(bench: Bench, job: str) -> None:
-    doing, prepare = {
-        "commit": (bench.commit, bench.reset),
-        "rollback": (lambda run: rollback(Receipt.of(run)), bench.commit_afresh),
-    }[job]
-    ends: dict[str, int] = {"mixed": 0, "before": 0, "after": 0}
-    for name, run, raised in bench.attempts(prepare, doing, width=math.inf, error=PowerCut):
-        assert isinstance(raised, PowerCut), name
-        if was_mixed := mixed(bench):
-            assert is_interrupted(bench.files), name
-        settled = settle_interrupted_write(bench.files)
-        assert not mixed(bench), name
-        assert not is_interrupted(bench.files), name
-        if was_mixed:
-            assert settled is not None, name
-            assert (settled.restored, settled.is_complete) == (("hexapod.hal",), False), name
-        ends["mixed"] += was_mixed
-        ends["before" if bench.found == bench.before else "after"] += 1
-        doing(run)  # whatever was left, it can be done again
-        assert bench.found == (bench.after if job == "commit" else bench.before), name
-    assert all(ends.values()), ends
-
-
-def test_what_is_settled_can_itself_be_cut_off(bench: Bench) -> None:
-    def half(run: Path) -> None:
-        bench.reset(run)
-        note_write(bench.files, bench.before, bench.after)
-        bench.files[0].write_bytes(bench.after[0])
-
-    for name, _, _ in bench.attempts(
-        half, lambda _: settle_interrupted_write(bench.files), width=math.inf, error=PowerCut
-    ):
-        settle_interrupted_write(bench.files)
-        assert bench.found == bench.before, name
 
 
 def test_a_write_that_was_complete_stays(bench: Bench, tmp_path: Path) -> None:

@@ -134,26 +134,6 @@ def test_only_number_tokens_change(layout: Layout, numbers: tuple[list[str], np.
     assert changed == layout.render(token_by_name(expected))
 
 
-@given(layouts, tokens_and_values())
-def test_writing_the_same_values_changes_nothing(
-    layout: Layout, numbers: tuple[list[str], np.ndarray]
-) -> None:
-    old, _ = numbers
-    text = layout.render(token_by_name(old))
-    same = [tomllib.loads(f"x = {token}")["x"] for token in old]
-    assert FORMAT.rewrite(text, Geometry(HEXAGLIDE_PARAMETERS, same)) == text
-
-
-@given(layouts, tokens_and_values())
-def test_writing_the_same_geometry_again_changes_nothing(
-    layout: Layout, numbers: tuple[list[str], np.ndarray]
-) -> None:
-    old, new = numbers
-    geometry = Geometry(HEXAGLIDE_PARAMETERS, new)
-    changed = FORMAT.rewrite(layout.render(token_by_name(old)), geometry)
-    assert FORMAT.rewrite(changed, geometry) == changed
-
-
 @given(st.floats(-1e15, 1e15))
 def test_number_tokens_are_floats_with_six_decimals(value: float) -> None:
     token = write_number(value, ParameterUnit.MM.decimals)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from hexacell.kinematics.commanded_motion import CommandedRobot
-from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.pose import Pose, PoseBatch
 
 COMMANDS = PoseBatch.of([Pose(0, 0, 550), Pose(50, -40, 520, 10, -5, 8), Pose(0, 0, 5000)])
@@ -44,12 +43,3 @@ def test_no_command_leads_to_joints_that_the_controllers_geometry_cannot_take(ro
     actual = robot.actual_poses(COMMANDS[:1])
     beyond = actual.joints + np.array([400.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert not robot.commands_for(actual.poses, beyond).found.any()
-
-
-def test_the_same_geometry_leaves_poses_as_they_are(robot, hexaglide, paper):
-    joints = robot.joints(COMMANDS[:2])
-    same = continue_solution(
-        hexaglide, paper.nominal, joints, start=COMMANDS[:2], start_geometry=paper.nominal
-    )
-    assert same.found.all()
-    np.testing.assert_allclose(same.poses.positions, COMMANDS.positions[:2], atol=1e-9)

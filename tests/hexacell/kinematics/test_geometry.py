@@ -21,14 +21,6 @@ def test_the_order_of_the_vector_is_that_of_the_names():
     np.testing.assert_array_equal(geometry.vector, COUNTING)
 
 
-def test_the_names_are_those_of_the_interface():
-    assert len(HEXAGLIDE_PARAMETERS.names) == 42
-    assert HEXAGLIDE_PARAMETERS.names[:4] == ("S1x", "S1y", "S1z", "S2x")
-    assert HEXAGLIDE_PARAMETERS.names[17:19] == ("S6z", "B1x")
-    assert HEXAGLIDE_PARAMETERS.names[35:37] == ("B6z", "l1")
-    assert HEXAGLIDE_PARAMETERS.names[-1] == "l6"
-
-
 def test_arrays_are_read_only_copies():
     S = np.zeros((6, 3))
     geometry = hexaglide_geometry(S, np.zeros((6, 3)), np.ones(6))

@@ -50,15 +50,6 @@ def test_sensitivity_agrees_with_finite_differences(hexaglide, paper, legs, vect
 
 
 @given(POSES)
-def test_pose_jacobian_agrees_with_finite_differences(hexaglide, paper, pose):
-    at = PoseBatch.of([pose])
-    joints = hexaglide.inverse(paper.nominal, paper.branch, at)
-    assume(not np.isnan(joints).any())
-    found = hexaglide.residual_and_jacobian(paper.nominal, at, joints)[1][0]
-    np.testing.assert_allclose(found, numeric_jacobian(hexaglide, paper.nominal, at, joints), atol=1e-5)
-
-
-@given(POSES)
 def test_margin_is_the_smallest_singular_value_of_the_scaled_jacobian(
     hexaglide, paper, legs, vector_of, pose
 ):

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from hexacell.kinematics.pose import Pose, PoseBatch
 from tests.geometries import hexaglide_geometry
 
-STEP = 1e-30  # complex steps need no compromise between rounding and truncation
 degrees = st.floats(-30.0, 30.0)
 poses = st.builds(
     Pose, st.floats(-100, 100), st.floats(-200, 100), st.floats(450, 600), degrees, degrees, degrees
@@ -20,63 +19,7 @@ poses = st.builds(
 BRANCHES = list(product((-1, 1), repeat=6))
 
 
-def leg_errors(S, B, l, joints, position, turn, rotation):  # noqa: E741 - the paper's symbol
-    """(|S + q e - P - (1 + [turn]x) R B|^2 - l^2) / 2l of each leg, of complex numbers."""
-    x, y, z = turn
-    small_turn = np.eye(3) + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    leg = S + np.outer(joints, [1, 0, 0]) - position - B @ (small_turn @ rotation).T
-    return (np.sum(leg * leg, axis=1) - l * l) / (2 * l)
-
-
-def by_complex_step(numbers, name, place):
-    stepped = {key: np.asarray(value, dtype=complex).copy() for key, value in numbers.items()}
-    stepped[name][place] += 1j * STEP
-    return leg_errors(**stepped).imag / STEP
-
-
-def state(geometry, pose, joints):
-    return {
-        "S": geometry["S"],
-        "B": geometry["B"],
-        "l": geometry["l"],
-        "joints": joints,
-        "position": pose.position,
-        "turn": np.zeros(3),
-        "rotation": pose.rotation,
-    }
-
-
 # Off the surface of closed poses too: a solver linearises there.
-@given(poses, st.floats(-5.0, 5.0))
-def test_derivatives_are_those_of_the_leg_equation(hexaglide, paper, legs, vector_of, pose, off_mm):
-    geometry = paper.actual
-    joints = legs(paper.nominal).joints(vector_of(pose)) + off_mm
-    if np.isnan(joints).any():
-        return
-    numbers = state(geometry, pose, joints)
-    found = hexaglide.derivatives(geometry, PoseBatch.of([pose]), joints[None])
-
-    np.testing.assert_allclose(
-        hexaglide.residual_and_jacobian(geometry, PoseBatch.of([pose]), joints[None])[0][0],
-        leg_errors(**numbers),
-        atol=1e-11,
-    )
-    for axis in range(3):
-        np.testing.assert_allclose(
-            found.pose[0, :, axis], by_complex_step(numbers, "position", (axis,)), atol=1e-12
-        )
-        np.testing.assert_allclose(
-            found.pose[0, :, 3 + axis], by_complex_step(numbers, "turn", (axis,)), atol=1e-10
-        )
-    for leg in range(6):
-        own = np.arange(6) == leg
-        derivatives = [by_complex_step(numbers, "joints", (leg,))]
-        derivatives += [by_complex_step(numbers, name, (leg, axis)) for name in "SB" for axis in range(3)]
-        derivatives += [by_complex_step(numbers, "l", (leg,))]
-        told = [found.joints[0, leg], *found.parameters[0, leg]]
-        np.testing.assert_allclose(np.array(derivatives)[:, own].ravel(), told, atol=1e-12)
-        # That leg's numbers move no other leg, so nothing is missing from the compact form.
-        np.testing.assert_array_equal(np.array(derivatives)[:, ~own], 0.0)
 
 
 def test_a_constraint_is_the_legs_error_in_millimetres(hexaglide, paper, legs, vector_of):

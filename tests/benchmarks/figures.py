@@ -26,7 +26,7 @@ HEAD = """# Figures of the benchmarks
 
 Written by `make figures` from `build/figures.json`, which `make bench` writes in one pass over all
 benchmarks (`FULL=1` takes the samples of the targets, for hours). A figure that is not of the commit below
-names its own.
+names its own; those without a target are in that file only.
 **missed** is a target that was not reached. [Measured](measured.md) has what else was found.
 
 """
@@ -190,27 +190,32 @@ def machine() -> str:
 
 
 def table(figures: Iterable[Figure], present: str) -> str:
-    """All figures as a page, those that missed their target first."""
-    listed = sorted(figures, key=lambda one: (one.benchmark.partition("::")[0], one.met is not False))
-    rows = [
-        "| benchmark | figure | value | target | met | samples | commit |",
-        "|---|---|---|---|---|---|---|",
-    ]
+    """The figures that have a target as a page, and what did not come to its end."""
+    every = sorted(figures, key=lambda one: one.benchmark.partition("::")[0])
+    listed = [one for one in every if one.met is not None or one.name == DID_NOT_END]
+    never = [one for one in listed if one.met and one.target == str(NEVER)]
+    rows = ["| benchmark | figure | measured | target | |", "|---|---|---|---|---|"]
     for one in listed:
-        met = {True: "yes", False: "**missed**", None: ""}[one.met]
-        of = "" if one.commit.rstrip("+") == present.rstrip("+") else one.commit
-        name = " ".join(one.name.replace("|", "\\|").split())
-        cells = (_module(one), name, one.shown.replace("|", "\\|"), one.target, met, one.samples, of)
-        rows.append("| " + " | ".join(cells) + " |")
-    missed = sum(one.met is False for one in listed)
-    targets = sum(one.met is not None for one in listed)
-    machines = ", ".join(sorted({one.machine for one in listed}))
-    of = f"Commit {present}; {machines}. {len(listed)} figures, {targets} with targets, {missed} missed."
-    return HEAD + of + "\n\n" + "\n".join(rows) + "\n"
+        if one in never:
+            continue
+        marks = [] if one.met else ["**missed**"]
+        marks += [] if one.commit.rstrip("+") == present.rstrip("+") else [f"at {one.commit}"]
+        case = one.benchmark.partition("[")[2].removesuffix("]")
+        cells = (f"{_module(one)} {case}", one.name, one.shown, one.target, ", ".join(marks))
+        rows.append(f"| {' | '.join(' '.join(cell.replace('|', '/').split()) for cell in cells)} |")
+    missed = sum(not one.met for one in listed)
+    counts = (
+        f"{len(every)} figures, {len(listed)} of them with a target, of which {missed} were missed; "
+        f"the {len(never)} of what must never happen, and did not, are not listed."
+    )
+    machines = "; ".join(sorted({one.machine for one in every}))
+    sizes = "; ".join(sorted({f"{_module(one)} {one.samples}" for one in every if one.samples}))
+    text = f"{HEAD}Commit {present}; {machines}. {counts}\n\nSamples: {sizes}.\n\n"
+    return text + "\n".join(rows) + "\n"
 
 
 def _module(figure: Figure) -> str:
-    return figure.benchmark.partition("::")[0].removeprefix("tests/benchmarks/")
+    return Path(figure.benchmark.partition("::")[0]).stem.removeprefix("test_")
 
 
 def main() -> None:

@@ -30,7 +30,7 @@ LATE = range(44, 55)
 REPEATS = 5
 MOST_MS = 15.0
 SMALL_SOLVES = 1000
-MOST_REFERENCES = 2.2
+MOST_REFERENCES = 1.9
 
 Moment = tuple[Plan, CampaignState, MeasurePose]
 """A plan, a state, and what was decided."""

@@ -244,12 +244,7 @@ def measured_held_out(
     Raises:
         LimitError: all of them are.
     """
-    records: list[Record] = []
-    chosen = HeldOutPoses(settings, robot, CANDIDATES).before(found)
-    for number, poses in enumerate(chosen, start=HELD_OUT_FROM):
-        virtual.zero_gauges()
-        for orientation, pose in enumerate(poses, start=1):
-            virtual.place(Pose(*pose))
-            records.append(virtual.measure(number, orientation))
+    poses = HeldOutPoses(settings, robot, CANDIDATES).before(found)
+    records = _visited(virtual, poses, HELD_OUT_FROM)
     deviations = _deviations(records)
     return HeldOut(MeasurementSet(tuple(records)), deviations, deviations)

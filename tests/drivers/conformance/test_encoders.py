@@ -25,7 +25,7 @@ from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
 
 TIMEOUT_S = 1.0
-CAN_TIMEOUT_S = 0.3
+CAN_TIMEOUT_S = 0.6
 
 
 class Cia406(EncoderConformance):
@@ -42,6 +42,7 @@ class TestLinear(Cia406):
     settings = LinearEncoderSettings(timeout_s=CAN_TIMEOUT_S, heartbeat_ms=5000)
 
 
+@pytest.mark.slow  # test_sync_sampling has signs and offsets
 class TestReversedAndOffset(Cia406):
     settings = LinearEncoderSettings.model_validate(
         {
@@ -53,6 +54,7 @@ class TestReversedAndOffset(Cia406):
     )
 
 
+@pytest.mark.slow  # test_open has encoders of angles
 class TestRotary(Cia406):
     settings = RotaryEncoderSettings(timeout_s=CAN_TIMEOUT_S, heartbeat_ms=5000)
 

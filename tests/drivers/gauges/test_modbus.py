@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -15,57 +13,30 @@ from hypothesis import strategies as st
 from drivers.errors import GaugeAtEnd, GaugeSilent, PortLost
 from drivers.gauges.modbus import ModbusGauge
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import SimulatedGaugeBank, instrument_class
+from drivers.simulated.gauges.bank import instrument_class
 from drivers.simulated.gauges.described import crc
 from drivers.simulated.gauges.instruments import Indicator
-from drivers.wire_trace import WireTrace
 from hexacell.cell.described_devices import ModbusSettings
 from hexacell.cell.devices import GaugeSettings
-from hexacell.cell.simulation import SimulatedGauges
-from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, FileError, UsageError
-
-WORST_LATENCY_S = 0.2
-FAST = 100.0
+from tests.drivers.simulated.gauges.served.cell import cell
 
 
-class Bench:
+def bench(transport: str = "pty", **modbus: Any) -> Any:
     """Three gauges on one line, at 1, 2 and 3 mm: two registers of device 7, one of device 8."""
+    places = [(7, 100), (7, 102), (8, 100)]
 
-    def __init__(self, transport: str = "pty", **modbus: Any) -> None:
-        self.balls = {"x": 1.0, "y": 2.0, "z": 3.0}
-        places = {"x": (7, 100), "y": (7, 102), "z": (8, 100)}
-        gauges = [
-            GaugeSettings(
-                name=name,
-                axis=name,
-                protocol="modbus",
-                timeout_s=0.5,
-                modbus=ModbusSettings.model_validate({"device": device, "register": register, **modbus}),
-            )
-            for name, (device, register) in places.items()
-        ]
-        plungers = {name: lambda name=name: self.balls[name] for name in self.balls}
-        simulated = SimulatedGauges.model_validate({"transport": transport})
-        self.bank = SimulatedGaugeBank(gauges, plungers, simulated, CellClock(FAST))
-        self.trace = WireTrace()
-        self.ports = SharedSerialPorts(trace=self.trace, worst_latency_s=WORST_LATENCY_S)
-        self.gauges = [ModbusGauge(gauge, self.ports) for gauge in self.bank.gauges]
+    def stated(_protocol: str, number: int) -> dict[str, Any]:
+        device, register = places[number - 1]
+        return {"modbus": {"device": device, "register": register, **modbus}}
 
-    def driver(self, **modbus: Any) -> ModbusGauge:
-        """One for another place than there is."""
-        gauge = self.bank.gauges[0]
-        found = ModbusSettings.model_validate({"device": 7, "register": 100, **modbus})
-        return ModbusGauge(gauge.model_copy(update={"modbus": found}), self.ports)
+    return cell(["modbus"] * 3, transport, 0.5, stated)
 
 
-@contextmanager
-def bench(**modbus: Any) -> Iterator[Bench]:
-    made = Bench(**modbus)
-    try:
-        yield made
-    finally:
-        made.bank.close()
+def other(made: Any, **modbus: Any) -> ModbusGauge:
+    """A driver for another place than there is."""
+    found = ModbusSettings.model_validate({"device": 7, "register": 100, **modbus})
+    return ModbusGauge(made.rack.gauges[0].model_copy(update={"modbus": found}), made.links)
 
 
 def test_the_checksum_of_the_simulation_is_that_of_the_specification():
@@ -75,23 +46,23 @@ def test_the_checksum_of_the_simulation_is_that_of_the_specification():
 
 @pytest.mark.parametrize("transport", ["pty", "socket"])
 async def test_three_gauges_on_one_line_are_read_at_once(transport):
-    with bench(transport=transport) as cell:
-        for gauge in cell.gauges:
+    async with bench(transport=transport) as made:
+        for gauge in made.gauges.values():
             await gauge.open()
-        cell.balls["y"] = -2.125
-        readings = await asyncio.gather(*(gauge.read() for gauge in cell.gauges))
+        made.balls["y"] = -2.125
+        readings = await asyncio.gather(*(gauge.read() for gauge in made.gauges.values()))
         assert [reading.value_mm for reading in readings] == pytest.approx([1.0, -2.125, 3.0])
         assert readings[0].raw == "0000 03e8 = 1000"
-        for gauge in cell.gauges:
+        for gauge in made.gauges.values():
             await gauge.check()
             await gauge.close()
 
 
 async def test_the_frames_are_those_of_the_specification_and_in_the_trace():
-    with bench() as cell:
-        await cell.gauges[0].open()
-        await cell.gauges[0].close()
-        frames = [entry.data for entry in cell.trace.entries()]
+    async with bench() as made:
+        await made.gauges["x"].open()
+        await made.gauges["x"].close()
+        frames = [entry.data for entry in made.trace.entries()]
         request = bytes.fromhex("07 04 00 64 00 02")
         answer = bytes.fromhex("07 04 04 00 00 03 e8")
         assert frames[0] == request + crc(request)
@@ -109,31 +80,33 @@ async def test_the_frames_are_those_of_the_specification_and_in_the_trace():
     ],
 )
 async def test_numbers_are_what_the_cell_file_says(modbus):
-    with bench(**modbus) as cell:
-        cell.balls["x"] = -1.5
-        await cell.gauges[0].open()
-        assert (await cell.gauges[0].read()).value_mm == pytest.approx(-1.5)
-        await cell.gauges[0].close()
+    async with bench(**modbus) as made:
+        made.balls["x"] = -1.5
+        await made.gauges["x"].open()
+        assert (await made.gauges["x"].read()).value_mm == pytest.approx(-1.5)
+        await made.gauges["x"].close()
 
 
 async def test_a_register_that_is_not_there_is_told():
     message = r"device 7 answers exception 2 \(illegal data address\)"
-    with bench() as cell, pytest.raises(DeviceError, match=message):
-        await cell.driver(register=999).open()
+    async with bench() as made:
+        with pytest.raises(DeviceError, match=message):
+            await other(made, register=999).open()
 
 
 async def test_a_device_that_is_not_there_is_silent():
-    with bench() as cell, pytest.raises(GaugeSilent, match="gauge x: does not answer within"):
-        await cell.driver(device=99).open()
+    async with bench() as made:
+        with pytest.raises(GaugeSilent, match="gauge x: does not answer within"):
+            await other(made, device=99).open()
 
 
 async def test_a_number_that_means_an_end_is_told():
-    with bench(at_end=(0x7FFFFFFF,)) as cell:
-        await cell.gauges[0].open()
-        cell.bank.faults("x")["at its end"](on=True)
+    async with bench(at_end=(0x7FFFFFFF,)) as made:
+        await made.gauges["x"].open()
+        made.rack.faults("x")["at its end"](on=True)
         with pytest.raises(GaugeAtEnd, match="gauge x: shows 2147483647, as at an end"):
-            await cell.gauges[0].read()
-        await cell.gauges[0].close()
+            await made.gauges["x"].read()
+        await made.gauges["x"].close()
 
 
 @given(st.integers(-(2**31), 2**31 - 1), st.sampled_from(["big", "little"]))
@@ -162,8 +135,9 @@ async def test_a_line_that_is_not_there_is_told():
 
 async def test_without_the_extra_the_command_that_installs_it_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "pymodbus", None)
-    with bench() as cell, pytest.raises(UsageError, match=r"Type: pip install 'hexacell\[modbus\]'"):
-        await cell.gauges[0].open()
+    async with bench() as made:
+        with pytest.raises(UsageError, match=r"Type: pip install 'hexacell\[modbus\]'"):
+            await made.gauges["x"].open()
 
 
 def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file():

@@ -1,59 +1,40 @@
 """Simulated instruments answer byte for byte as their manuals say."""
 
+from __future__ import annotations
+
+from typing import Any
+
 import pytest
 
 from drivers.simulated.gauges.indicators import Cdi, Mux10, Sylvac
-from drivers.simulated.gauges.instruments import Indicator
+from drivers.simulated.gauges.instruments import Indicator, Instrument
 
 
 class Ball:
     """A plunger position that tests change."""
 
-    def __init__(self, position):
-        self.position = position
+    position = 2.138
 
-    def __call__(self):
+    def __call__(self) -> float:
         return self.position
 
 
 @pytest.fixture
-def ball():
-    return Ball(2.138)
+def ball() -> Ball:
+    return Ball()
 
 
 @pytest.fixture
-def indicator(ball):
+def indicator(ball: Ball) -> Indicator:
     return Indicator(ball, travel_mm=12.5)
 
 
-@pytest.fixture
-def sylvac(indicator):
-    return Sylvac({1: indicator})
-
-
-@pytest.fixture
-def mux10(indicator):
-    return Mux10({2: indicator})
-
-
-@pytest.fixture
-def cdi(indicator):
-    return Cdi({1: indicator})
-
-
-# The instrument
-
-
-@pytest.mark.parametrize("position", [6.25, -6.25, 0.0])
-def test_a_position_within_the_travel_is_shown(indicator, ball, position):
+@pytest.mark.parametrize(
+    ("position", "shown"), [(6.25, 6.25), (-6.25, -6.25), (0.0, 0.0), (6.26, None), (-6.26, None)]
+)
+def test_a_position_within_the_travel_is_shown(indicator, ball, position, shown):
     ball.position = position
-    assert indicator.shown() == position
-
-
-@pytest.mark.parametrize("position", [6.26, -6.26, 1000.0])
-def test_a_position_outside_the_travel_is_not_shown(indicator, ball, position):
-    ball.position = position
-    assert indicator.shown() is None
+    assert indicator.shown() == shown
 
 
 def test_a_held_value_is_shown_even_outside_the_travel(indicator, ball):
@@ -84,110 +65,58 @@ def test_switching_on_again_loses_zero_and_hold(indicator, ball):
     assert indicator.shown() == pytest.approx(1.0)
 
 
-# Sylvac
+INCH, OFF, AT_END = {"inch": True}, {"powered": False}, {"is_at_end": True}
+ANSWERS: list[tuple[type[Instrument], dict[str, Any], bytes, bytes]] = [
+    (Sylvac, {}, b"?", b"+2.138\r"),
+    (Sylvac, {"off_middle_mm": -2.1384}, b"?", b"-0.000\r"),
+    (Sylvac, AT_END, b"?", b"ERR3\r"),
+    (Sylvac, OFF, b"?", b""),
+    (Sylvac, {}, b"PRI", b"+2.138\r"),
+    (Sylvac, {}, b"uni ?", b"MM\r"),
+    (Sylvac, INCH, b"UNI?", b"IN\r"),
+    (Sylvac, {}, b"ID?", b"SY276\r"),
+    (Sylvac, {}, b"MOD?", b"NOR\r"),
+    (Sylvac, {"peak_mm": 1.0}, b"MOD?", b"MAX\r"),
+    (Sylvac, {}, b"STO?", b"STO0\r"),
+    (Sylvac, {"held_mm": 1.0}, b"STO?", b"STO1\r"),
+    (Sylvac, {}, b"CHA?", b"CHA+\r"),
+    (Sylvac, {"reversed": True}, b"CHA?", b"CHA-\r"),
+    (Sylvac, {}, b"PRE?", b"PRE +0.000\r"),
+    (Sylvac, {}, b"BAT?", b"BAT1\r"),
+    (Sylvac, {"battery_low": True}, b"BAT?", b"BAT0\r"),
+    (Sylvac, {}, b"XYZ?", b"ERR1\r"),
+    (Sylvac, {}, b"", b"ERR1\r"),
+    (Sylvac, {}, b"\xff", b"ERR1\r"),
+    (Mux10, {}, b"1", b"01A+0002.138\r"),
+    (Mux10, INCH, b"1", b"01A+00.08417\r"),
+    (Mux10, AT_END, b"1", b"912\r"),
+    (Mux10, OFF, b"1", b"911\r"),
+    (Mux10, {}, b"2", b"911\r"),
+    (Mux10, {}, b"V", b"MUX-10F SIMULATED\r"),
+    (Mux10, {}, b"?", b""),
+    (Cdi, {}, b"R", b"+  2.1380, MM\r\n"),
+    (Cdi, {"reversed": True, "inch": True}, b"R", b"- 0.08417, IN\r\n"),
+    (Cdi, AT_END, b"R", b"OUT OF BOUNDS\r\n"),
+    (Cdi, {}, b"?p011", b"0\r\n"),
+    (Cdi, {"peak_mm": 1.0}, b"?p011", b"1\r\n"),
+    (Cdi, {}, b"?P013", b"2\r\n"),
+    (Cdi, INCH, b"?p013", b"1\r\n"),
+    (Cdi, {"reversed": True}, b"?p019", b"1\r\n"),
+    (Cdi, {"held_mm": 1.0}, b"?p021", b"1\r\n"),
+    (Cdi, {}, b"?p040", b"0\r\n"),
+    (Cdi, {}, b"?p999", b"NOT FOUND\r\n"),
+    (Cdi, {}, b"X", b"NOT FOUND\r\n"),
+]
 
 
-@pytest.mark.parametrize(
-    ("position", "answer"), [(2.138, b"+2.138\r"), (-0.0004, b"-0.000\r"), (99.0, b"ERR3\r")]
-)
-def test_sylvac_answers_with_its_value(sylvac, ball, position, answer):
-    ball.position = position
-    assert sylvac.answer(b"?") == answer
+@pytest.mark.parametrize(("instrument", "state", "question", "answer"), ANSWERS)
+def test_it_answers_as_its_manual_says(indicator, instrument, state, question, answer):
+    for name, value in state.items():
+        setattr(indicator, name, value)
+    assert instrument({1: indicator}).answer(question) == answer
 
 
-@pytest.mark.parametrize(
-    ("question", "answer"),
-    [
-        (b"PRI", b"+2.138\r"),
-        (b"UNI?", b"MM\r"),
-        (b"uni ?", b"MM\r"),
-        (b"ID?", b"SY276\r"),
-        (b"MOD?", b"NOR\r"),
-        (b"STO?", b"STO0\r"),
-        (b"CHA?", b"CHA+\r"),
-        (b"PRE?", b"PRE +0.000\r"),
-        (b"BAT?", b"BAT1\r"),
-        (b"XYZ?", b"ERR1\r"),
-        (b"XYZ", b"ERR1\r"),
-        (b"", b"ERR1\r"),
-        (b"\xff", b"ERR1\r"),
-    ],
-)
-def test_sylvac_answers_questions(sylvac, question, answer):
-    assert sylvac.answer(question) == answer
-
-
-def test_sylvac_reports_its_settings(sylvac, indicator):
-    indicator.battery_low = indicator.inch = indicator.reversed = True
-    indicator.set_hold(on=True)
-    indicator.set_peak(on=True)
-    answers = [sylvac.answer(question) for question in (b"BAT?", b"UNI?", b"CHA?", b"STO?", b"MOD?")]
-    assert answers == [b"BAT0\r", b"IN\r", b"CHA-\r", b"STO1\r", b"MAX\r"]
-    indicator.powered = False
-    assert sylvac.answer(b"?") == b""
-
-
-# MUX-10
-
-
-@pytest.mark.parametrize(
-    ("command", "answer"),
-    [
-        (b"2", b"02A+0002.138\r"),
-        (b"1", b"911\r"),
-        (b"V", b"MUX-10F SIMULATED\r"),
-        (b"?", b""),
-        (b"", b""),
-    ],
-)
-def test_mux10_answers(mux10, command, answer):
-    assert mux10.answer(command) == answer
-
-
-def test_mux10_reports_errors_units_and_absent_gauges(mux10, ball, indicator):
-    indicator.inch = True
-    assert mux10.answer(b"2") == b"02A+00.08417\r"
-    ball.position = -99.0
-    assert mux10.answer(b"2") == b"912\r"
-    indicator.powered = False
-    assert mux10.answer(b"2") == b"911\r"
-
-
-def test_mux10_is_busy_for_the_number_of_requests_that_is_set(mux10):
+def test_a_multiplexer_is_busy_for_the_number_of_requests_that_is_set(indicator):
+    mux10 = Mux10({1: indicator})
     mux10.busy = 2
-    assert [mux10.answer(b"2") for _ in range(3)] == [b"918\r", b"918\r", b"02A+0002.138\r"]
-
-
-# CDI
-
-
-def test_cdi_answers_with_value_and_unit(cdi, ball, indicator):
-    assert cdi.answer(b"R") == b"+  2.1380, MM\r\n"
-    ball.position = -2.138
-    assert cdi.answer(b"R") == b"-  2.1380, MM\r\n"
-    indicator.inch = True
-    assert cdi.answer(b"R") == b"- 0.08417, IN\r\n"
-    ball.position = 99.0
-    assert cdi.answer(b"R") == b"OUT OF BOUNDS\r\n"
-
-
-@pytest.mark.parametrize(
-    ("command", "answer"),
-    [
-        (b"?p011", b"0\r\n"),
-        (b"?P013", b"2\r\n"),
-        (b"?p999", b"NOT FOUND\r\n"),
-        (b"X", b"NOT FOUND\r\n"),
-        (b"r", b"NOT FOUND\r\n"),
-    ],
-)
-def test_cdi_answers_for_parameters(cdi, command, answer):
-    assert cdi.answer(command) == answer
-
-
-def test_cdi_reports_its_settings(cdi, indicator):
-    indicator.inch = indicator.reversed = True
-    indicator.set_hold(on=True)
-    indicator.set_peak(on=True)
-    answers = [cdi.answer(b"?p%03d" % number) for number in (11, 13, 19, 21, 40)]
-    assert answers == [b"1\r\n", b"1\r\n", b"1\r\n", b"1\r\n", b"0\r\n"]
+    assert [mux10.answer(b"1") for _ in range(3)] == [b"918\r", b"918\r", b"01A+0002.138\r"]

@@ -21,6 +21,7 @@ from drivers.simulated.gauges.bank import SimulatedGaugeBank, instrument_class
 from drivers.simulated.gauges.instruments import Indicator
 from drivers.simulated.gauges.server import GaugeLineServer
 from drivers.simulated.serial_line import PtyLine, SocketLine
+from drivers.wire_trace import WireTrace
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
@@ -80,9 +81,12 @@ LONG_S = 100.0
 
 
 class Cell:
-    """Three gauges x, y, z that see balls at 1, 2 and 3 mm, and drivers for them."""
+    """Three gauges x, y, z that see balls at 1, 2 and 3 mm, and drivers for them.
 
-    def __init__(self, protocols, transport="pty", timeout_s=LONG_S, **simulation):
+    ``stated``: what the cell file says of one, by its protocol and number.
+    """
+
+    def __init__(self, protocols, transport="pty", timeout_s=LONG_S, stated=described, **simulation):
         self.balls = {"x": 1.0, "y": 2.0, "z": 3.0}
         settings = [
             GaugeSettings(
@@ -92,14 +96,15 @@ class Cell:
                 channel=number,
                 timeout_s=timeout_s,
                 delay_s=STREAM_DELAY_S,
-                **described(protocol, number),
+                **stated(protocol, number),
             )
             for number, (name, protocol) in enumerate(zip("xyz", protocols, strict=True), start=1)
         ]
         plungers = {name: lambda name=name: self.balls[name] for name in "xyz"}
         simulated = SimulatedGauges(transport=transport, **simulation)
         self.rack = SimulatedGaugeBank(settings, plungers, simulated, CellClock(FAST))
-        self.links = SharedSerialPorts(worst_latency_s=WORST_LATENCY_S)
+        self.trace = WireTrace()
+        self.links = SharedSerialPorts(trace=self.trace, worst_latency_s=WORST_LATENCY_S)
         self.gauges = {
             each.name: (DRIVERS | MORE_DRIVERS)[each.protocol](each, self.links)
             for each in self.rack.gauges

@@ -1,3 +1,5 @@
+"""Protects what a wire trace keeps of an exchange, and how much memory it may take."""
+
 import tracemalloc
 
 import pytest

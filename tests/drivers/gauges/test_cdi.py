@@ -25,9 +25,7 @@ def opening(value=VALUE, **answers):
 
 @pytest.fixture
 async def gauge(links, settings):
-    gauge = CdiGauge(settings("cdi"), links)
-    yield gauge
-    await gauge.close()
+    return CdiGauge(settings("cdi"), links)
 
 
 @pytest.fixture

@@ -66,7 +66,6 @@ async def test_it_is_asked_and_read(dialogue, links, settings, instrument, chann
     reading = await gauge.read()
     assert reading == GaugeReading(value, reading.raw)
     assert reading.raw in frame.decode()
-    await gauge.close()
 
 
 @pytest.mark.parametrize(("instrument", "channel", "frame", "error", "message"), FAULTS)
@@ -82,7 +81,6 @@ async def test_what_is_no_value_is_told(
     with pytest.raises(error, match=message):
         await gauge.read()
     dialogue.expected.clear()
-    await gauge.close()
 
 
 async def test_the_line_of_a_display_has_seven_bits_and_a_parity(dialogue, links, settings):
@@ -95,7 +93,6 @@ async def test_the_line_of_a_display_has_seven_bits_and_a_parity(dialogue, links
         "E",
         2,
     ]
-    await gauge.close()
 
 
 @pytest.mark.parametrize(("factory", "protocol", "question"), ALL)

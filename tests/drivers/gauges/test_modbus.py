@@ -55,7 +55,6 @@ async def test_three_gauges_on_one_line_are_read_at_once(transport):
         assert readings[0].raw == "0000 03e8 = 1000"
         for gauge in made.gauges.values():
             await gauge.check()
-            await gauge.close()
 
 
 async def test_the_frames_are_those_of_the_specification_and_in_the_trace():
@@ -84,7 +83,6 @@ async def test_numbers_are_what_the_cell_file_says(modbus):
         made.balls["x"] = -1.5
         await made.gauges["x"].open()
         assert (await made.gauges["x"].read()).value_mm == pytest.approx(-1.5)
-        await made.gauges["x"].close()
 
 
 async def test_a_register_that_is_not_there_is_told():
@@ -106,7 +104,6 @@ async def test_a_number_that_means_an_end_is_told():
         made.rack.faults("x")["at its end"](on=True)
         with pytest.raises(GaugeAtEnd, match="gauge x: shows 2147483647, as at an end"):
             await made.gauges["x"].read()
-        await made.gauges["x"].close()
 
 
 @given(st.integers(-(2**31), 2**31 - 1), st.sampled_from(["big", "little"]))

@@ -22,9 +22,7 @@ OPENING = ((b"2\r", VALUE), (b"V\r", b"MUX-10F 1.0\r"))
 
 @pytest.fixture
 async def gauge(links, settings):
-    gauge = Mux10Gauge(settings("mux10", channel=2), links)
-    yield gauge
-    await gauge.close()
+    return Mux10Gauge(settings("mux10", channel=2), links)
 
 
 @pytest.fixture
@@ -257,7 +255,6 @@ async def test_a_gauge_that_may_be_zeroed_at_either_end_shows_twice_its_travel(
             await gauge.read()
     else:
         assert (await gauge.read()).value_mm == 9.0
-    await gauge.close()
 
 
 async def test_values_may_be_anywhere_after_it_was_opened_again(dialogue, opened):
@@ -274,7 +271,6 @@ async def test_the_cell_file_says_which_readings_agree(dialogue, links, settings
     dialogue.expect(*OPENING, *((b"2\r", value) for value in values))
     await gauge.open()
     assert (await gauge.read()).value_mm == 0.128
-    await gauge.close()
 
 
 @pytest.mark.parametrize("damaged", [0, 1, 2])
@@ -289,7 +285,6 @@ async def test_damage_below_the_agreement_is_outvoted_by_a_third_reading(
     dialogue.expect(*OPENING, *((b"2\r", value) for value in needed))
     await gauge.open()
     assert (await gauge.read()).value_mm == 4.102
-    await gauge.close()
 
 
 async def test_a_line_lost_and_opened_again_voids_the_zero_of_every_gauge_on_it(dialogue, links, settings):
@@ -309,8 +304,6 @@ async def test_a_line_lost_and_opened_again_voids_the_zero_of_every_gauge_on_it(
     dialogue.expect(second, OPENING[1], second, second)
     await two.open()
     assert (await two.read()).value_mm == 1.0
-    await one.close()
-    await two.close()
 
 
 # Glancing

@@ -35,9 +35,7 @@ def line(dialogue):
 
 @pytest.fixture
 async def gauge(links, settings):
-    gauge = StreamGauge(settings("stream", stream=CALIPER, delay_s=0.0), links)
-    yield gauge
-    await gauge.close()
+    return StreamGauge(settings("stream", stream=CALIPER, delay_s=0.0), links)
 
 
 async def test_it_is_understood_as_described(line, dialogue, gauge):
@@ -56,8 +54,6 @@ async def test_gauges_on_one_port_are_told_apart_by_their_channel(line, links, s
     for gauge in gauges:
         await gauge.open()
     assert [(await gauge.read()).value_mm for gauge in gauges] == [1.0, -2.0]
-    for gauge in gauges:
-        await gauge.close()
 
 
 async def test_without_a_channel_it_has_the_port_alone(line, gauge, links, settings):

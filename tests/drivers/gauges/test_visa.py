@@ -43,7 +43,6 @@ async def test_three_inputs_of_one_instrument_are_read_at_once(transport):
         assert str(made.gauges["x"].settings.port).startswith("TCPIP" if transport == "socket" else "ASRL")
         for gauge in made.gauges.values():
             await gauge.check()
-            await gauge.close()
 
 
 async def test_another_setting_than_expected_is_told_at_opening_and_afterwards():
@@ -64,7 +63,6 @@ async def test_numbers_are_compared_as_numbers():
     async with bench() as made:
         answers(made, {b"AVER?": b"+4.00000E+00\n"})
         await made.gauges["x"].open()
-        await made.gauges["x"].close()
 
 
 async def test_another_instrument_voids_the_zero():
@@ -73,7 +71,6 @@ async def test_another_instrument_voids_the_zero():
         answers(made, {b"*IDN?": b"HEXACELL,SIMULATED,1,1\n"})
         with pytest.raises(ZeroVoid, match="identification"):
             await made.gauges["x"].check()
-        await made.gauges["x"].close()
 
 
 @pytest.mark.parametrize(
@@ -95,7 +92,6 @@ async def test_what_is_no_value_is_told(answer, error, message):
             await made.gauges["x"].read()
         answers(made, {})
         assert (await made.gauges["x"].read()).value_mm == pytest.approx(1.0)
-        await made.gauges["x"].close()
 
 
 async def test_a_resource_that_is_not_there_is_told():

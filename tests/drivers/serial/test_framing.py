@@ -1,3 +1,5 @@
+"""Protects how bytes of a serial line are cut into frames."""
+
 from hypothesis import given
 from hypothesis import strategies as st
 

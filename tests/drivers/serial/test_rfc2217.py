@@ -99,12 +99,3 @@ async def test_a_connection_that_ends_is_a_lost_port(server: Server) -> None:
     with pytest.raises(PortLost, match="was lost"):
         await line.exchange(b"?\r", b"\r", LONG_S)
     await line.close()
-
-
-async def test_no_server_is_a_lost_port() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        url = f"rfc2217://127.0.0.1:{free.getsockname()[1]}"
-    line = SharedSerialPort(url, {})
-    with pytest.raises(PortLost, match="cannot be opened"):
-        await line.open()
-    await line.close()

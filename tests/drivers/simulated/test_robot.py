@@ -25,13 +25,6 @@ def rewrite(twin: Any, geometry: Geometry) -> None:
     twin.config.write_text(NativeToml(HEXAGLIDE_PARAMETERS).rewrite(text, geometry))
 
 
-def test_a_move_ends_at_its_target(twin) -> None:
-    twin.machine.move(TILTED)
-    assert twin.machine.pose().as_tuple() == pytest.approx(TILTED.as_tuple(), abs=1e-9)
-    assert twin.machine.joints() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
-    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
-
-
 def test_a_move_lasts_until_the_sliders_stand(make_twin) -> None:
     twin = make_twin(motion__minimum_s=2.5)
     begun = twin.clock.now()

@@ -4,7 +4,7 @@ import pytest
 import serial
 
 from drivers.serial.shared_port import SharedSerialPorts
-from tests.drivers.serial.shared_port.fake_port import WORST_LATENCY_S
+from tests.drivers.serial.shared_port.fake_port import LINKS, WORST_LATENCY_S
 
 
 @pytest.fixture
@@ -22,6 +22,13 @@ def fake(monkeypatch):
         return port
 
     return install
+
+
+@pytest.fixture(autouse=True)
+async def closed_links():
+    yield
+    while LINKS:
+        await LINKS.pop().close()
 
 
 @pytest.fixture

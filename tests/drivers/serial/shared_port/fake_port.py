@@ -60,8 +60,17 @@ class FakePort:
             raise self.broken
 
 
+LINKS: list[SharedSerialPort] = []
+"""What was opened and is closed with the test."""
+
+
+def link_to(url="fake", settings=None, **options):
+    LINKS.append(SharedSerialPort(url, settings or {}, **options))
+    return LINKS[-1]
+
+
 async def opened(url="fake", **settings):
-    link = SharedSerialPort(url, settings, worst_latency_s=WORST_LATENCY_S)
+    link = link_to(url, settings, worst_latency_s=WORST_LATENCY_S)
     await link.open()
     return link
 

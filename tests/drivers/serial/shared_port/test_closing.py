@@ -6,9 +6,8 @@ import threading
 import pytest
 
 from drivers.serial.request_port import NoAnswer
-from drivers.serial.shared_port import SharedSerialPort
 from hexacell.errors import DeviceError
-from tests.drivers.serial.shared_port.fake_port import FOREVER_S, SOON_S, FakePort, opened, written
+from tests.drivers.serial.shared_port.fake_port import FOREVER_S, SOON_S, FakePort, link_to, opened, written
 from tests.waiting import until
 
 
@@ -24,7 +23,6 @@ async def test_a_cancelled_exchange_leaves_the_port_synchronized(fake):
     answering.set()
     assert await link.exchange(b"2\r", b"\r", FOREVER_S) == b"to 2\r"
     assert link.take_unsolicited() == b""
-    await link.close()
 
 
 async def test_an_exchange_cancelled_before_its_turn_sends_nothing(fake):
@@ -40,7 +38,6 @@ async def test_an_exchange_cancelled_before_its_turn_sends_nothing(fake):
     assert await first == b"to 1\r"
     assert await link.exchange(b"3\r", b"\r", FOREVER_S) == b"to 3\r"
     assert port.asked == [b"1\r", b"3\r"]
-    await link.close()
 
 
 async def test_closing_does_not_wait_for_an_answer(fake):
@@ -56,7 +53,7 @@ async def test_closing_does_not_wait_for_an_answer(fake):
 
 async def test_closing_does_not_wait_for_silence(fake):
     fake(FakePort(lambda _: []))
-    link = SharedSerialPort("fake", {}, worst_latency_s=FOREVER_S)
+    link = link_to("fake", {}, worst_latency_s=FOREVER_S)
     await link.open()
     with pytest.raises(NoAnswer):
         await link.exchange(b"?\r", b"\r", SOON_S)

@@ -5,10 +5,16 @@ import serial
 
 from drivers.serial.framing import FRAME_LIMIT
 from drivers.serial.request_port import NoAnswer
-from drivers.serial.shared_port import SharedSerialPort
 from drivers.wire_trace import TrafficDirection, WireTrace
 from hexacell.errors import DeviceError
-from tests.drivers.serial.shared_port.fake_port import LONG_S, SOON_S, WORST_LATENCY_S, FakePort, opened
+from tests.drivers.serial.shared_port.fake_port import (
+    LONG_S,
+    SOON_S,
+    WORST_LATENCY_S,
+    FakePort,
+    link_to,
+    opened,
+)
 
 
 async def test_an_answer_is_complete_and_read_by_one_thread(fake):
@@ -27,7 +33,6 @@ async def test_received_bytes_are_reported_if_there_is_no_answer(fake):
     with pytest.raises(NoAnswer) as caught:
         await link.exchange(b"?\r", b"\r", SOON_S)
     assert caught.value.received == b"+1.2"
-    await link.close()
 
 
 @pytest.mark.parametrize("sent", [True, False])
@@ -49,7 +54,6 @@ async def test_a_write_that_took_too_long_is_judged_by_its_answer(fake, sent):
         with pytest.raises(NoAnswer):
             await link.exchange(b"?\r", b"\r", SOON_S)
     assert port.is_open
-    await link.close()
 
 
 async def test_a_late_answer_is_never_taken_for_that_to_the_next_request(fake):
@@ -61,7 +65,6 @@ async def test_a_late_answer_is_never_taken_for_that_to_the_next_request(fake):
     assert await link.exchange(b"2\r", b"\r", LONG_S) == b"second\r"
     assert link.take_unsolicited() == b"late\r"
     assert await link.exchange(b"3\r", b"\r", LONG_S) == b"third\r"
-    await link.close()
 
 
 async def test_nothing_is_sent_until_no_late_answer_can_come(fake):
@@ -72,7 +75,6 @@ async def test_nothing_is_sent_until_no_late_answer_can_come(fake):
     await link.exchange(b"2\r", b"\r", LONG_S)
     assert port.asked == [b"1\r", b"2\r"]
     assert port.asked_at_s[1] - port.asked_at_s[0] >= WORST_LATENCY_S
-    await link.close()
 
 
 async def test_unsolicited_bytes_are_kept_apart(fake):
@@ -82,7 +84,6 @@ async def test_unsolicited_bytes_are_kept_apart(fake):
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"answer\r"
     assert link.take_unsolicited() == b"SY276.1\rmore\r"
     assert link.take_unsolicited() == b""
-    await link.close()
 
 
 async def test_a_second_frame_after_the_answer_does_not_answer_the_next_request(fake):
@@ -92,7 +93,6 @@ async def test_a_second_frame_after_the_answer_does_not_answer_the_next_request(
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"one\r"
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"two\r"
     assert link.take_unsolicited() == b"key\r"
-    await link.close()
 
 
 async def test_silence_is_awaited_after_a_garbled_frame(fake):
@@ -102,7 +102,6 @@ async def test_silence_is_awaited_after_a_garbled_frame(fake):
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"gar\r"
     link.require_silence()
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"two\r"
-    await link.close()
 
 
 async def test_bytes_without_a_terminator_are_limited(fake):
@@ -111,7 +110,6 @@ async def test_bytes_without_a_terminator_are_limited(fake):
     with pytest.raises(NoAnswer) as caught:
         await link.exchange(b"?\r", b"\r", LONG_S)
     assert len(caught.value.received) == FRAME_LIMIT + 1
-    await link.close()
 
 
 async def test_a_device_that_never_falls_silent_is_refused(fake):
@@ -121,7 +119,6 @@ async def test_a_device_that_never_falls_silent_is_refused(fake):
     with pytest.raises(DeviceError, match="keeps sending unasked"):
         await link.exchange(b"?\r", b"\r", LONG_S)
     assert port.asked == []
-    await link.close()
 
 
 async def test_the_echo_alone_is_no_answer():
@@ -129,13 +126,12 @@ async def test_the_echo_alone_is_no_answer():
     with pytest.raises(NoAnswer) as caught:
         await link.exchange(b"?\r", b"\r", SOON_S)
     assert caught.value.received == b"?\r"
-    await link.close()
 
 
 async def test_every_byte_is_traced(fake):
     trace = WireTrace()
     fake(FakePort(lambda _: [(0.0, b"?\r+1.234\r")]))
-    link = SharedSerialPort("fake", {}, trace=trace)
+    link = link_to("fake", {}, trace=trace)
     await link.open()
     await link.exchange(b"?\r", b"\r", LONG_S)
     await link.close()

@@ -9,9 +9,8 @@ import serial
 
 from drivers.errors import PortLost
 from drivers.serial.opening import opening_errors
-from drivers.serial.shared_port import SharedSerialPort
 from hexacell.errors import DeviceError, ExitCode
-from tests.drivers.serial.shared_port.fake_port import LONG_S, FakePort, opened
+from tests.drivers.serial.shared_port.fake_port import LONG_S, FakePort, link_to, opened
 
 
 async def test_an_absent_port_is_reported_with_the_gauge_and_an_action(links):
@@ -21,13 +20,6 @@ async def test_an_absent_port_is_reported_with_the_gauge_and_an_action(links):
     text = "gauge x: port /dev/absent-port is absent. Plug it in or correct port in the cell file"
     assert str(caught.value) == text
     assert caught.value.exit_code is ExitCode.HARDWARE
-
-
-async def test_a_refused_connection_is_reported():
-    link = SharedSerialPort("socket://127.0.0.1:1", {})
-    with pytest.raises(DeviceError, match="cannot be opened"):
-        await link.open()
-    await link.close()
 
 
 @pytest.mark.parametrize(
@@ -49,7 +41,7 @@ def test_the_cause_is_reported_in_words(number, words):
 async def test_a_port_in_use_is_reported():
     near, far = os.openpty()
     url = os.ttyname(far)
-    one, two = await opened(url, exclusive=True), SharedSerialPort(url, {"exclusive": True})
+    one, two = await opened(url, exclusive=True), link_to(url, {"exclusive": True})
     with pytest.raises(DeviceError, match="is in use"):
         await two.open()
     await one.close()
@@ -62,7 +54,7 @@ async def test_a_terminal_marks_bytes_of_wrong_parity_and_opens_again():
     """Of a pseudo-terminal that refuses a second opening with parity, see pyserial's issue 196."""
     near, far = os.openpty()
     for _ in range(2):
-        link = SharedSerialPort(os.ttyname(far), {"bytesize": 7, "parity": "E", "stopbits": 2})
+        link = link_to(os.ttyname(far), {"bytesize": 7, "parity": "E", "stopbits": 2})
         await link.open()
         flags = termios.tcgetattr(far)[0]
         assert flags & termios.INPCK
@@ -80,10 +72,9 @@ async def test_a_pseudo_terminal_that_refuses_parity_is_reported(fake):
         raise termios.error(errno.EINVAL, "Invalid argument")
 
     port.open = refuse
-    link = SharedSerialPort("fake", {"bytesize": 7, "parity": "E", "stopbits": 2})
+    link = link_to("fake", {"bytesize": 7, "parity": "E", "stopbits": 2})
     with pytest.raises(DeviceError, match="cannot be opened"):
         await link.open()
-    await link.close()
 
 
 @pytest.mark.parametrize(
@@ -109,7 +100,6 @@ async def test_a_port_that_breaks_is_lost_until_it_is_opened_again(fake, broken)
     assert link.line.open_count == 1
     assert await link.open() == 2
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
-    await link.close()
 
 
 async def test_opening_an_open_port_is_no_new_session(fake):
@@ -118,7 +108,6 @@ async def test_opening_an_open_port_is_no_new_session(fake):
     port.due = [(0.0, b"SY276.1\r")]
     assert await link.open() == 1
     assert link.take_unsolicited() == b"SY276.1\r"
-    await link.close()
 
 
 async def test_opening_detects_that_an_open_port_has_been_lost(fake):
@@ -134,4 +123,3 @@ async def test_opening_detects_that_an_open_port_has_been_lost(fake):
     port.close = replug
     assert await link.open() == 2
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
-    await link.close()

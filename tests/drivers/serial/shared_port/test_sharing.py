@@ -8,13 +8,12 @@ from tests.drivers.serial.shared_port.fake_port import FakePort, opened
 
 async def test_settings_reach_pyserial_unchanged(fake):
     port = fake(FakePort())
-    link = await opened("any://url?x=1", baudrate=4800, parity="E", xonxoff=True, timeout=99, rts=False)
+    await opened("any://url?x=1", baudrate=4800, parity="E", xonxoff=True, timeout=99, rts=False)
     assert port.url == "any://url?x=1"
     assert port.settings == {"baudrate": 4800, "parity": "E", "xonxoff": True, "timeout": 99}
     assert port.rts is False
     assert port.timeout <= 0.2
     assert port.write_timeout <= 0.2
-    await link.close()
 
 
 @pytest.mark.parametrize(

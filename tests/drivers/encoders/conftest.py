@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import uuid
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -146,15 +146,31 @@ def settings(raw: RawBus) -> LinearEncoderSettings:
 
 
 @pytest.fixture
-async def bank(settings: LinearEncoderSettings) -> AsyncIterator[Cia406Bank]:
-    bank = Cia406Bank(settings)
-    yield bank
-    await bank.close()
+async def make_bank(settings: LinearEncoderSettings) -> AsyncIterator[Callable[..., Cia406Bank]]:
+    """A bank with other settings than these."""
+    made = []
+
+    def make(trace: Any = None, **changes: Any) -> Cia406Bank:
+        made.append(Cia406Bank(settings.model_copy(update=changes), trace=trace))
+        return made[-1]
+
+    yield make
+    for bank in made:
+        await bank.close()
 
 
 @pytest.fixture
-async def short_timeout_bank(settings: LinearEncoderSettings) -> AsyncIterator[Cia406Bank]:
+def bank(make_bank: Callable[..., Cia406Bank]) -> Cia406Bank:
+    return make_bank()
+
+
+@pytest.fixture
+async def opened(bank: Cia406Bank) -> Cia406Bank:
+    await bank.open()
+    return bank
+
+
+@pytest.fixture
+def short_timeout_bank(make_bank: Callable[..., Cia406Bank]) -> Cia406Bank:
     """A bank for tests in which a node is silent."""
-    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 1.0}))
-    yield bank
-    await bank.close()
+    return make_bank(timeout_s=1.0)

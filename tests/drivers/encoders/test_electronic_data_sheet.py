@@ -10,7 +10,6 @@ from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.electronic_data_sheet import read_data_sheet
 from drivers.encoders.object_dictionary import DEVICE_TYPE, PRESET, PRODUCT, VENDOR
 from hexacell.errors import DeviceError, FileError
@@ -105,16 +104,15 @@ def test_names_may_be_in_any_encoding(sheet) -> None:
     assert read_data_sheet(path).values[VENDOR] == 0x99
 
 
-async def test_devices_that_are_as_delivered_have_no_remark(raw, settings, sheet) -> None:
-    bank = Cia406Bank(settings.model_copy(update={"eds": str(sheet())}))
+async def test_devices_that_are_as_delivered_have_no_remark(raw, make_bank, sheet) -> None:
+    bank = make_bank(eds=str(sheet()))
     assert {identity.remark for identity in await bank.open()} == {""}
-    await bank.close()
 
 
-async def test_a_setting_that_was_changed_is_told_beside_a_warning(raw, settings, sheet) -> None:
+async def test_a_setting_that_was_changed_is_told_beside_a_warning(raw, make_bank, sheet) -> None:
     raw.nodes[3].objects[0x6000, 0] = b"\x08\0"
     raw.nodes[3].objects[0x6505, 0] = b"\x04\0"
-    bank = Cia406Bank(settings.model_copy(update={"eds": str(sheet())}))
+    bank = make_bank(eds=str(sheet()))
     remarks = [identity.remark for identity in await bank.open()]
     await bank.close()
     assert remarks[2] == (
@@ -130,15 +128,15 @@ async def test_a_setting_that_was_changed_is_told_beside_a_warning(raw, settings
         ({"kind": "0x000A0196"}, "its device type is 0x80196, the file says 0xA0196"),
     ],
 )
-async def test_another_device_is_refused_by_its_leg(raw, settings, sheet, file, told) -> None:
-    bank = Cia406Bank(settings.model_copy(update={"eds": str(sheet(**file))}))
+async def test_another_device_is_refused_by_its_leg(raw, make_bank, sheet, file, told) -> None:
+    bank = make_bank(eds=str(sheet(**file)))
     with pytest.raises(DeviceError, match=f"is not the device of encoder.eds: {told}") as refused:
         await bank.open()
     assert refused.value.subject == "encoder of leg 1 (node 1)"
 
 
-async def test_a_file_that_is_not_there_is_named(settings, tmp_path: Path) -> None:
-    bank = Cia406Bank(settings.model_copy(update={"eds": str(tmp_path / "none.eds")}))
+async def test_a_file_that_is_not_there_is_named(make_bank, tmp_path: Path) -> None:
+    bank = make_bank(eds=str(tmp_path / "none.eds"))
     with pytest.raises(FileError, match=r"none.eds: cannot be read: No such file"):
         await bank.open()
 

@@ -19,18 +19,17 @@ CLEARED = bytes(8)
 PERIOD_S = 0.02
 
 
-async def test_an_emergency_makes_samples_invalid_until_it_is_cleared(raw, bank):
-    await bank.open()
+async def test_an_emergency_makes_samples_invalid_until_it_is_cleared(raw, opened):
     raw.send(0x83, NO_MAGNET)
-    await raw.delivered_to(bank)
+    await raw.delivered_to(opened)
     for _ in range(2):
         with pytest.raises(
             InvalidSampleError, match=r"leg 3 \(node 3\): reports emergency FF00 \(no magnet"
         ):
-            await bank.read()
+            await opened.read()
     raw.send(0x83, CLEARED)
-    await raw.delivered_to(bank)
-    await bank.read()
+    await raw.delivered_to(opened)
+    await opened.read()
 
 
 @pytest.mark.parametrize(
@@ -43,24 +42,21 @@ async def test_an_emergency_makes_samples_invalid_until_it_is_cleared(raw, bank)
         ("", "emergency FFFF"),
     ],
 )
-async def test_an_emergency_that_is_no_complete_reset_is_an_error(raw, bank, data, words):
-    await bank.open()
+async def test_an_emergency_that_is_no_complete_reset_is_an_error(raw, opened, data, words):
     raw.send(0x81, bytes.fromhex(data))
-    await raw.delivered_to(bank)
+    await raw.delivered_to(opened)
     with pytest.raises(InvalidSampleError, match=rf"leg 1 .*{words}"):
-        await bank.read()
+        await opened.read()
 
 
-async def test_an_emergency_during_a_sample_makes_it_invalid(raw, bank):
-    await bank.open()
-
+async def test_an_emergency_during_a_sample_makes_it_invalid(raw, opened):
     def report_then_answer(_sync):
         raw.send(0x86, NO_MAGNET)
         return [bytes(4)]
 
     raw.nodes[6].answers_sync = report_then_answer
     with pytest.raises(InvalidSampleError, match=r"leg 6"):
-        await bank.read()
+        await opened.read()
 
 
 async def test_the_alarms_are_read_after_an_emergency(raw, bank, monkeypatch):
@@ -94,24 +90,22 @@ async def test_alarms_without_an_emergency_are_found(raw, bank, alarms_read_alwa
         await bank.read()
 
 
-async def test_a_boot_up_voids_the_set_until_opened_again(raw, bank):
-    await bank.open()
+async def test_a_boot_up_voids_the_set_until_opened_again(raw, opened):
     raw.send(0x702, b"\x00")
-    await raw.delivered_to(bank)
+    await raw.delivered_to(opened)
     for _ in range(2):
         with pytest.raises(RestartedNodeError, match=r"leg 2 \(node 2\).*the set is void"):
-            await bank.read()
-    await bank.open()
-    await bank.read()
+            await opened.read()
+    await opened.open()
+    await opened.read()
 
 
-async def test_a_boot_up_ends_a_waiting_sample(raw, settings):
-    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 10.0}))
+async def test_a_boot_up_ends_a_waiting_sample(raw, make_bank):
+    bank = make_bank(timeout_s=10.0)
     await bank.open()
     raw.nodes[2].answers_sync = lambda _: raw.send(0x702, b"\x00") or []
     with pytest.raises(RestartedNodeError):
         await bank.read()
-    await bank.close()
 
 
 async def test_a_boot_up_during_configuration_is_detected(raw, bank):
@@ -128,15 +122,14 @@ async def test_a_boot_up_during_configuration_is_detected(raw, bank):
 
 
 @pytest.mark.parametrize("state", [b"\x7f", b"\x04", b"\x00"])
-async def test_a_node_that_leaves_operational_has_lost_its_configuration(raw, bank, state):
-    await bank.open()
+async def test_a_node_that_leaves_operational_has_lost_its_configuration(raw, opened, state):
     raw.send(0x704, b"\x05")
-    await raw.delivered_to(bank)
-    await bank.read()
+    await raw.delivered_to(opened)
+    await opened.read()
     raw.send(0x704, state)
-    await raw.delivered_to(bank)
+    await raw.delivered_to(opened)
     with pytest.raises(RestartedNodeError, match=r"leg 4"):
-        await bank.read()
+        await opened.read()
 
 
 class Heartbeats:
@@ -167,10 +160,8 @@ def heartbeats(raw, monkeypatch):
 
 
 @pytest.fixture
-async def heartbeat_bank(settings):
-    bank = Cia406Bank(settings.model_copy(update={"heartbeat_ms": 20}))
-    yield bank
-    await bank.close()
+async def heartbeat_bank(make_bank):
+    return make_bank(heartbeat_ms=20)
 
 
 async def test_heartbeats_are_requested_and_their_loss_is_an_error(raw, heartbeat_bank, heartbeats):
@@ -212,27 +203,25 @@ async def test_a_warning_that_comes_during_a_run_makes_samples_invalid(raw, bank
         await bank.read()
 
 
-async def test_a_node_that_wants_another_sync_is_not_a_matter_of_magnets(raw, bank):
-    await bank.open()
+async def test_a_node_that_wants_another_sync_is_not_a_matter_of_magnets(raw, opened):
     raw.send(0x82, bytes.fromhex("4082110000000000"))
-    await raw.delivered_to(bank)
+    await raw.delivered_to(opened)
     with pytest.raises(InvalidSampleError, match="it expects another length of SYNC") as caught:
-        await bank.read()
+        await opened.read()
     assert "magnet" not in str(caught.value.action)
 
 
-async def test_many_error_frames_are_a_failed_bus(raw, bank):
-    await bank.open()
+async def test_many_error_frames_are_a_failed_bus(raw, opened):
     for _ in range(ERROR_FRAMES - 1):
         raw.send(0x20, bytes(8), is_error_frame=True)
-    await raw.delivered_to(bank)
-    await bank.read()
+    await raw.delivered_to(opened)
+    await opened.read()
     raw.send(0x20, bytes(8), is_error_frame=True)
-    await until(lambda: has_failed(bank))
+    await until(lambda: has_failed(opened))
     with pytest.raises(BusError, match=r"has failed: 20 error frames within 1 s.*termination"):
-        await bank.read()
-    await bank.open()
-    await bank.read()
+        await opened.read()
+    await opened.open()
+    await opened.read()
 
 
 def has_failed(bank: Cia406Bank) -> bool:

@@ -8,7 +8,6 @@ import threading
 import can
 import pytest
 
-from drivers.encoders.cia406 import Cia406Bank
 from drivers.errors import BusError
 from hexacell.errors import DeviceError
 from tests.drivers.short_timeout import short_timeout
@@ -31,16 +30,15 @@ async def test_no_thread_outlives_a_failed_open(raw, short_timeout_bank):
     assert set(threading.enumerate()) == before
 
 
-async def test_opening_again_configures_again(raw, bank):
-    await bank.open()
+async def test_opening_again_configures_again(raw, opened):
     raw.heard.clear()
-    await bank.open()
+    await opened.open()
     assert (0, b"\x01\x06") in raw.heard
-    assert (await bank.read()).counts[5] == 6000
+    assert (await opened.read()).counts[5] == 6000
 
 
-async def test_a_cancelled_read_returns_soon_and_the_next_one_is_right(raw, settings):
-    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 3600.0}))
+async def test_a_cancelled_read_returns_soon_and_the_next_one_is_right(raw, make_bank):
+    bank = make_bank(timeout_s=3600.0)
     await bank.open()
     release = threading.Event()
 
@@ -60,19 +58,17 @@ async def test_a_cancelled_read_returns_soon_and_the_next_one_is_right(raw, sett
     raw.nodes[1].answers_sync = lambda sync: [b"\x02\0\0\0"]
     release.set()
     assert (await bank.read()).counts == (2, 2000, 3000, 4000, 5000, 6000)
-    await bank.close()
 
 
-async def test_cancelling_at_any_moment_leaves_the_samples_synchronized(raw, bank):
-    await bank.open()
+async def test_cancelling_at_any_moment_leaves_the_samples_synchronized(raw, opened):
     for node in raw.nodes.values():
         node.answers_sync = lambda sync: [sync.to_bytes(4, "little")]
     for step in range(60):
-        reading = asyncio.ensure_future(bank.read())
+        reading = asyncio.ensure_future(opened.read())
         await asyncio.sleep(step * 0.00005)
         reading.cancel()
         await asyncio.gather(reading, return_exceptions=True)
-    found = await bank.read()
+    found = await opened.read()
     assert found.counts == (raw.syncs,) * 6
 
 
@@ -101,8 +97,8 @@ async def test_a_cancelled_open_leaves_nothing(raw, bank):
     await bank.open()
 
 
-async def test_closing_ends_reads_in_progress(raw, settings):
-    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 3600.0}))
+async def test_closing_ends_reads_in_progress(raw, make_bank):
+    bank = make_bank(timeout_s=3600.0)
     await bank.open()
     raw.nodes[1].answers_sync = lambda _: []
     readings = [asyncio.ensure_future(bank.read()) for _ in range(3)]
@@ -113,24 +109,21 @@ async def test_closing_ends_reads_in_progress(raw, settings):
 
 
 @pytest.mark.parametrize("where", ["recv", "send"])
-async def test_a_bus_that_fails_is_an_error_with_its_cause(raw, bank, monkeypatch, where):
-    await bank.open()
-
+async def test_a_bus_that_fails_is_an_error_with_its_cause(raw, opened, monkeypatch, where):
     def fail(*_args, **_kwargs):
         raise can.CanOperationError("adapter gone")
 
-    network = bank._session.bus.network
+    network = opened._session.bus.network
     monkeypatch.setattr(network.bus, where, fail)
     for _ in range(2):
         failed = pytest.raises(
             BusError, match=r"encoder bus virtual raw-.*adapter gone.*the set .* is void"
         )
-        with short_timeout(bank), failed:
-            await bank.read()
+        with short_timeout(opened), failed:
+            await opened.read()
 
 
-async def test_any_error_of_the_bus_is_reported(raw, bank, monkeypatch):
-    await bank.open()
-    monkeypatch.setattr(bank._session.bus.network.bus, "recv", lambda _timeout: 1 / 0)
+async def test_any_error_of_the_bus_is_reported(raw, opened, monkeypatch):
+    monkeypatch.setattr(opened._session.bus.network.bus, "recv", lambda _timeout: 1 / 0)
     with pytest.raises(BusError, match="division by zero"):
-        await bank.read()
+        await opened.read()

@@ -49,15 +49,14 @@ DIALOGUE_WITH_NODE_4 = """
 """
 
 
-async def test_the_dialogue_with_a_node_frame_by_frame(raw, settings):
-    bank = Cia406Bank(settings.model_copy(update={"heartbeat_ms": 250}))
+async def test_the_dialogue_with_a_node_frame_by_frame(raw, make_bank):
+    bank = make_bank(heartbeat_ms=250)
     await bank.open()
     await bank.close()
     assert raw.requests_to(4) == [line.split()[0] for line in DIALOGUE_WITH_NODE_4.strip().splitlines()]
 
 
-async def test_all_nodes_are_configured_before_any_is_started(raw, bank):
-    await bank.open()
+async def test_all_nodes_are_configured_before_any_is_started(raw, opened):
     commands = [data.hex() for can_id, data in raw.heard if can_id == 0]
     assert commands == [f"80{node:02x}" for node in range(1, 7)] + [f"01{node:02x}" for node in range(1, 7)]
     first_start = raw.heard.index((0, b"\x01\x01"))
@@ -100,10 +99,10 @@ def change(node, objects) -> None:
 
 
 @pytest.mark.parametrize(("objects", "error"), UNFIT)
-async def test_a_device_that_does_not_fit_is_refused_by_its_leg(raw, settings, objects, error):
+async def test_a_device_that_does_not_fit_is_refused_by_its_leg(raw, make_bank, objects, error):
     change(raw.nodes[5], objects)
     stated = tuple(500 + leg for leg in range(1, 7))
-    bank = Cia406Bank(settings.model_copy(update={"serial_numbers": stated}))
+    bank = make_bank(serial_numbers=stated)
     with pytest.raises(DeviceError, match=rf"leg 5 \(node 5\).*{error}"):
         await bank.open()
 
@@ -145,8 +144,8 @@ async def test_a_node_that_answers_wrongly_is_named(raw, bank, fault, error):
         await bank.open()
 
 
-async def test_legs_have_any_nodes_and_missing_ones_are_all_named(raw, settings):
-    bank = Cia406Bank(settings.model_copy(update={"nodes": (6, 5, 4, 3, 2, 1), "timeout_s": 1.0}))
+async def test_legs_have_any_nodes_and_missing_ones_are_all_named(raw, make_bank):
+    bank = make_bank(nodes=(6, 5, 4, 3, 2, 1), timeout_s=1.0)
     identities = await bank.open()
     assert identities[0].name == "encoder of leg 1 (node 6)"
     assert (await bank.read()).counts == (6000, 5000, 4000, 3000, 2000, 1000)
@@ -162,18 +161,17 @@ async def test_a_node_that_belongs_to_no_leg_is_named(raw, short_timeout_bank):
         await short_timeout_bank.open()
 
 
-async def test_two_steps_that_differ_are_refused_until_the_cell_file_names_one(raw, settings):
+async def test_two_steps_that_differ_are_refused_until_the_cell_file_names_one(raw, make_bank):
     for node in raw.nodes.values():
         node.objects[0x6501, 0] = (5000).to_bytes(4, "little")
     words = r"leg 1.*1000 nm in object 6005h:1, 5000 nm in object 6501h:0.*step_object"
     for choice, error in (("any", words), ("6501h", "has a measuring step of 5000 nm"), ("6005h", None)):
-        bank = Cia406Bank(settings.model_copy(update={"step_object": choice}))
+        bank = make_bank(step_object=choice)
         if error is None:
             await bank.open()
         else:
             with pytest.raises(DeviceError, match=error):
                 await bank.open()
-        await bank.close()
 
 
 async def test_settings_that_shift_or_turn_counts_belong_to_the_identity(raw, bank):

@@ -21,10 +21,9 @@ def counts(value: int) -> bytes:
     return value.to_bytes(4, "little", signed=True)
 
 
-async def test_a_sample_is_one_sync_and_no_sdo_request(raw, bank):
-    await bank.open()
+async def test_a_sample_is_one_sync_and_no_sdo_request(raw, opened):
     raw.heard.clear()
-    assert (await bank.read()).counts == (1000, 2000, 3000, 4000, 5000, 6000)
+    assert (await opened.read()).counts == (1000, 2000, 3000, 4000, 5000, 6000)
     assert raw.heard == [(0x80, b"")]
 
 
@@ -49,20 +48,19 @@ async def test_counts_become_millimetres_by_direction_step_and_offset(raw, setti
     assert found.positions == pytest.approx(expected, abs=1e-9)
 
 
-async def test_unsigned_positions_do_not_turn_negative(raw, settings):
-    bank = Cia406Bank(settings.model_copy(update={"signed": False}))
+async def test_unsigned_positions_do_not_turn_negative(raw, make_bank):
+    bank = make_bank(signed=False)
     await bank.open()
     raw.nodes[1].counts = 2**31 - 1
     assert (await bank.read()).counts[0] == 2**31 - 1
     raw.nodes[1].counts = -1
     with pytest.raises(WrongSetting, match=r"leg 1.*shows 4294967295 counts.*signed = true"):
         await bank.read()
-    await bank.close()
 
 
 @pytest.mark.parametrize("jump_counts", [400_000, -400_000])
-async def test_a_joint_that_jumps_farther_than_it_can_go_is_an_error(raw, settings, jump_counts):
-    bank = Cia406Bank(settings.model_copy(update={"largest_speed": 1e-3}))
+async def test_a_joint_that_jumps_farther_than_it_can_go_is_an_error(raw, make_bank, jump_counts):
+    bank = make_bank(largest_speed=1e-3)
     await bank.open()
     await bank.read()
     raw.nodes[3].counts += 900  # less than a millimetre, which is no jump
@@ -70,45 +68,40 @@ async def test_a_joint_that_jumps_farther_than_it_can_go_is_an_error(raw, settin
     raw.nodes[3].counts += jump_counts
     with pytest.raises(InvalidSampleError, match=r"leg 3 .*jumped from 3.900 to -?\d+\.[19]00 mm in"):
         await bank.read()
-    await bank.close()
 
 
-async def test_an_incomplete_sample_is_discarded_and_repeated(raw, bank):
-    await bank.open()
+async def test_an_incomplete_sample_is_discarded_and_repeated(raw, opened):
     for node in raw.nodes.values():
         node.answers_sync = lambda sync, node=node: (
             [] if (sync, node.node) == (2, 3) else [counts(100 * sync + node.node)]
         )
-    with short_timeout(bank):
-        assert (await bank.read()).counts == (301, 302, 303, 304, 305, 306)
-    assert (await bank.read()).counts == (401, 402, 403, 404, 405, 406)
+    with short_timeout(opened):
+        assert (await opened.read()).counts == (301, 302, 303, 304, 305, 306)
+    assert (await opened.read()).counts == (401, 402, 403, 404, 405, 406)
 
 
-async def test_a_silent_leg_is_named_after_bounded_tries(raw, bank):
-    await bank.open()
+async def test_a_silent_leg_is_named_after_bounded_tries(raw, opened):
     raw.nodes[5].answers_sync = lambda _: []
     before = raw.syncs
     silent = pytest.raises(
         SilentNodeError, match=r"encoder of leg 5 \(node 5\): no response to SYNC.*its supply"
     )
-    with short_timeout(bank), silent:
-        await bank.read()
+    with short_timeout(opened), silent:
+        await opened.read()
     assert raw.syncs - before == MAX_SYNCS
 
 
-async def test_if_all_nodes_are_silent_the_error_suggests_the_bus(raw, bank):
-    await bank.open()
+async def test_if_all_nodes_are_silent_the_error_suggests_the_bus(raw, opened):
     for node in raw.nodes.values():
         node.answers_sync = lambda _: []
     silent = pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter, supply and termination")
-    with short_timeout(bank), silent:
-        await bank.read()
+    with short_timeout(opened), silent:
+        await opened.read()
 
 
-async def test_a_late_response_is_awaited_before_the_next_sync(raw, bank, monkeypatch):
-    await bank.open()
-    assert bank._session is not None
-    bus, timed_out = bank._session.bus, threading.Event()
+async def test_a_late_response_is_awaited_before_the_next_sync(raw, opened, monkeypatch):
+    assert opened._session is not None
+    bus, timed_out = opened._session.bus, threading.Event()
     wait_for = bus.wait_for
 
     def first_times_out(ready, _timeout_s):
@@ -120,47 +113,43 @@ async def test_a_late_response_is_awaited_before_the_next_sync(raw, bank, monkey
 
     monkeypatch.setattr(bus, "wait_for", first_times_out)
     raw.nodes[2].answers_sync = lambda sync: [] if sync == 2 else [counts(77)]
-    reading = asyncio.ensure_future(bank.read())
+    reading = asyncio.ensure_future(opened.read())
     await until(lambda: timed_out.is_set() and raw.syncs == 2)
     raw.send(raw.nodes[2].tpdo, counts(66))
     assert (await reading).counts[1] == 77
     assert raw.syncs == 3
 
 
-async def test_more_positions_than_syncs_are_reported_as_a_second_device(raw, bank):
-    await bank.open()
-    await bank.read()
+async def test_more_positions_than_syncs_are_reported_as_a_second_device(raw, opened):
+    await opened.read()
     raw.send(raw.nodes[4].tpdo, counts(4))
-    await raw.delivered_to(bank)
+    await raw.delivered_to(opened)
     with pytest.raises(DeviceError, match=r"leg 4 \(node 4\).*more positions than there were SYNCs"):
-        await bank.read()
+        await opened.read()
 
 
-async def test_a_surplus_position_never_passes_for_that_of_a_later_sync(raw, bank):
-    await bank.open()
-    await bank.read()
+async def test_a_surplus_position_never_passes_for_that_of_a_later_sync(raw, opened):
+    await opened.read()
     raw.send(raw.nodes[4].tpdo, counts(77))
-    await raw.delivered_to(bank)
+    await raw.delivered_to(opened)
     raw.nodes[4].answers_sync = lambda _sync: []
     for _ in range(2):
         with pytest.raises(DeviceError, match=r"leg 4 \(node 4\).*more positions than there were SYNCs"):
-            await bank.read()
+            await opened.read()
 
 
-async def test_sync_of_another_master_is_an_error(raw, bank):
-    await bank.open()
+async def test_sync_of_another_master_is_an_error(raw, opened):
     raw.send(0x80)
-    await raw.delivered_to(bank)
+    await raw.delivered_to(opened)
     with pytest.raises(BusError, match="another master sends SYNC"):
-        await bank.read()
+        await opened.read()
 
 
 @pytest.mark.parametrize("size", [0, 3])
-async def test_a_frame_too_short_is_no_position(raw, bank, size):
-    await bank.open()
+async def test_a_frame_too_short_is_no_position(raw, opened, size):
     raw.nodes[6].answers_sync = lambda _: [bytes(size)]
     with pytest.raises(DeviceError, match=f"leg 6.*sent {size} bytes where its position needs 4"):
-        await bank.read()
+        await opened.read()
 
 
 async def test_position_is_taken_from_where_it_is_mapped(raw, bank):
@@ -173,30 +162,28 @@ async def test_position_is_taken_from_where_it_is_mapped(raw, bank):
     assert (await bank.read()).counts[0] == -5
 
 
-async def test_frames_that_are_not_canopen_are_ignored(raw, bank):
-    await bank.open()
+async def test_frames_that_are_not_canopen_are_ignored(raw, opened):
     cob_id = raw.nodes[1].tpdo
     raw.send(cob_id, counts(9), is_extended_id=True)
     raw.send(cob_id, is_remote_frame=True)
     raw.send(cob_id, counts(9), is_error_frame=True)
     raw.send(0x123, b"anything")
     raw.send(0x7E4, b"\0" * 8)
-    await raw.delivered_to(bank)
-    assert (await bank.read()).counts[0] == 1000
+    await raw.delivered_to(opened)
+    assert (await opened.read()).counts[0] == 1000
 
 
-async def test_the_echo_of_its_own_sync_is_not_that_of_another_master(raw, settings):
+async def test_the_echo_of_its_own_sync_is_not_that_of_another_master(raw, settings, make_bank):
     echoing = {**settings.bus, "receive_own_messages": True}
-    bank = Cia406Bank(settings.model_copy(update={"bus": echoing}))
+    bank = make_bank(bus=echoing)
     await bank.open()
     await bank.read()
     await bank.read()
-    await bank.close()
 
 
-async def test_every_frame_can_be_traced(raw, settings):
+async def test_every_frame_can_be_traced(raw, make_bank):
     entries: list[TraceEntry] = []
-    bank = Cia406Bank(settings, trace=entries.append)
+    bank = make_bank(entries.append)
     await bank.open()
     entries.clear()
     await bank.read()

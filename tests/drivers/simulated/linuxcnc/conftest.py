@@ -102,6 +102,11 @@ class RawClient:
         self.send(line)
         assert self.receive(len(answer)) == answer
 
+    def does(self, orders: str) -> None:
+        """Each of the orders, separated by ``|``, is acknowledged."""
+        for line in orders.split(" | "):
+            self.expect(line, f"SET {line.split()[1].upper()} ACK\n\r".encode())
+
     def send(self, line: str) -> None:
         self._socket.sendall(line.encode() + b"\r\n")
 
@@ -131,17 +136,18 @@ class RawClient:
     def greet(self) -> None:
         self.expect("hello EMC test 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
         self.expect("set echo off", b"set echo off\r\n")
-        self.expect("set verbose on", b"SET VERBOSE ACK\n\r")
-        self.expect("set enable EMCTOO", b"SET ENABLE ACK\n\r")
+        self.does("set verbose on | set enable EMCTOO")
 
     def make_ready(self) -> None:
         self.greet()
-        self.expect("set set_wait done", b"SET SET_WAIT ACK\n\r")
-        self.expect("set estop off", b"SET ESTOP ACK\n\r")
-        self.expect("set machine on", b"SET MACHINE ACK\n\r")
-        self.expect("set home -1", b"SET HOME ACK\n\r")
+        self.does("set set_wait done | set estop off | set machine on | set home -1")
         wait_until(lambda: b"NO" not in self.query("get joint_homed"))
-        self.expect("set mode mdi", b"SET MODE ACK\n\r")
+        self.does("set mode mdi")
+
+    def moves_slowly(self, machine: FakeMachine) -> None:
+        machine.duration_s = 30.0
+        self.send("set mdi G0 X100")
+        machine.wait_for("move")
 
     def close(self) -> None:
         self._socket.close()
@@ -172,6 +178,20 @@ def client(simulated: SimulatedController) -> Iterator[Callable[[], RawClient]]:
     yield connect
     for made in clients:
         made.close()
+
+
+@pytest.fixture
+def greeted(client: Callable[[], RawClient]) -> RawClient:
+    made = client()
+    made.greet()
+    return made
+
+
+@pytest.fixture
+def ready(client: Callable[[], RawClient]) -> RawClient:
+    made = client()
+    made.make_ready()
+    return made
 
 
 @pytest.fixture

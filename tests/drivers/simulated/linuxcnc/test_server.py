@@ -92,27 +92,21 @@ def test_answers_before_and_during_the_greeting(client):
         me.expect(line, answer)
 
 
-def test_answers_in_emergency_stop_and_before_homing(client):
-    me = client()
-    me.greet()
+def test_answers_in_emergency_stop_and_before_homing(greeted):
     for line, answer in GREETED:
-        me.expect(line, answer)
+        greeted.expect(line, answer)
 
 
-def test_answers_when_ready_to_move(client):
-    me = client()
-    me.make_ready()
+def test_answers_when_ready_to_move(ready):
     for line, answer in READY:
-        me.expect(line, answer)
+        ready.expect(line, answer)
 
 
-def test_an_unknown_first_word_gets_no_answer(client):
-    me = client()
-    me.greet()
-    me.send("foo bar")
-    me.send("")
-    me.expect_silence()
-    me.expect("get mode", b"MODE MANUAL\r\n")
+def test_an_unknown_first_word_gets_no_answer(greeted):
+    greeted.send("foo bar")
+    greeted.send("")
+    greeted.expect_silence()
+    greeted.expect("get mode", b"MODE MANUAL\r\n")
 
 
 def test_a_line_longer_than_the_buffer_is_fatal(client):
@@ -124,14 +118,11 @@ def test_a_line_longer_than_the_buffer_is_fatal(client):
     me.expect_end()
 
 
-def test_one_client_commands_at_a_time(client):
-    first, second = client(), client()
-    first.make_ready()
-    second.greet()
-    first.expect("get enable", b"ENABLE OFF\r\n")
-    first.expect("set mode manual", b"SET MODE NAK\n\r")
-    first.expect("set enable EMCTOO", b"SET ENABLE ACK\n\r")
-    second.expect("set abort", b"SET ABORT NAK\n\r")
+def test_one_client_commands_at_a_time(ready, greeted):
+    ready.expect("get enable", b"ENABLE OFF\r\n")
+    ready.expect("set mode manual", b"SET MODE NAK\n\r")
+    ready.does("set enable EMCTOO")
+    greeted.expect("set abort", b"SET ABORT NAK\n\r")
 
 
 @pytest.mark.parametrize(
@@ -142,105 +133,78 @@ def test_one_client_commands_at_a_time(client):
         ("set estop on", b"SET ESTOP ACK\n\r", b"MACHINE OFF\r\n"),
     ],
 )
-def test_a_move_that_another_client_ends_is_acknowledged(client, machine, order, answer, machine_is):
-    first, second = client(), client()
-    first.make_ready()
-    machine.duration_s = 30.0
-    first.send("set mdi G0 X100")
-    machine.wait_for("move")
-    second.greet()
-    second.expect(order, answer)
-    assert first.receive(13) == b"SET MDI ACK\n\r"
+def test_a_move_that_another_client_ends_is_acknowledged(ready, client, machine, order, answer, machine_is):
+    ready.moves_slowly(machine)
+    other = client()
+    other.greet()
+    other.expect(order, answer)
+    assert ready.receive(13) == b"SET MDI ACK\n\r"
     assert machine.pose().x < 99.0
-    first.expect("get machine", machine_is)
-    first.expect("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
+    ready.expect("get machine", machine_is)
+    ready.expect("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
 
 
-def test_a_move_is_acknowledged_on_receipt_by_default(client, machine):
-    me = client()
-    me.make_ready()
-    me.expect("set set_wait received", b"SET SET_WAIT ACK\n\r")
+def test_a_move_is_acknowledged_on_receipt_by_default(ready, machine):
+    ready.does("set set_wait received")
     machine.duration_s = 30.0
-    me.expect("set mdi G0 X100", b"SET MDI ACK\n\r")
+    ready.does("set mdi G0 X100")
     assert machine.pose().x < 99.0
 
 
-def test_an_abort_drops_waiting_moves(client, machine):
-    me = client()
-    me.make_ready()
-    me.expect("set set_wait received", b"SET SET_WAIT ACK\n\r")
+def test_an_abort_drops_waiting_moves(ready, machine):
+    ready.does("set set_wait received")
     machine.duration_s = 30.0
-    me.expect("set mdi G0 X100", b"SET MDI ACK\n\r")
-    me.expect("set mdi G0 X200", b"SET MDI ACK\n\r")
+    ready.does("set mdi G0 X100 | set mdi G0 X200")
     machine.wait_for("move")
-    me.expect("set abort", b"SET ABORT ACK\n\r")
+    ready.does("set abort")
     machine.duration_s = 0.01
-    me.expect("set set_wait done", b"SET SET_WAIT ACK\n\r")
-    me.expect("set mdi G0 X300", b"SET MDI ACK\n\r")
+    ready.does("set set_wait done | set mdi G0 X300")
     assert machine.events.count("move") == 2
     assert machine.pose().x == 300.0
 
 
-def test_switching_on_reads_the_config_again(client, machine):
-    me = client()
-    me.make_ready()
-    me.expect("set mdi G0 X10", b"SET MDI ACK\n\r")
+def test_switching_on_reads_the_config_again(ready, machine):
+    ready.does("set mdi G0 X10")
     machine.config = 2.0
-    me.expect("set machine on", b"SET MACHINE ACK\n\r")
+    ready.does("set machine on")
     assert machine.pose().x == 10.0
-    me.expect("set machine off", b"SET MACHINE ACK\n\r")
-    me.expect("set machine on", b"SET MACHINE ACK\n\r")
+    ready.does("set machine off | set machine on")
     assert machine.pose().x == 8.0
     assert machine.joints()[0] == 10.0
     assert machine.events == ["on", "home", "move", "on"]
 
 
-def test_a_config_that_cannot_be_used_keeps_the_machine_off(client, machine):
-    me = client()
-    me.greet()
+def test_a_config_that_cannot_be_used_keeps_the_machine_off(greeted, machine):
     machine.config = None
-    me.expect("set estop off", b"SET ESTOP ACK\n\r")
-    me.expect("set machine on", b"SET MACHINE ACK\n\r")
-    me.expect("get machine", b"MACHINE OFF\r\n")
-    me.expect("get error", b"ERROR machine.ini: has no geometry\r\n")
+    greeted.does("set estop off | set machine on")
+    greeted.expect("get machine", b"MACHINE OFF\r\n")
+    greeted.expect("get error", b"ERROR machine.ini: has no geometry\r\n")
 
 
-def test_aborted_homing_leaves_the_machine_unhomed(client, machine):
-    me = client()
-    me.greet()
+def test_aborted_homing_leaves_the_machine_unhomed(greeted, machine):
     machine.duration_s = 30.0
-    me.expect("set estop off", b"SET ESTOP ACK\n\r")
-    me.expect("set machine on", b"SET MACHINE ACK\n\r")
-    me.expect("set home -1", b"SET HOME ACK\n\r")
+    greeted.does("set estop off | set machine on | set home -1")
     machine.wait_for("home")
-    me.expect("set abort", b"SET ABORT ACK\n\r")
-    me.expect("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n")
+    greeted.does("set abort")
+    greeted.expect("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n")
 
 
 @pytest.mark.parametrize("fault", ["estop", "following error"])
-def test_faults_during_a_move_stop_it(client, simulated, machine, fault):
-    me = client()
-    me.make_ready()
-    machine.duration_s = 30.0
-    me.send("set mdi G0 X100")
-    machine.wait_for("move")
+def test_faults_during_a_move_stop_it(ready, simulated, machine, fault):
+    ready.moves_slowly(machine)
     if fault == "estop":
         simulated.state.set_estop(on=True)
     else:
         simulated.state.exceed_following_error()
-    assert me.receive(13) == b"SET MDI ACK\n\r"
-    me.expect("get machine", b"MACHINE OFF\r\n")
-    me.expect("get estop", b"ESTOP ON\r\n" if fault == "estop" else b"ESTOP OFF\r\n")
-    me.expect("get error", b"ERROR OK\r\n" if fault == "estop" else b"ERROR joint 3 following error\r\n")
+    assert ready.receive(13) == b"SET MDI ACK\n\r"
+    ready.expect("get machine", b"MACHINE OFF\r\n")
+    ready.expect("get estop", b"ESTOP ON\r\n" if fault == "estop" else b"ESTOP OFF\r\n")
+    ready.expect("get error", b"ERROR OK\r\n" if fault == "estop" else b"ERROR joint 3 following error\r\n")
     assert machine.pose().x < 99.0
 
 
-def test_closing_ends_a_move_and_may_be_repeated(client, simulated, machine):
-    me = client()
-    me.make_ready()
-    machine.duration_s = 30.0
-    me.send("set mdi G0 X100")
-    machine.wait_for("move")
+def test_closing_ends_a_move_and_may_be_repeated(ready, simulated, machine):
+    ready.moves_slowly(machine)
     machine.ignored_stops = 2
     simulated.close()
     simulated.close()

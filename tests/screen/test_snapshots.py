@@ -88,7 +88,7 @@ def idle(cell: Cell) -> ToldWorkplace:
     )
 
 
-def running(cell: Cell, history: tuple[events.Event, ...], count: int) -> tuple[ToldRun, ToldWorkplace]:
+def running(cell: Cell, history: History, count: int) -> tuple[ToldRun, ToldWorkplace]:
     run = ToldRun()
     run.begin(cell)
     run.record(history[:count])
@@ -96,18 +96,12 @@ def running(cell: Cell, history: tuple[events.Event, ...], count: int) -> tuple[
     return run, ToldWorkplace(cell, run=run)
 
 
-Scene = Callable[[Cell, tuple[events.Event, ...]], tuple[ToldWorkplace, tuple[str, ...]]]
+History = tuple[events.Event, ...]
+Opening = tuple[ToldWorkplace, tuple[str, ...]]
+"""What is shown, and the keys that lead there."""
 
 
-def scene_cell(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
-    return idle(cell), ("1",)
-
-
-def scene_preflight(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
-    return idle(cell), ("2", "v", "enter")
-
-
-def scene_plan(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+def scene_plan(cell: Cell, _: History) -> Opening:
     workplace, plan = idle(cell), tried(cell)
     pose = plan.poses[1][2].as_tuple()
     exclusions = (ExclusionSettings(pose=pose, within_deg=5.0), ExclusionSettings(point=4))
@@ -116,7 +110,7 @@ def scene_plan(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, 
     return workplace, ("2", "x", "down", "down", "down")
 
 
-def scene_measure(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+def scene_measure(cell: Cell, history: History) -> Opening:
     _, workplace = running(cell, history, MEASURED)
     target = cell.settings.identification.model_copy(update={"target_mm": 0.1})
     settings = cell.settings.model_copy(update={"identification": target})
@@ -124,21 +118,13 @@ def scene_measure(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWo
     return workplace, ("3",)
 
 
-def scene_begun(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
-    return running(cell, history, 16)[1], ("3",)
-
-
-def scene_review(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+def scene_review(cell: Cell, history: History) -> Opening:
     run, workplace = running(cell, history, len(history))
     run.tell(StatusChanged(status=Status.ENDED))
     return workplace, ("4",)
 
 
-def scene_history(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
-    return idle(cell), ("5", "v")
-
-
-def scene_place(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+def scene_place(cell: Cell, history: History) -> Opening:
     run, workplace = running(cell, history, 5)
     run.tell(
         snapshot(x={"shown_mm": -1.2}, z={"shown_mm": None, "age_s": None, "problem": "gauge z: silent"})
@@ -147,7 +133,7 @@ def scene_place(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWork
     return workplace, ()
 
 
-def scene_approve(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+def scene_approve(cell: Cell, history: History) -> Opening:
     run, workplace = running(cell, history, PROPOSED)
     proposed = next(event for event in history if isinstance(event, events.Proposed))
     far = AcceptanceGate(
@@ -162,31 +148,27 @@ def scene_approve(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWo
     return workplace, ()
 
 
-def scene_fault(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+def scene_fault(cell: Cell, history: History) -> Opening:
     run, workplace = running(cell, history, MEASURED)
-    run.record(
-        [
-            events.Tripped(
-                guard=Guard.GAUGE_END,
-                device="gauge y",
-                problem="its plunger is at the end of its travel",
-                action="Move the gauge by 3.8 mm along +y, then answer the question",
-            )
-        ]
-    )
+    problem = "its plunger is at the end of its travel"
+    action = "Move the gauge by 3.8 mm along +y, then answer the question"
+    run.record([events.Tripped(guard=Guard.GAUGE_END, device="gauge y", problem=problem, action=action)])
     return workplace, ()
 
 
-def scene_digits(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
-    return running(cell, history, MEASURED)[1], ("d",)
-
-
-def scene_help(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
-    return running(cell, history, MEASURED)[1], ("question_mark",)
-
-
-SCENES: dict[str, Scene] = {
-    name.removeprefix("scene_"): scene for name, scene in globals().items() if name.startswith("scene_")
+SCENES: dict[str, Callable[[Cell, History], Opening]] = {
+    "cell": lambda cell, _: (idle(cell), ("1",)),
+    "preflight": lambda cell, _: (idle(cell), ("2", "v", "enter")),
+    "plan": scene_plan,
+    "measure": scene_measure,
+    "begun": lambda cell, history: (running(cell, history, 16)[1], ("3",)),
+    "review": scene_review,
+    "history": lambda cell, _: (idle(cell), ("5", "v")),
+    "place": scene_place,
+    "approve": scene_approve,
+    "fault": scene_fault,
+    "digits": lambda cell, history: (running(cell, history, MEASURED)[1], ("d",)),
+    "help": lambda cell, history: (running(cell, history, MEASURED)[1], ("question_mark",)),
 }
 
 
@@ -209,7 +191,7 @@ async def test_the_assistant_looks_as_it_did(size: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("scene", SCENES)
 async def test_it_looks_as_it_did(
-    scene: str, size: str, cell: Cell, history: tuple[events.Event, ...], opened: Opened
+    scene: str, size: str, cell: Cell, history: History, opened: Opened
 ) -> None:
     workplace, keys = SCENES[scene](cell, history)
     async with opened(workplace, SIZES[size]) as pilot:

@@ -45,18 +45,10 @@ def past_run(name: str, *, is_in_controller: bool = False, **summary: object) ->
 def gauges(**changes: dict[str, object]) -> tuple[GaugeSnapshot, ...]:
     """Three gauges that show something; ``x={...}`` changes one of them."""
     shown = {"x": 0.4127, "y": -0.2089, "z": 1.1034}
+    usual = {"age_s": 0.1, "noise_mm": 0.0008, "travel_mm": 12.5, "middle_mm": 0.0}
     return tuple(
         GaugeSnapshot.model_validate(
-            {
-                "name": axis,
-                "axis": axis,
-                "shown_mm": value,
-                "age_s": 0.1,
-                "noise_mm": 0.0008,
-                "travel_mm": 12.5,
-                "middle_mm": 0.0,
-            }
-            | changes.get(axis, {})
+            {"name": axis, "axis": axis, "shown_mm": value} | usual | changes.get(axis, {})
         )
         for axis, value in shown.items()
     )

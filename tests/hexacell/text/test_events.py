@@ -65,18 +65,10 @@ def test_every_step_without_motion_says_what_it_does(step):
     assert activity(events.StepBegun(step=step()))
 
 
-def test_every_change_of_the_config_has_its_text():
-    assert "its own geometry" in str(event_text(events.ProvisionalReverted(), RunState()))
-    assert "old geometry" in str(event_text(events.RolledBack(), RunState()))
-
-
-def test_a_closed_set_is_summarized_in_one_line():
+def test_a_closed_set_is_summarized_in_one_line_and_that_of_the_identification_with_the_forecast():
     history = closed(HELD_OUT)
     lines = EventFormatter().lines(history[-1], fold(history))
     assert lines == ["held-out point 1, before  2 records, largest deviation 1.250 mm, drift 0.020 mm"]
-
-
-def test_a_closed_set_of_the_identification_is_followed_by_the_forecast():
     formatter = EventFormatter()
     history = [move(POINT, 7, FORECAST), *closed(POINT)]
     lines = [line for event in history for line in formatter.lines(event, fold(history))]

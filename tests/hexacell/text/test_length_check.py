@@ -13,16 +13,14 @@ from hexacell.verdict.length_check import LengthStatement
 from hexacell.verdict.outcome import length_line
 from procedures.run.questions import ask_mounting
 
-SOURCES = tuple(
-    LengthSource(name=name, um_m=size)
-    for name, size in [
-        ("noise of the readings", 8.0),
-        ("certificate", 3.4),
-        ("seating of the gauges", 4.1),
-        ("waves", 0.1),
-        ("sag", 1.0),
-    ]
-)
+SIZES = {
+    "noise of the readings": 8.0,
+    "certificate": 3.4,
+    "seating of the gauges": 4.1,
+    "waves": 0.1,
+    "sag": 1,
+}
+SOURCES = tuple(LengthSource(name=name, um_m=size) for name, size in SIZES.items())
 ERROR = JudgedError(value=0.19, expanded=0.004, limit=0.15, verdict=Verdict.FAIL)
 
 
@@ -43,15 +41,11 @@ def stated(found: LengthResult, verdict: Verdict = Verdict.PASS) -> LengthStatem
     return LengthStatement(verdict=verdict, result=found, error=ERROR)
 
 
-@pytest.mark.parametrize(
-    ("long_um_m", "said"),
-    [
-        (12.0, "length scale: checked over 300.000 mm: encoders read 12 +- 20 um/m long"),
-        (-12.0, "length scale: checked over 300.000 mm: encoders read 12 +- 20 um/m short"),
-    ],
-)
-def test_a_scale_within_its_uncertainty_is_one_line(long_um_m: float, said: str) -> None:
-    assert scale_lines(length_of(long_um_m)) == [said]
+@pytest.mark.parametrize(("long_um_m", "direction"), [(12.0, "long"), (-12.0, "short")])
+def test_a_scale_within_its_uncertainty_is_one_line(long_um_m: float, direction: str) -> None:
+    said = f"encoders read 12 +- 20 um/m {direction}"
+    assert scale_lines(length_of(long_um_m)) == [f"length scale: checked over 300.000 mm: {said}"]
+    assert earlier_scale_line(length_of(long_um_m)).endswith(f"as checked in that run: {said}")
 
 
 @pytest.mark.parametrize(("long_um_m", "factor"), [(1000.0, "0.999001"), (-1000.0, "1.001001")])
@@ -64,9 +58,6 @@ def test_what_was_not_checked_is_said_and_what_says_nothing_is_left_out() -> Non
     assert scale_lines(None) == [not_checked()] == [earlier_scale_line(None)]
     assert scale_lines(length_of(reason="the fixture moved")) == []
     assert earlier_scale_line(length_of(reason="the fixture moved")) == not_checked()
-    assert earlier_scale_line(length_of()).endswith(
-        "as checked in that run: encoders read 12 +- 20 um/m long"
-    )
 
 
 def test_a_length_check_of_its_own_says_what_the_scale_does_and_its_largest_sources() -> None:
@@ -77,6 +68,10 @@ def test_a_length_check_of_its_own_says_what_the_scale_does_and_its_largest_sour
         "1 sigma: noise of the readings 8.0, seating of the gauges 4.1, certificate 3.4, sag 1.0"
     )
     assert max(map(len, lines)) <= 80
+    assert length_line(stated(length_of(1000.0), Verdict.FAIL)) == (
+        "length check over 300.000 mm: encoders read 1000 +- 20 um/m long; position error by that "
+        "0.190 +- 0.004 mm (limit 0.15): fail"
+    )
 
 
 def test_a_check_that_contradicts_itself_says_why() -> None:
@@ -86,13 +81,6 @@ def test_a_check_that_contradicts_itself_says_why() -> None:
         "  the length check says nothing: the gauges were zeroed",
     ]
     assert length_line(found) == "length check: not evaluated (the gauges were zeroed)"
-
-
-def test_the_outcome_in_one_line() -> None:
-    assert length_line(stated(length_of(1000.0), Verdict.FAIL)) == (
-        "length check over 300.000 mm: encoders read 1000 +- 20 um/m long; position error by that "
-        "0.190 +- 0.004 mm (limit 0.15): fail"
-    )
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,13 @@
-"""Text at a plain terminal: where the run is and what the devices show, within 80 columns."""
+"""Text at a plain terminal: where the run is, what the devices show, a recorded run told in lines."""
 
 from __future__ import annotations
 
+from datetime import UTC, datetime, timedelta
+
 from hexacell.campaign.decisions import Forecast
 from hexacell.run_process.messages import EncoderSnapshot, GaugeSnapshot, LiveSnapshot
-from hexacell.text.line_face import gauges_text, record_text, run_status_text
+from hexacell.text.line_face import gauges_text, run_status_text, run_story, story_text
+from procedures.journal.journal import Entry
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
 from procedures.steps import events
@@ -12,11 +15,6 @@ from tests.procedures.story import Story
 
 RECORD = Story(SetKey(phase=Phase.IDENTIFY, point=2)).sampled(3, (0.1234, -0.5, 2.0))
 FORECAST = Forecast(now_mm=0.311, next_mm=0.3, end_mm=0.063, records=10, minutes=12.0)
-
-
-def test_a_record_in_a_line() -> None:
-    assert isinstance(RECORD, events.RecordTaken)
-    assert record_text(RECORD) == "point 2, orientation 3: x +0.123, y -0.500, z +2.000 mm"
 
 
 def test_where_the_run_is() -> None:
@@ -28,9 +26,6 @@ def test_where_the_run_is() -> None:
         "Last record: point 2, orientation 3: x +0.123, y -0.500, z +2.000 mm",
         "Predicted error at the task: 0.311 mm now, 0.063 at the end, 12 minutes left",
     ]
-
-
-def test_before_anything_happened() -> None:
     assert run_status_text(None, RunState(), 61, None, None).splitlines() == [
         "Now: connecting",
         "Done: 0 of 61 records and closings of points",
@@ -68,3 +63,26 @@ def test_what_the_devices_show() -> None:
         "motion is forbidden: the stop file is there",
     ]
     assert max(map(len, text.splitlines())) <= 80
+
+
+NOON = datetime(2026, 11, 20, 12, 0, tzinfo=UTC)
+HISTORY = [
+    *Story(SetKey(phase=Phase.AFTER, point=10)).whole(11),
+    events.Interrupted(reason="a cable of the third encoder broke", exit_code=3),
+    events.Resumed(),
+    events.Ended(exit_code=0, line="35 parameters, 55 records at 5 points; " + "position error " * 8),
+]
+ENTRIES = [
+    Entry(n, NOON + timedelta(seconds=n), float(n), event) for n, event in enumerate(HISTORY, start=1)
+]
+
+
+def test_each_record_and_each_turn_has_its_time() -> None:
+    told = list(run_story(ENTRIES))
+    kinds = [entry.event.kind for entry, _ in told]
+    assert kinds == ["sampled"] * 11 + ["closed", "interrupted", "resumed", "ended"]
+    lines = story_text(ENTRIES).splitlines()
+    assert lines[0] == "12:00:03  held-out point 10, after, orientation 1: x +0.000, y +0.000, z +0.000"
+    assert lines[1] == "            mm"
+    assert "12:00:26  interrupted: a cable of the third encoder broke" in lines
+    assert max(map(len, lines)) <= 80

@@ -47,21 +47,22 @@ def test_a_quiet_cell_is_told_in_short() -> None:
     ]
 
 
-def test_the_ranges_of_unlike_instruments_are_told() -> None:
-    text = said(measured(instrument("gauge y", reading=0.004, record=0.02)))
-    assert "gauges 10 to 20, encoders 10 um a record" in text
-    assert "readings at rest: gauges 1 to 4, encoders 1 um" in text
-
-
-def test_large_noise_is_told_in_whole_micrometres() -> None:
-    text = said(measured(instrument("gauge y", reading=0.1234, record=1.5)))
-    assert "gauges 10 to 1500, encoders 10 um a record" in text
-    assert "readings at rest: gauges 1 to 123, encoders 1 um" in text
-
-
-def test_without_a_series_no_readings_at_rest_are_told() -> None:
-    text = said(measured(instrument("gauge x", reading=None)))
-    assert "at rest" not in text
+@pytest.mark.parametrize(
+    ("changed", "said_of_records", "said_at_rest"),
+    [
+        (
+            {"reading": 0.004, "record": 0.02},
+            "gauges 10 to 20, encoders 10 um a record",
+            "gauges 1 to 4, enc",
+        ),
+        ({"reading": 0.1234, "record": 1.5}, "gauges 10 to 1500, enc", "gauges 1 to 123, encoders 1 um"),
+    ],
+)
+def test_the_ranges_of_unlike_instruments_are_told(changed, said_of_records, said_at_rest) -> None:
+    text = said(measured(instrument("gauge y", **changed)))
+    assert said_of_records in text
+    assert f"readings at rest: {said_at_rest}" in text
+    assert "at rest" not in said(measured(instrument("gauge x", reading=None)))
 
 
 @pytest.mark.parametrize(
@@ -77,21 +78,18 @@ def test_a_noisy_instrument_is_named_with_what_to_do(name: str, action: str) -> 
     assert "scatter by" not in said(measured(instrument(name, reading=0.113)))
 
 
-def test_a_drift_is_told_where_it_matters() -> None:
-    assert "gauge z: it drifted by -30 um within the series: let it warm up" in said(
-        measured(instrument("gauge z", drift=-0.03))
-    )
-    assert "encoder 2: it drifted by +30 um within the series: see whether it slides" in said(
-        measured(instrument("encoder 2", drift=0.03))
-    )
-    assert "drifted" not in said(measured(instrument("gauge z", drift=-0.002)))
-
-
-def test_false_readings_are_told() -> None:
-    assert "gauge x: a reading was false, and left out." in said(
-        measured(instrument("gauge x", outliers=1))
-    )
-    assert "gauge x: 2 readings were false" in said(measured(instrument("gauge x", outliers=2)))
+@pytest.mark.parametrize(
+    ("name", "changed", "told"),
+    [
+        ("gauge z", {"drift": -0.03}, "it drifted by -30 um within the series: let it warm up"),
+        ("encoder 2", {"drift": 0.03}, "it drifted by +30 um within the series: see whether it slides"),
+        ("gauge x", {"outliers": 1}, "a reading was false, and left out."),
+        ("gauge x", {"outliers": 2}, "2 readings were false"),
+    ],
+)
+def test_drift_and_false_readings_are_told_where_they_matter(name, changed, told) -> None:
+    assert f"{name}: {told}" in said(measured(instrument(name, **changed)))
+    assert "drifted" not in said(measured(instrument(name, drift=-0.002)))
 
 
 @pytest.mark.parametrize(
@@ -120,20 +118,14 @@ def forecasts(*errors: float) -> tuple[AveragingForecast, ...]:
     )
 
 
-def test_means_that_would_gain_are_told_with_the_setting_that_allows_them() -> None:
+def test_means_of_more_readings_are_told_with_their_gain() -> None:
     text = said(measured(forecasts=forecasts(0.2, 0.15, 0.12, 0.115), encoders_part_mm=0.17))
     assert "the encoders contribute 0.170 of the 0.200 mm expected at the task in the end" in text
     assert "4 windows of readings a record would give 0.120 mm for 2 minutes more" in text
     assert "averaged_windows = 4 in [noise] allows it" in text
-
-
-def test_means_that_are_taken_are_told_with_their_gain() -> None:
     text = said(measured(forecasts=forecasts(0.2, 0.15, 0.12), windows=4))
     assert "a record is the mean of 4 windows of readings, which gives 0.120 mm for 2 minutes more" in text
     assert "allows it" not in text
-
-
-def test_means_that_gain_nothing_are_not_proposed() -> None:
     text = said(measured(forecasts=forecasts(0.2, 0.199, 0.198), encoders_part_mm=0.17))
     assert "windows" not in text
 

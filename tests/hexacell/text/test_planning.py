@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.cell.bundled import bundled_config
 from hexacell.cli.app import main
@@ -21,15 +22,16 @@ from hexacell.services.offline import PlanTrial
 from hexacell.text.layout import duration
 from hexacell.text.planning import (
     decision_text,
+    device_line,
     forecast_text,
     plan_trial_lines,
+    preflight_lines,
     run_forecast_line,
 )
 from hexacell.verdict.decision import ErrorLimits, Verdict
 
 ZERO = (0.0,) * 6
 FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
-RUN_FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
 MEASURE = MeasurePose(2, 7, Pose(1.0, 2.0, 3.0), ZERO, (0.1, -0.2, 0.0), (0.5, 0.6, 0.7), 1.8, None)
 
 
@@ -40,37 +42,38 @@ def test_the_text_of_each_decision():
     measure = decision_text(MEASURE)
     assert measure.startswith("Point 2, orientation 7: go to X1.000 Y2.000 Z3.000")
     assert "x +0.100 +- 0.500, y -0.200 +- 0.600, z +0.000 +- 0.700 mm" in measure
+    through = decision_text(replace(MEASURE, via=(Pose(4.0, 5.0, 6.0),)))
+    assert ": pass through X4.000 Y5.000 Z6.000" in through
 
 
-def test_waypoints_are_named_before_the_pose():
-    via = MeasurePose(
-        2, 7, Pose(1.0, 2.0, 3.0), ZERO, (0.0,) * 3, (0.0,) * 3, 1.8, None, (Pose(4.0, 5.0, 6.0),)
-    )
-    assert ": pass through X4.000 Y5.000 Z6.000" in decision_text(via)
-
-
-def test_the_text_of_a_forecast():
+def test_a_forecast_says_what_records_gain_and_u_where_the_effects_are_known():
     text = forecast_text(FORECAST)
     assert text.startswith("Predicted error at the worst task pose 0.310 mm (one sigma);")
     assert text.endswith("continuing gains 0.250 mm in 24 records, about 12 minutes.")
-    assert forecast_text(Forecast(now_mm=0.06, next_mm=0.06, end_mm=0.06, records=0, minutes=0.0)).endswith(
-        "0.060 mm (one sigma)."
-    )
+    done = FORECAST.model_copy(update={"now_mm": 0.06, "records": 0})
+    assert forecast_text(done).endswith("0.060 mm (one sigma).")
     assert "none of the task poses" in forecast_text(None)
-
-
-def test_a_forecast_states_u_where_the_systematic_effects_are_known():
     known = FORECAST.model_copy(update={"systematic_mm": 0.08})
     assert known.expanded_mm(0.06) == pytest.approx(0.2)
     assert FORECAST.expanded_mm(0.06) is None
     text = forecast_text(known)
     assert "0.310 mm (one sigma), U 0.640 mm with the systematic effects;" in text
     assert text.endswith("continuing gains 0.250 mm, U 0.200 mm then in 24 records, about 12 minutes.")
-    line = run_forecast_line(known)
-    assert line == "  predicted error at the task 0.290 mm, U 0.602; in 12 minutes 0.060, U 0.200"
+
+
+@pytest.mark.parametrize(
+    ("changes", "rest"),
+    [
+        ({}, "0.290 mm; in 12 minutes 0.060"),
+        ({"records": 1}, "0.290 mm"),
+        ({"systematic_mm": 0.08}, "0.290 mm, U 0.602; in 12 minutes 0.060, U 0.200"),
+        ({"systematic_mm": 0.08, "records": 1}, "0.290 mm, U 0.602"),
+    ],
+)
+def test_a_run_states_what_the_remaining_records_gain(changes, rest):
+    line = run_forecast_line(FORECAST.model_copy(update=changes))
+    assert line == f"  predicted error at the task {rest}"
     assert len(line) <= 80
-    last = known.model_copy(update={"records": 1})
-    assert run_forecast_line(last) == "  predicted error at the task 0.290 mm, U 0.602"
 
 
 @pytest.mark.parametrize(
@@ -79,13 +82,6 @@ def test_a_forecast_states_u_where_the_systematic_effects_are_known():
 )
 def test_durations_are_rounded_to_seconds_or_minutes(minutes, text):
     assert duration(minutes) == text
-
-
-def test_a_run_states_what_the_remaining_records_gain():
-    line = run_forecast_line(RUN_FORECAST)
-    assert line == "  predicted error at the task 0.290 mm; in 12 minutes 0.060"
-    last = RUN_FORECAST.model_copy(update={"records": 1})
-    assert run_forecast_line(last) == "  predicted error at the task 0.290 mm"
 
 
 def lines(target_mm=None, **changes):
@@ -113,14 +109,6 @@ def test_the_text_of_a_predicted_plan():
     assert rest[0].startswith("Point 2: 6% of the robots within the tolerances cannot reach it")
 
 
-def test_the_expanded_uncertainty_is_stated_with_the_plan():
-    _, second, *_ = lines(expanded_mm=0.0661)
-    assert second == (
-        "The expanded uncertainty U of the largest error there will be about 0.066 mm, with the systematic "
-        "effects of [uncertainty]."
-    )
-
-
 def test_the_verdicts_on_healthy_machines_and_the_part_of_the_encoders_are_told():
     probabilities = dict.fromkeys(Verdict, 0.0) | {Verdict.PASS: 0.6, Verdict.CONDITIONAL_PASS: 0.4}
     limits = ErrorLimits(0.15, 0.05)
@@ -140,15 +128,23 @@ def test_the_verdicts_on_healthy_machines_and_the_part_of_the_encoders_are_told(
     )
 
 
-def test_a_target_that_will_not_be_reached_is_reported():
+def test_what_a_plan_may_miss_is_reported():
+    assert "U of the largest error there will be about 0.066 mm" in lines(expanded_mm=0.0661)[1]
     assert any("not the target of 0.02 mm" in line for line in lines(target_mm=0.02))
     assert not any("target" in line for line in lines(target_mm=0.05))
-
-
-def test_a_plan_that_fails_on_simulated_robots_is_reported():
     assert "1 of 3 simulated robots could not be calibrated with this plan." in lines()
     assert lines(robots=0, drawn=6)[0].startswith("None of 6 robots drawn within the tolerances")
     assert "no accuracy is predicted" in lines(worst_sigma_mm=None)[0]
+
+
+def test_a_device_is_named_with_its_serial_number_and_a_preflight_names_every_device():
+    gauge = DeviceIdentity(name="x", protocol="sylvac", description="SY276")
+    encoder = DeviceIdentity(name="leg 1", protocol="cia406", description="linear", serial_number="1001")
+    assert device_line(gauge) == "x, sylvac: SY276"
+    assert device_line(encoder) == "leg 1, cia406, serial number 1001: linear"
+    *named, third, _ = preflight_lines([gauge, encoder])
+    assert named == [f"ok  {device_line(gauge)}", f"ok  {device_line(encoder)}"]
+    assert third.endswith("nothing was moved")
 
 
 @pytest.fixture

@@ -39,16 +39,18 @@ def placement(phase: Phase) -> Question:
     return ask_placement(SetKey(phase=phase, point=3), Pose(1.0, 2.0, 3.0))
 
 
-def test_placing_gauges_names_the_point_and_the_pose() -> None:
-    text = question_text(placement(Phase.IDENTIFY))
-    assert text.startswith("\nPoint 3: the robot is at X1.000 ")
+@pytest.mark.parametrize(
+    ("phase", "beginning"),
+    [
+        (Phase.IDENTIFY, "\nPoint 3: the robot is at X1.000 "),
+        (Phase.BEFORE, "\nHeld-out point 3: "),
+        (Phase.AFTER, "\nHeld-out point 3 with the new geometry: "),
+    ],
+)
+def test_placing_gauges_names_the_point_and_the_pose(phase: Phase, beginning: str) -> None:
+    text = question_text(placement(phase))
+    assert text.startswith(beginning)
     assert text.endswith("Press Enter when they are in place, or type a to abort: ")
-
-
-def test_a_held_out_point_is_not_called_as_the_others() -> None:
-    before, after = (question_text(placement(phase)) for phase in (Phase.BEFORE, Phase.AFTER))
-    assert before.startswith("\nHeld-out point 3: ")
-    assert after.startswith("\nHeld-out point 3 with the new geometry: ")
 
 
 def test_an_approval_shows_the_change_then_every_gate() -> None:
@@ -83,26 +85,12 @@ def test_a_failure_names_the_choices() -> None:
 
 
 @pytest.mark.parametrize(
-    ("typed", "choice"),
-    [
-        ("redo\n", "redo-set"),
-        ("Measure again\n", "measure-again"),
-        ("a", "abort"),
-        ("re", None),
-        ("\n", None),
-        ("leave", None),
-    ],
-)
-def test_an_unambiguous_beginning_selects_a_choice(typed: str, choice: str | None) -> None:
-    answer = typed_answer(typed, FAILURE, "somebody")
-    assert answer == (None if choice is None else TypedAnswer(choice))
-
-
-@pytest.mark.parametrize(
     ("question", "typed", "answer"),
     [
         (placement(Phase.IDENTIFY), "\n", TypedAnswer("placed")),
-        (placement(Phase.IDENTIFY), "  \n", TypedAnswer("placed")),
+        (FAILURE, "redo\n", TypedAnswer("redo-set")),
+        (FAILURE, "Measure again\n", TypedAnswer("measure-again")),
+        (FAILURE, "a", TypedAnswer("abort")),
         (APPROVAL, "yes\n", TypedAnswer("somebody")),
         (APPROVAL, "Y\n", TypedAnswer("somebody")),
         (APPROVAL, "no\n", TypedAnswer(None)),
@@ -121,6 +109,7 @@ def test_what_a_question_offers_is_an_answer(question: Question, typed: str, ans
         *((placement(Phase.IDENTIFY), typed) for typed in ("a\n", "m\n", "yes\n", "no\n", "placed\n")),
         *((APPROVAL, typed) for typed in ("\n", "a\n", "yess\n", "bench\n", "ok\n")),
         *((GRAVE, typed) for typed in ("\n", "yes\n", "y\n", "benc\n")),
+        *((FAILURE, typed) for typed in ("re", "\n", "leave")),
     ],
 )
 def test_nothing_else_is_an_answer(question: Question, typed: str) -> None:

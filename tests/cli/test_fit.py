@@ -89,8 +89,8 @@ def test_too_few_records_are_refused(typed_here, cell_folder, tmp_path, records)
 
 MISTAKES = {
     "text": (
-        lambda r: [*r[:4], r[4].replace(",550.0,", ",abc,"), *r[5:]],
-        ':5: z is "abc", but must be a finite',
+        lambda r: [*r[:4], f"{r[4].rpartition(',')[0]},abc", *r[5:]],
+        ':5: dz is "abc", but must be a finite',
     ),
     "no header": (lambda r: r[1:], ":1: columns are missing: point, orientation"),
     "point with one row": (lambda r: r[:13], ":13: point 2 has one row, and at least two are needed"),

@@ -8,7 +8,7 @@ zeros alone, that are written as G of the estimate, what is held is seen to err 
     d - H (x - h),    covariance  (C - C') + H (C0 - C) H^T,    H = 1 - G,
 
 x the identification, h what is held and C0 the covariance of its tolerances. Machines are drawn: each has
-the largest error J d over the task poses and its U by draws, as in a run (``docs/method.md``).
+the largest error J d over the task poses and its U by draws, as in a run (``docs/verdict.md``).
 """
 
 from __future__ import annotations

@@ -63,6 +63,7 @@ main(sys.argv[3:])
 """
 
 
+@pytest.mark.sample("api", "fit by the api", "cell show")
 @pytest.mark.parametrize(
     ("program", "command", "not_loaded"),
     [

@@ -104,13 +104,9 @@ cells = st.builds(
 
 
 @given(settings=cells)
-def test_dumped_settings_load_as_the_same(load_text, settings):
-    assert load_text(dump(settings)).settings == settings
-
-
-@given(settings=cells)
-def test_description_is_a_cell_file_of_the_same(load_text, settings):
+def test_settings_dumped_and_described_load_as_the_same(load_text, settings):
     cell = load_text(dump(settings))
+    assert cell.settings == settings
     assert load_text(describe(cell)).settings == settings
 
 

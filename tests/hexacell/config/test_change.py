@@ -1,3 +1,5 @@
+"""A proposed change of a config: what it holds, how it is kept, and its diff."""
+
 import json
 import re
 from pathlib import Path

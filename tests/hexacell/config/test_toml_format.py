@@ -1,3 +1,5 @@
+"""The native config: read with the line of every mistake, rewritten in its number tokens alone."""
+
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -127,11 +129,17 @@ def token_by_name(tokens: list[str]) -> Callable[[str], str]:
 
 
 @given(layouts, tokens_and_values())
-def test_only_number_tokens_change(layout: Layout, numbers: tuple[list[str], np.ndarray]) -> None:
+def test_only_number_tokens_change_and_only_where_the_values_do(
+    layout: Layout, numbers: tuple[list[str], np.ndarray]
+) -> None:
     old, new = numbers
-    expected = [expected_token(text, value) for text, value in zip(old, new.tolist(), strict=True)]
-    changed = FORMAT.rewrite(layout.render(token_by_name(old)), Geometry(HEXAGLIDE_PARAMETERS, new))
+    text, geometry = layout.render(token_by_name(old)), Geometry(HEXAGLIDE_PARAMETERS, new)
+    same = Geometry(HEXAGLIDE_PARAMETERS, [tomllib.loads(f"x = {token}")["x"] for token in old])
+    assert FORMAT.rewrite(text, same) == text
+    expected = [expected_token(one, value) for one, value in zip(old, new.tolist(), strict=True)]
+    changed = FORMAT.rewrite(text, geometry)
     assert changed == layout.render(token_by_name(expected))
+    assert FORMAT.rewrite(changed, geometry) == changed
 
 
 @given(st.floats(-1e15, 1e15))

@@ -38,7 +38,7 @@ def here(hexaglide, paper, commanded):
     ).poses
 
 
-def stepwise(hexaglide, geometry, ways, joints, here, row, fineness=8):
+def stepwise(hexaglide, geometry, ways, joints, here, row, fineness=4):
     """One line in much smaller steps, one after the other; none where the assembly mode is left."""
     mode = modes_of(hexaglide, geometry, here, joints[0, [row]])
     pose, found = here, []

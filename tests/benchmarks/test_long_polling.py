@@ -9,6 +9,7 @@ left out.
 from __future__ import annotations
 
 import gc
+import logging
 import os
 import threading
 from collections import Counter
@@ -142,7 +143,8 @@ class Day:
         self._cell.stand_at(plungers, self._joints)
 
 
-async def test_a_day_of_polling_with_random_faults(figure, monkeypatch) -> None:
+async def test_a_day_of_polling_with_random_faults(figure, monkeypatch, caplog) -> None:
+    caplog.set_level(logging.CRITICAL, logger="drivers")  # pytest would keep all that is logged
     cell = FaultyCell(monkeypatch)
     day = Day(cell, Random(24))
     await cell.open()

@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivers.simulated.cell import SimulatedCell
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
 from hexacell.config.toml_format import NativeToml
@@ -108,6 +110,15 @@ def bundled_cell(tmp_path: Path) -> Cell:
     for path in source.parent.glob("simulated-hexaglide*.toml"):
         shutil.copy(path, tmp_path)
     return load_cell(tmp_path / source.name)
+
+
+def served(bundled_cell: Cell, settings: CellSettings, *, other_processes: bool = False) -> SimulatedCell:
+    """The simulated devices of these settings, with the config of the bundled cell."""
+    assert settings.simulation is not None
+    config = (bundled_cell.config_path,)
+    return SimulatedCell(
+        settings, settings.simulation, Hexaglide(), NATIVE, config, other_processes=other_processes
+    )
 
 
 @pytest.fixture

@@ -18,14 +18,13 @@ from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.interfaces import StartupAction
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.cell import SimulatedCell
 from hexacell.cell.model import CellSettings
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError, ReachError
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose
+from tests.drivers.simulated.conftest import served
 from tests.geometries import hexaglide_geometry
-from tests.native_config import NATIVE
 
 ALL = frozenset(StartupAction)
 MOVE_S = 1.0
@@ -34,15 +33,7 @@ DRIVERS: dict[str, Any] = {"sylvac": SylvacGauge, "mux10": Mux10Gauge, "cdi": Cd
 
 def serve(bundled_cell: Any, settings: CellSettings | None = None, *, other_processes: bool = False) -> Any:
     settings = settings or quick(bundled_cell.settings)
-    assert settings.simulation is not None
-    return SimulatedCell(
-        settings,
-        settings.simulation,
-        Hexaglide(),
-        NATIVE,
-        (bundled_cell.config_path,),
-        other_processes=other_processes,
-    )
+    return served(bundled_cell, settings, other_processes=other_processes)
 
 
 def quick(settings: CellSettings) -> CellSettings:
@@ -104,21 +95,13 @@ async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> Non
         async with drivers(cell.settings) as (_, _, controller):
             await controller.prepare(ALL)
             sliders, believed = cell.machine.joints(), await controller.pose()
-            config, values = (
-                bundled_cell.config_path,
-                bundled_cell.settings.simulation.geometry.model_dump(),
-            )
-            config.write_text(
-                NativeToml(HEXAGLIDE_PARAMETERS).rewrite(config.read_text(), _geometry(values))
-            )
+            config = bundled_cell.config_path
+            values = bundled_cell.settings.simulation.geometry.model_dump()
+            truth = hexaglide_geometry(values["S"], values["B"], values["l"])
+            config.write_text(NativeToml(HEXAGLIDE_PARAMETERS).rewrite(config.read_text(), truth))
             await controller.reload(ALL)
             assert cell.machine.joints() == pytest.approx(sliders, abs=1e-6)
             assert (await controller.pose()).position != pytest.approx(believed.position, abs=0.5)
-
-
-def _geometry(values: Any) -> Any:
-
-    return hexaglide_geometry(values["S"], values["B"], values["l"])
 
 
 def test_settings_have_an_address_for_every_device_and_no_simulation(bundled_cell) -> None:

@@ -7,13 +7,11 @@ from typing import Any
 
 import pytest
 
-from drivers.simulated.cell import SimulatedCell
 from drivers.simulated.fault_schedule import FaultSchedule
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
 from hexacell.errors import UsageError
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
-from tests.native_config import NATIVE
+from tests.drivers.simulated.conftest import served
 from tests.waiting import wait_until
 
 
@@ -21,15 +19,7 @@ from tests.waiting import wait_until
 def cell(bundled_cell):
     settings = bundled_cell.settings
     gauges = tuple(gauge.model_copy(update={"protocol": "sylvac"}) for gauge in settings.gauges)
-    settings = settings.model_copy(update={"gauges": gauges})
-    with SimulatedCell(
-        settings,
-        settings.simulation,
-        Hexaglide(),
-        NATIVE,
-        (bundled_cell.config_path,),
-        other_processes=False,
-    ) as simulated:
+    with served(bundled_cell, settings.model_copy(update={"gauges": gauges})) as simulated:
         yield simulated
 
 
@@ -74,8 +64,8 @@ def test_impossible_faults_are_refused(cell, kind: FaultKind, device: str) -> No
 class Log:
     """A test double of a cell's faults that records its calls."""
 
-    def __init__(self, clock: CellClock) -> None:
-        self.clock = clock
+    def __init__(self) -> None:
+        self.clock = CellClock(100.0)
         self.told: list[tuple[str, str, float]] = []
 
     def check(self, kind: FaultKind, device: str) -> None:
@@ -93,24 +83,25 @@ class Log:
         return [(what, device) for what, device, _ in self.told]
 
 
+@pytest.fixture
+def log() -> Any:
+    return Log()
+
+
 def fault(device: str, **values: Any) -> SimulatedFault:
     return SimulatedFault.model_validate({"kind": "silent", "device": device, **values})
 
 
-def test_faults_are_injected_and_cleared_in_their_order() -> None:
-    clock = CellClock(100.0)
-    log: Any = Log(clock)
+def test_faults_are_injected_and_cleared_in_their_order(log) -> None:
     planned = [fault("b", after_s=4.0), fault("a", after_s=1.0, lasts_s=5.0)]
-    with FaultSchedule(log, clock, planned):
+    with FaultSchedule(log, log.clock, planned):
         assert log.wait_for(3) == [("inject", "a"), ("inject", "b"), ("clear", "a")]
     for (_, _, at_s), due_s in zip(log.told, (1.0, 4.0, 6.0), strict=True):
         assert at_s >= due_s
 
 
-def test_a_fault_waits_for_its_move() -> None:
-    clock = CellClock(100.0)
-    log: Any = Log(clock)
-    with FaultSchedule(log, clock, [fault("x", at_move=2)]) as schedule:
+def test_a_fault_waits_for_its_move(log) -> None:
+    with FaultSchedule(log, log.clock, [fault("x", at_move=2)]) as schedule:
         schedule.on_motion_start()
         assert log.told == []
         schedule.on_motion_start()
@@ -121,17 +112,13 @@ def test_a_fault_waits_for_its_move() -> None:
         assert log.wait_for(2) == [("inject", "x"), ("inject", "y")]
 
 
-def test_planned_faults_are_checked_at_the_start() -> None:
-    clock = CellClock()
-    log: Any = Log(clock)
+def test_planned_faults_are_checked_at_the_start(log) -> None:
     with pytest.raises(UsageError):
-        FaultSchedule(log, clock, [fault("absent")])
+        FaultSchedule(log, log.clock, [fault("absent")])
 
 
-def test_closing_drops_faults_that_are_not_due() -> None:
-    clock = CellClock()
-    log: Any = Log(clock)
-    schedule = FaultSchedule(log, clock, [fault("x", after_s=1000.0)])
+def test_closing_drops_faults_that_are_not_due(log) -> None:
+    schedule = FaultSchedule(log, log.clock, [fault("x", after_s=1000.0)])
     schedule.close()
     schedule.close()
     assert log.told == []
@@ -141,11 +128,4 @@ def test_a_cell_file_with_an_impossible_fault_is_refused(bundled_cell) -> None:
     settings = bundled_cell.settings
     simulation = settings.simulation.model_copy(update={"faults": (fault("w"),)})
     with pytest.raises(UsageError, match="simulated of 'w'"):
-        SimulatedCell(
-            settings,
-            simulation,
-            Hexaglide(),
-            NATIVE,
-            (bundled_cell.config_path,),
-            other_processes=False,
-        )
+        served(bundled_cell, settings.model_copy(update={"simulation": simulation}))

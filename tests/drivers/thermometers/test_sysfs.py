@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
@@ -26,30 +25,31 @@ def show(path: Path, text: str) -> None:
     path.write_text(text, encoding="latin-1")
 
 
-@asynccontextmanager
-async def thermometer(path: Path, timeout_s: float = 2.0) -> AsyncIterator[SysfsThermometer]:
+@pytest.fixture
+def timeout_s() -> float:
+    return 2.0
+
+
+@pytest.fixture
+async def room(path: Path, timeout_s: float) -> AsyncIterator[SysfsThermometer]:
     made = SysfsThermometer(ThermometerSettings(name="room", path=str(path), timeout_s=timeout_s))
-    try:
-        yield made
-    finally:
-        await made.close()
-        await made.close()
+    yield made
+    await made.close()
+    await made.close()
 
 
 @pytest.mark.parametrize(
     ("text", "celsius"), [("21375\n", 21.375), ("-500\n", -0.5), ("0", 0.0), ("85000\n", 85.0)]
 )
-async def test_millidegrees_are_read(path: Path, text: str, celsius: float) -> None:
+async def test_millidegrees_are_read(path, room, text, celsius):
     show(path, text)
-    async with thermometer(path) as room:
-        assert await room.read() == TemperatureReading(celsius, text.strip())
+    assert await room.read() == TemperatureReading(celsius, text.strip())
 
 
-async def test_the_identity_of_a_thermometer_names_its_file(path: Path) -> None:
+async def test_the_identity_of_a_thermometer_names_its_file(path, room):
     show(path, "21375\n")
-    async with thermometer(path) as room:
-        assert await room.open() == DeviceIdentity("thermometer room", "sysfs", str(path))
-        assert room.name == "room"
+    assert await room.open() == DeviceIdentity("thermometer room", "sysfs", str(path))
+    assert room.name == "room"
 
 
 @pytest.mark.parametrize(
@@ -63,36 +63,31 @@ async def test_the_identity_of_a_thermometer_names_its_file(path: Path) -> None:
         ("9" * 5000, "gives 1e[+]61 deg C|gives no number"),
     ],
 )
-async def test_contents_that_are_no_temperature_are_refused(path: Path, text: str, words: str) -> None:
+async def test_contents_that_are_no_temperature_are_refused(path, room, text, words):
     show(path, text)
-    async with thermometer(path) as room:
-        with pytest.raises(DeviceError, match=f"^thermometer room: {words}") as refusal:
-            await room.read()
+    with pytest.raises(DeviceError, match=f"^thermometer room: {words}") as refusal:
+        await room.read()
     assert refusal.value.action == f"Check the sensor behind {path}"
 
 
-async def test_an_unreadable_file_is_an_error_until_it_can_be_read(path: Path) -> None:
-    async with thermometer(path) as room:
-        with pytest.raises(DeviceError, match="cannot be read: it does not exist"):
-            await room.open()
-        show(path, "20000")
-        assert (await room.read()).celsius == 20.0
+async def test_an_unreadable_file_is_an_error_until_it_can_be_read(path, room):
+    with pytest.raises(DeviceError, match="cannot be read: it does not exist"):
+        await room.open()
+    show(path, "20000")
+    assert (await room.read()).celsius == 20.0
 
 
-async def test_a_folder_is_no_thermometer(tmp_path: Path) -> None:
-    async with thermometer(tmp_path) as room:
-        with pytest.raises(DeviceError, match="cannot be read: it is a folder"):
-            await room.read()
+@pytest.mark.parametrize(
+    ("make", "words"), [(Path.mkdir, "cannot be read: it is a folder"), (os.mkfifo, "gives no number")]
+)
+async def test_a_folder_or_a_pipe_is_no_thermometer(path, room, make, words):
+    make(path)
+    with pytest.raises(DeviceError, match=words):
+        await room.read()
 
 
-async def test_a_pipe_is_not_waited_for(path: Path) -> None:
-    os.mkfifo(path)
-    async with thermometer(path) as room:
-        with pytest.raises(DeviceError, match="gives no number"):
-            await room.read()
-
-
-async def test_a_sensor_that_blocks_is_not_read_again(path: Path, monkeypatch) -> None:
+@pytest.mark.parametrize("timeout_s", [0.5])
+async def test_a_sensor_that_blocks_is_not_read_again(path, room, monkeypatch):
     """At most one read blocks at a time, and its late result is discarded."""
     answers = threading.Event()
     content: Callable[[Path], str] = sysfs._content
@@ -103,14 +98,13 @@ async def test_a_sensor_that_blocks_is_not_read_again(path: Path, monkeypatch) -
 
     monkeypatch.setattr(sysfs, "_content", slow)
     show(path, "20000")
-    async with thermometer(path, timeout_s=0.5) as room:
-        with pytest.raises(DeviceError, match=r"does not answer within 0\.5 s"):
-            await room.read()
-        with pytest.raises(DeviceError, match="still does not answer"):
-            await room.read()
-        monkeypatch.setattr(sysfs, "_content", content)
-        hanging = room._reading
-        assert hanging is not None
-        answers.set()
-        hanging.result()
-        assert (await room.read()).celsius == 20.0
+    with pytest.raises(DeviceError, match=r"does not answer within 0\.5 s"):
+        await room.read()
+    with pytest.raises(DeviceError, match="still does not answer"):
+        await room.read()
+    monkeypatch.setattr(sysfs, "_content", content)
+    hanging = room._reading
+    assert hanging is not None
+    answers.set()
+    hanging.result()
+    assert (await room.read()).celsius == 20.0

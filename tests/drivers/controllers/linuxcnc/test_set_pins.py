@@ -92,21 +92,17 @@ def test_where_the_forward_kinematics_fails_the_old_numbers_are_set_again(pins, 
     assert pins()["kins.fwd-kins-fail"] == "FALSE"
 
 
-def test_a_pin_that_is_not_there_sets_none(pins, files) -> None:
-    with pytest.raises(UsageError, match=r"no pin kins\.gain"):
-        set_pins(files(ini=INI + "[OTHER]\nGAIN = 2\n"))
-    assert pins()["kins.l.1"] == "580"
-
-
-def test_a_variable_that_is_no_single_number_is_refused(pins, files) -> None:
-    with pytest.raises(FileError, match="behind L1 stands"):
-        set_pins(files(ini="[KINS]\nL1 = 591.0 # mm\n"))
-    assert pins()["kins.l.1"] == "580"
-
-
-def test_a_variable_that_its_section_has_not_sets_none(pins, files) -> None:
-    with pytest.raises(FileError, match=r"no L1 in a section \[KINS\]"):
-        set_pins(files(ini="[KINS]\nL2 = 591.0\n"))
+@pytest.mark.parametrize(
+    ("ini", "error", "words"),
+    [
+        (INI + "[OTHER]\nGAIN = 2\n", UsageError, r"no pin kins\.gain"),
+        ("[KINS]\nL1 = 591.0 # mm\n", FileError, "behind L1 stands"),
+        ("[KINS]\nL2 = 591.0\n", FileError, r"no L1 in a section \[KINS\]"),
+    ],
+)
+def test_one_number_that_cannot_be_set_leaves_all_as_they_were(pins, files, ini, error, words) -> None:
+    with pytest.raises(error, match=words):
+        set_pins(files(ini=ini))
     assert pins()["kins.l.1"] == "580"
 
 

@@ -9,6 +9,7 @@ import pytest
 from drivers.errors import ConnectionLost, StartupNotPermitted
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
+from tests.drivers.controllers.linuxcnc.conftest import OPENING, Then
 from tests.drivers.controllers.linuxcnc.dialogue import (
     HOMED,
     HOMING,
@@ -32,6 +33,8 @@ RESTARTED = frozenset({StartupAction.RESET_INITIAL_ESTOP, StartupAction.HOME})
 BEFORE = said("get machine: ON | get joint_pos: -461.827519 1.0 2.0 3.0 4.0 5.0")
 AFTER = said("get joint_pos: -461.827512 1.0 2.0 3.0 4.0 5.0")
 HOMED_AGAIN = [*NOT_HOMED, *OWN_COORDINATES, *IN_JOINT_MODE, *HOMING, *READY]
+REOPENED, DEAF = OPENING[:-1], ("hello EMC hexacell 1.0", Then.HANG_UP)
+RESTARTS, RESET = [*IN_ESTOP, *NOT_HOMED], said("set estop off | get estop: OFF")
 TURNED_OFF = said("set machine off | get machine: OFF")
 ON = [*SWITCHING_ON, *NO_ESTOP, *IS_ON]
 
@@ -40,8 +43,24 @@ def python(program: str) -> tuple[str, ...]:
     return (sys.executable, "-c", program)
 
 
-async def test_without_a_command_the_machine_goes_off_and_on(play):
-    driver = await play.opened([*BEFORE, *TURNED_OFF, *ON, *HOMED, *AFTER, *MDI_MODE])
+RESTARTING = [*BEFORE, TURNED_OFF[0], (*TURNED_OFF[1], Then.HANG_UP)]
+COMMAND = {"reload_command": python("pass")}
+
+
+@pytest.mark.parametrize(
+    ("conversations", "settings"),
+    [
+        ([[*BEFORE, *TURNED_OFF, *ON, *HOMED, *AFTER, *MDI_MODE]], {}),
+        # joints that are homed after it, or include zeros, are not compared with where they were
+        ([[*BEFORE, *TURNED_OFF, *ON, *HOMED_AGAIN, *MDI_MODE]], {}),
+        ([[*BEFORE, *TURNED_OFF, *ON, *HOMED, *MDI_MODE]], {"joints_include_zeros": True}),
+        # a command that restarts the controller, which is connected to again as soon as it answers
+        ([RESTARTING, [*REOPENED, *RESTARTS, *RESET, *ON, *HOMED_AGAIN, *MDI_MODE]], COMMAND),
+        ([RESTARTING, [DEAF], [*REOPENED, *ON, *HOMED, *AFTER, *MDI_MODE]], COMMAND),
+    ],
+)
+async def test_the_machine_goes_off_and_on(play, conversations, settings):
+    driver = await play.opened(*conversations, **settings)
     await driver.reload(RESTARTED)
 
 
@@ -91,11 +110,6 @@ async def test_a_joint_that_moved_is_an_error(play):
         await driver.reload(RESTARTED)
 
 
-async def test_unhomed_joints_are_homed_after_the_reload_without_comparing_positions(play):
-    driver = await play.opened([*BEFORE, *TURNED_OFF, *ON, *HOMED_AGAIN, *MDI_MODE])
-    await driver.reload(RESTARTED)
-
-
 async def test_an_emergency_stop_meanwhile_is_not_reset(play):
     play.patience = play.IMPATIENT
     driver = await play.opened([*BEFORE, *TURNED_OFF, *IN_ESTOP, *HOMED])
@@ -119,46 +133,14 @@ async def test_a_machine_that_was_off_is_not_switched_on_without_permission(play
 
 
 async def test_a_restarted_controller_is_left_in_emergency_stop_without_permission(play):
-    driver = await play.opened(
-        [*BEFORE, TURNED_OFF[0], (*TURNED_OFF[1], play.HANG_UP)],
-        [*play.OPENING[:-1], *IN_ESTOP, *NOT_HOMED],
-        reload_command=python("pass"),
-    )
+    driver = await play.opened(RESTARTING, [*REOPENED, *RESTARTS], **COMMAND)
     with pytest.raises(StartupNotPermitted, match="since it was started"):
         await driver.reload(frozenset({StartupAction.HOME}))
 
 
-async def test_a_reload_command_that_restarts_the_controller_is_followed_by_reconnection(play):
-    reset = said("set estop off | get estop: OFF")
-    driver = await play.opened(
-        [*BEFORE, TURNED_OFF[0], (*TURNED_OFF[1], play.HANG_UP)],
-        [*play.OPENING[:-1], *IN_ESTOP, *NOT_HOMED, *reset, *ON, *HOMED_AGAIN, *MDI_MODE],
-        reload_command=python("pass"),
-    )
-    await driver.reload(RESTARTED)
-
-
-async def test_connecting_is_repeated_until_the_restarted_controller_answers(play):
-    driver = await play.opened(
-        [*BEFORE, TURNED_OFF[0], (*TURNED_OFF[1], play.HANG_UP)],
-        [("hello EMC hexacell 1.0", play.HANG_UP)],
-        [*play.OPENING[:-1], *ON, *HOMED, *AFTER, *MDI_MODE],
-        reload_command=python("pass"),
-    )
-    await driver.reload(RESTARTED)
-
-
 async def test_a_controller_that_does_not_restart_is_reported(play):
     play.patience = play.IMPATIENT
-    driver = await play.opened(
-        [*BEFORE, TURNED_OFF[0], (*TURNED_OFF[1], play.HANG_UP)],
-        reload_command=python("pass"),
-    )
+    driver = await play.opened(RESTARTING, **COMMAND)
     play.servers[0].stop_listening()
     with pytest.raises(ConnectionLost, match="cannot be reached: Connection refused"):
         await driver.reload(RESTARTED)
-
-
-async def test_joints_that_include_zeros_are_not_compared_with_those_of_other_zeros(play):
-    driver = await play.opened([*BEFORE, *TURNED_OFF, *ON, *HOMED, *MDI_MODE], joints_include_zeros=True)
-    await driver.reload(RESTARTED)

@@ -139,16 +139,16 @@ async def test_an_identification_that_comes_once_more_is_not_switching_on(dialog
         await opened.read()
 
 
-async def test_a_power_up_message_before_a_request_voids_the_zero(dialogue, opened):
-    dialogue.unasked(b"SY276.1\r")
-    dialogue.expect((b"?\r", b"+0.000\r"))
-    with pytest.raises(ZeroVoid, match=r"switched on again.*SY276\.1"):
-        await opened.read()
-
-
-async def test_a_power_up_message_instead_of_an_answer_voids_the_zero(dialogue, opened):
-    dialogue.expect((b"?\r", b"TE233.1.2\r"))
-    with pytest.raises(ZeroVoid, match="switched on again"):
+@pytest.mark.parametrize(
+    ("before", "answer", "shown"),
+    [(b"SY276.1\r", b"+0.000\r", r"SY276\.1"), (b"", b"TE233.1.2\r", r"TE233")],
+)
+async def test_a_power_up_message_before_or_as_an_answer_voids_the_zero(
+    dialogue, opened, before, answer, shown
+):
+    dialogue.unasked(before)
+    dialogue.expect((b"?\r", answer))
+    with pytest.raises(ZeroVoid, match=f"switched on again.*{shown}"):
         await opened.read()
 
 

@@ -16,7 +16,7 @@ from drivers.gauges.serial_gauge import SerialGauge
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.gauges.uwave import UwaveGauge
 from drivers.gauges.visa import VisaGauge
-from drivers.serial.shared_port import SharedSerialPorts
+from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, instrument_class
 from drivers.simulated.gauges.instruments import Indicator
 from drivers.simulated.gauges.server import GaugeLineServer
@@ -132,6 +132,17 @@ def served(protocol, plunger=lambda: 1.0, transport="pty", factor=FAST, name="ga
     instrument = instrument_class(protocol)({1: Indicator(plunger)})
     line = PtyLine(name) if transport == "pty" else SocketLine()
     return GaugeLineServer(instrument, line, CellClock(factor), **({"latency_s": 0.02} | pace))
+
+
+@contextlib.asynccontextmanager
+async def linked(line, **settings):
+    """An open connection to a line."""
+    link = SharedSerialPort(line.url, settings)
+    try:
+        await link.open()
+        yield link
+    finally:
+        await link.close()
 
 
 def send_unsolicited(line, data):

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 import serial
 
-from drivers.serial.shared_port import SharedSerialPort
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
@@ -19,6 +18,7 @@ from tests.drivers.simulated.gauges.served.cell import (
     TRANSPORTS,
     ask,
     cell,
+    linked,
     questions_to,
     send_unsolicited,
     served,
@@ -63,11 +63,9 @@ async def test_a_pseudo_terminal_opens_with_parity_repeatedly(asked):
     settings = {"baudrate": 4800, "bytesize": 7, "parity": "E", "stopbits": 2, "exclusive": True}
     with served("sylvac") as line:
         for _ in range(5):
-            link = SharedSerialPort(line.url, settings)
-            await link.open()
-            if asked:
-                assert await ask(link) == b"+1.000\r"
-            await link.close()
+            async with linked(line, **settings) as link:
+                if asked:
+                    assert await ask(link) == b"+1.000\r"
 
 
 @pytest.mark.parametrize("transport", TRANSPORTS)
@@ -82,19 +80,14 @@ async def test_questions_in_pieces_and_in_a_row_are_answered_in_order(transport)
 
 async def test_a_second_client_of_a_socket_is_refused():
     with served("sylvac", transport="socket") as line:
-        one, two = SharedSerialPort(line.url, {}), SharedSerialPort(line.url, {})
-        await one.open()
-        assert await ask(one) == b"+1.000\r"
-        await two.open()
-        with pytest.raises(DeviceError, match="lost"):
-            await ask(two)
-        assert await ask(one) == b"+1.000\r"
-        await one.close()
-        await two.close()
-        three = SharedSerialPort(line.url, {})
-        await three.open()
-        assert await ask(three) == b"+1.000\r"
-        await three.close()
+        async with linked(line) as one:
+            assert await ask(one) == b"+1.000\r"
+            async with linked(line) as two:
+                with pytest.raises(DeviceError, match="lost"):
+                    await ask(two)
+                assert await ask(one) == b"+1.000\r"
+        async with linked(line) as three:
+            assert await ask(three) == b"+1.000\r"
 
 
 @pytest.mark.parametrize(
@@ -109,34 +102,28 @@ async def test_a_second_client_of_a_socket_is_refused():
 async def test_an_answer_takes_its_latency_and_its_time_on_the_wire(protocol, question, baudrate, wire_s):
     with served(protocol, factor=4.0, latency_s=0.05, baudrate=baudrate) as line:
         clock = CellClock(4.0)
-        link = SharedSerialPort(line.url, {})
-        await link.open()
-        asked = clock.now()
-        await ask(link, question)
-        assert clock.now() - asked > 0.05 + wire_s - 0.001
-        await link.close()
+        async with linked(line) as link:
+            asked = clock.now()
+            await ask(link, question)
+            assert clock.now() - asked > 0.05 + wire_s - 0.001
 
 
 async def test_a_faster_clock_shortens_the_latency():
     with served("sylvac", factor=1000.0, latency_s=60.0) as line:
-        link = SharedSerialPort(line.url, {})
-        await link.open()
-        assert await ask(link) == b"+1.000\r"  # after 60 ms of real time
-        await link.close()
+        async with linked(line) as link:
+            assert await ask(link) == b"+1.000\r"  # after 60 ms of real time
 
 
 async def test_closing_does_not_wait_for_answers_that_are_due():
     line = served("sylvac", factor=1.0, latency_s=3600.0)
-    link = SharedSerialPort(line.url, {})
-    await link.open()
-    questions = questions_to(line)
-    waiting = asyncio.create_task(ask(link))
-    await until(lambda: bool(questions))
-    line.close()
-    line.close()
-    with pytest.raises(DeviceError, match="lost"):
-        await waiting
-    await link.close()
+    async with linked(line) as link:
+        questions = questions_to(line)
+        waiting = asyncio.create_task(ask(link))
+        await until(lambda: bool(questions))
+        line.close()
+        line.close()
+        with pytest.raises(DeviceError, match="lost"):
+            await waiting
     with pytest.raises(RuntimeError, match="is closed"):
         line.set_unplugged(on=True)
 
@@ -166,9 +153,7 @@ async def test_an_error_of_the_simulation_breaks_the_line(caplog):
         raise ArithmeticError("the truth has no such pose")
 
     with served("sylvac", broken) as line, caplog.at_level(logging.ERROR):
-        link = SharedSerialPort(line.url, {})
-        await link.open()
-        with pytest.raises(DeviceError, match="was lost"):
-            await ask(link)
-        await link.close()
+        async with linked(line) as link:
+            with pytest.raises(DeviceError, match="was lost"):
+                await ask(link)
     assert "have failed" in caplog.text

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, load_cell
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.prior import Noise, Prior, Tolerances
@@ -271,6 +273,12 @@ def problem_of(
         noise=noise,
         provisional=provisional,
     ).problem(measurements)
+
+
+@pytest.fixture(scope="session")
+def bundled_cell() -> Cell:
+    """The cell of the demo, on the paper's robot."""
+    return load_cell(bundled_config("simulated-hexaglide"))
 
 
 @pytest.fixture(scope="session")

@@ -19,6 +19,7 @@ from hexacell.errors import LimitError
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.solver import multistart
 from hexacell.measurements.records import MeasurementSet
+from tests.hexacell.altered_records import altered
 
 FALSE = (2, 5)
 OTHERS = (1, 3)
@@ -31,13 +32,10 @@ def one_mm_more(d):
 
 def with_change(measurements, label, change):
     """The readings d (3,) of one record, or of all, replaced by ``change(d)``."""
-    return MeasurementSet(
-        tuple(
-            replace(record, deviation=tuple(change(np.array(record.deviation)).tolist()))
-            if label in {None, record.id}
-            else record
-            for record in measurements.records
-        )
+    return altered(
+        measurements,
+        lambda r: {"deviation": change(np.array(r.deviation))},
+        lambda r: label in {None, r.id},
     )
 
 

@@ -63,12 +63,6 @@ def test_they_are_chosen_as_if_the_noise_were_larger_than_stated(two_points, at_
     assert two_points.decide(state).pose != cautious.pose
 
 
-def test_the_same_state_gives_the_same_one(two_points, at_first, make_plan) -> None:
-    state = before(at_first, 4)
-    again = make_plan(identification__points=((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)))
-    assert two_points.pilot_pose(state).pose == again.pilot_pose(state).pose
-
-
 def test_there_are_none_where_none_are_wanted(two_points, at_first, campaign, make_plan) -> None:
     assert two_points.pilot_pose(at_first) is None, "all are visited"
     state = before(at_first, 3)

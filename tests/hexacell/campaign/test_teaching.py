@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.loader import Cell
 from hexacell.cell.measuring import AcceptanceSettings, TaskSettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.identification.diagnostics.frame_alignment import PoseErrors
@@ -37,8 +36,8 @@ WORKSHOP = FrameTransform(
 
 
 @pytest.fixture(scope="module")
-def cell() -> Cell:
-    return load_cell(bundled_config("simulated-hexaglide"))
+def cell(bundled_cell: Cell) -> Cell:
+    return bundled_cell
 
 
 @pytest.fixture(scope="module")

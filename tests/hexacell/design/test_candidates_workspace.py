@@ -8,19 +8,11 @@ import numpy as np
 import pytest
 
 from hexacell.design.candidates import workspace_poses
-from hexacell.identification.belief import RobotBelief
-from hexacell.identification.problem.prior import Noise
-from hexacell.limits.limits import Limits
-
-LIMITS = Limits(5.0, np.radians(45.0), -800.0, 800.0, 0.05)
 
 
 @pytest.fixture
-def belief(paper, hexaglide):
-    free = hexaglide.convention.free_parameters(paper.nominal)
-    return RobotBelief(
-        hexaglide, paper.nominal, paper.branch, free, np.eye(len(free)), Noise(0.01, 0.01), LIMITS
-    )
+def belief(know, paper):
+    return know(paper.nominal, sigma_mm=1.0)
 
 
 def test_level_and_tilted_at_every_point(belief, paper):
@@ -31,7 +23,7 @@ def test_level_and_tilted_at_every_point(belief, paper):
 
 
 def test_tilts_keep_a_smaller_limit(belief, paper):
-    narrow = replace(belief, limits=replace(LIMITS, tilt=np.radians(8.0)))
+    narrow = replace(belief, limits=replace(belief.limits, tilt=np.radians(8.0)))
     assert np.degrees(workspace_poses(narrow, paper.points[:2]).tilts()).max() == pytest.approx(8.0)
 
 

@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 
 from hexacell.design.decorrelation import decorrelating_poses
-from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import identify
-from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet, Record
 
-LIMITS = Limits(5.0, np.radians(45.0), -800.0, 800.0, 0.05)
 SEED = 2
 DEGREES = 30.0
 
@@ -30,16 +27,8 @@ def found(measured, make_problem):
 
 
 @pytest.fixture(scope="module")
-def belief(found, paper, hexaglide):
-    return RobotBelief(
-        hexaglide,
-        paper.nominal,
-        paper.branch,
-        found.free,
-        found.free_covariance,
-        found.problem.noise,
-        LIMITS,
-    )
+def belief(know, found):
+    return know(found)
 
 
 def correlation_of(found, pair):
@@ -82,20 +71,20 @@ def test_the_ball_stays_within_the_travel(found, belief, visit, reach, paper):
 
 
 def test_limits_are_kept(found, belief):
-    narrow = replace(belief, limits=replace(LIMITS, tilt=np.radians(15.0)))
+    narrow = replace(belief, limits=replace(belief.limits, tilt=np.radians(15.0)))
     pairs = found.strongly_correlated()[:6]
     parts = [part for part in decorrelating_poses(narrow, found, pairs) if part]
     assert all(abs(part.degrees) < 15.0 for part in parts if part.axis != "z")
 
 
 def test_with_almost_no_travel_there_is_no_record(found, belief):
-    blind = replace(belief, limits=replace(LIMITS, gauge_travel_mm=1e-6))
+    blind = replace(belief, limits=replace(belief.limits, gauge_travel_mm=1e-6))
     pairs = found.strongly_correlated()[:3]
     assert decorrelating_poses(blind, found, pairs) == (None, None, None)
 
 
 def test_where_no_pose_is_in_reach_there_is_no_record(found, belief):
-    stuck = replace(belief, limits=replace(LIMITS, joint_min=0.0, joint_max=1.0))
+    stuck = replace(belief, limits=replace(belief.limits, joint_min=0.0, joint_max=1.0))
     pairs = found.strongly_correlated()[:1]
     assert decorrelating_poses(stuck, found, pairs) == (None,)
 

@@ -75,13 +75,6 @@ def test_the_prediction_keeps_the_travel_with_three_sigma(stage):
     assert SAFETY_SIGMAS >= 3.0
 
 
-def test_inverse_kinematics_of_the_command_gives_the_joints(stage, paper, legs, vector_of):
-    _, _, choice = stage
-    np.testing.assert_allclose(
-        legs(paper.nominal).joints(vector_of(choice.command)), choice.record.targets.joints[0], atol=1e-6
-    )
-
-
 def test_the_estimated_robot_brings_the_ball_to_the_expected_deviation(stage, legs):
     """From the estimated reference, which is millimetres from the nominal point."""
     estimate, at, choice = stage
@@ -176,11 +169,6 @@ def test_rotations_are_larger_when_more_is_known(know, little, much):
 
     assert turned(little) < 30.0
     assert turned(much) > max(30.0, 1.5 * turned(little))
-
-
-def test_the_choice_is_the_same_every_time(know, much):
-    first, again = (selected(know(much), station_of(know, much, 2), TURNS) for _ in range(2))
-    assert first.command == again.command
 
 
 # --- the way there ---

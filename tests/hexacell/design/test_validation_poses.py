@@ -114,11 +114,6 @@ def pose_tilts(poses):
     return [poses.pose(row).a for row in range(len(poses))]
 
 
-def test_the_choice_is_the_same_every_time(know, much, point, chosen):
-    again = select_validation_poses(know(much), point, COUNT, TURNS)
-    np.testing.assert_array_equal(again.rotations, chosen.rotations)
-
-
 def test_tilts_are_smaller_when_less_is_known(know, little, much, point):
     def largest(estimate):
         poses = select_validation_poses(know(estimate), point, 3, TURNS)
@@ -157,10 +152,6 @@ def test_equal_orientations_do_not_count_twice(know, much):
     with pytest.raises(LimitError, match="only 2 orientations"):
         select_validation_poses(know(much), CORNER, 3, same)
     assert len(select_validation_poses(know(much), CORNER, 2, same)) == 2
-
-
-def test_poses_are_batches_of_the_point_given(know, much):
-    assert isinstance(select_validation_poses(know(much), CORNER, 2, TURNS), PoseBatch)
 
 
 def test_the_first_pose_is_level_as_the_controller_has_it(know, much, paper):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import pytest
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import MeasurementSet
+from tests.hexacell.altered_records import altered
 
 NOISE_MM = 0.01
 REPETITIONS = range(100, 140)
@@ -35,16 +35,10 @@ def spoil() -> Callable[..., MeasurementSet]:
         joints: Sequence[float] = (0, 0, 0, 0, 0, 0),
         deviation: Sequence[float] = (0, 0, 0),
     ) -> MeasurementSet:
-        records = [
-            replace(
-                record,
-                joints=tuple(np.add(record.joints, joints).tolist()),
-                deviation=tuple(np.add(record.deviation, deviation).tolist()),
-            )
-            if (record.point, record.orientation) == label
-            else record
-            for record in measurements.records
-        ]
-        return MeasurementSet(tuple(records))
+        return altered(
+            measurements,
+            lambda r: {"joints": np.add(r.joints, joints), "deviation": np.add(r.deviation, deviation)},
+            lambda r: r.id == label,
+        )
 
     return spoilt

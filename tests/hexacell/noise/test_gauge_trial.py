@@ -7,8 +7,6 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import Pose
 from hexacell.noise.gauge_trial import (
@@ -26,12 +24,11 @@ HAND_DEG = 2.0
 
 
 @pytest.fixture(scope="module")
-def responses() -> np.ndarray:
+def responses(bundled_cell) -> np.ndarray:
     """(n, 3, 3) of drawn robots at the cell's points, by gauges off their axes, with noise."""
-    cell = load_cell(bundled_config("simulated-hexaglide"))
-    robot, random = robot_of(cell), np.random.default_rng(4)
+    robot, random = robot_of(bundled_cell), np.random.default_rng(4)
     found = []
-    for point in cell.settings.identification.points[:3]:
+    for point in bundled_cell.settings.identification.points[:3]:
         poses = [Pose(*point), *(Pose(*(np.array(point) + move)) for move in np.eye(3))]
         commands = robot.from_commands(poses)
         for truth in robots_within_tolerances(robot, 60, seed=11):

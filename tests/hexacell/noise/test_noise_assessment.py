@@ -10,8 +10,6 @@ import pytest
 
 from hexacell.campaign.budget import COMMANDED_PROVISIONALLY, usual_move_seconds
 from hexacell.campaign.planner import Plan
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.sensitivity import pose_sensitivity
 from hexacell.noise.approach_scatter import ScatterSource
@@ -34,9 +32,8 @@ QUIET = 0.001
 
 
 @pytest.fixture(scope="module")
-def plan() -> Plan:
-    cell = load_cell(bundled_config("simulated-hexaglide"))
-    return Plan(cell.settings, robot_of(cell))
+def plan(bundled_cell) -> Plan:
+    return Plan(bundled_cell.settings, robot_of(bundled_cell))
 
 
 def allowing(plan: Plan, **noise: Any) -> Plan:

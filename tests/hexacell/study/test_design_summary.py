@@ -8,7 +8,6 @@ from math import isnan
 from typing import Any
 
 import pytest
-from pydantic import TypeAdapter
 
 from hexacell.measurements.records import MeasurementSet
 from hexacell.study import design_study as design_trials
@@ -83,12 +82,6 @@ def test_the_study_is_shown() -> None:
     picture = design_picture(found)
     assert picture.startswith("<svg ")
     assert picture == design_picture(found)
-
-
-def test_outcomes_are_kept_as_json_and_come_back() -> None:
-    kept = TypeAdapter(DesignOutcome)
-    one = outcome(DesignTrial(0))
-    assert kept.validate_json(kept.dump_json(one)) == one
 
 
 def test_a_robot_that_is_measured_at_one_point_only_is_not_identified(monkeypatch) -> None:

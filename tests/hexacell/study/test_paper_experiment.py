@@ -42,10 +42,6 @@ def test_what_is_left_of_another_robot_is_its_repeatability() -> None:
     assert 0.8 * expected < np.mean(found.calibrating.ours) < 2.0 * expected
 
 
-def test_the_same_experiment_is_the_same_again(repeatable) -> None:
-    assert run_experiment(Experiment(0.0, 0)) == repeatable
-
-
 def test_means_of_draws_have_a_median_of_those_that_ended() -> None:
     draws = [Differences((1.0, 3.0), (0.5, 0.7), (0.1, 0.3)), Differences((4.0, 6.0), (), (0.4, 0.6))]
     found = Reduction.of(draws)

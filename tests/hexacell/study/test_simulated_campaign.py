@@ -7,8 +7,6 @@ import pytest
 from scipy.stats import chi2
 
 from hexacell.campaign.decisions import Finished
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.identification.estimator import identify
 from hexacell.robot.model import robot_of
 from tests.benchmarks.watched_robot import watch
@@ -16,15 +14,14 @@ from tests.simulated_campaign import SimulatedCampaign
 
 
 @pytest.fixture
-def make_campaign(paper):
-    cell = load_cell(bundled_config("simulated-hexaglide"))
-    robot = robot_of(cell)
+def make_campaign(bundled_cell, paper):
+    robot = robot_of(bundled_cell)
     truth, _ = robot.mechanism.normalize_frames(paper.actual)
 
     def make(provisional=False):
         changes = {"orientations": 6, "provisional": provisional}
-        identification = cell.settings.identification.model_copy(update=changes)
-        settings = cell.settings.model_copy(update={"identification": identification})
+        identification = bundled_cell.settings.identification.model_copy(update=changes)
+        settings = bundled_cell.settings.model_copy(update={"identification": identification})
         return SimulatedCampaign(settings, robot, truth, np.random.default_rng(5))
 
     return make

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Placement
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
-from hexacell.measurements.records import MeasurementSet
 from hexacell.uncertainty.effect_kinds import load_at_work, rail_waves
 from hexacell.uncertainty.possible_causes import ExcessTest, possible_causes
+from tests.hexacell.altered_records import altered
 
 ENCODERS, GUIDES, LOAD, TEMPERATURE, GAUGES = (
     "errors of the encoders",
@@ -34,15 +32,15 @@ def found_with(noisy, make_problem):
 
     def identified(joints=0.0, deviations=0.0):
         joints, deviations = np.broadcast_to(joints, (55, 6)), np.broadcast_to(deviations, (55, 3))
-        records = [
-            replace(
-                record,
-                joints=tuple((record.joints + joints[row]).tolist()),
-                deviation=tuple((record.deviation + deviations[row]).tolist()),
-            )
-            for row, record in enumerate(noisy.records)
-        ]
-        found = identify(make_problem(MeasurementSet(tuple(records))), find_outliers=False)
+        rows = {record.id: row for row, record in enumerate(noisy.records)}
+        measured = altered(
+            noisy,
+            lambda r: {
+                "joints": r.joints + joints[rows[r.id]],
+                "deviation": r.deviation + deviations[rows[r.id]],
+            },
+        )
+        found = identify(make_problem(measured), find_outliers=False)
         assert found.goodness.agreement is ChiSquareVerdict.TOO_LARGE
         return found
 

@@ -55,8 +55,3 @@ def test_a_covariance_and_the_same_effects_give_the_same_statement() -> None:
     assert by_covariance.position.value == pytest.approx(by_effects.position.value)
     assert by_covariance.position.expanded == pytest.approx(by_effects.position.expanded, rel=0.03)
     assert by_covariance.worst == by_effects.worst
-
-
-def test_the_same_errors_are_stated_the_same_every_time() -> None:
-    first, second = (errors([[0.1] * 6], isotropic(0.02)).position for _ in range(2))
-    assert first == second

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.cell.measuring import TaskSettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
@@ -26,6 +24,7 @@ from hexacell.robot.model import make_robot
 from hexacell.verdict.assessment import assess
 from hexacell.verdict.findings import findings, pair_sentences
 from hexacell.verdict.fit_document import fit_document
+from tests.hexacell.altered_records import altered
 
 AGAIN = 100
 """Added to the orientation's number at a second visit."""
@@ -35,8 +34,8 @@ TURNED = np.eye(3) + 0.004 * np.array([[0.0, 1.0, -0.5], [0.3, 0.0, 0.2], [0.4, 
 
 
 @pytest.fixture(scope="module")
-def settings():
-    return load_cell(bundled_config("simulated-hexaglide")).settings
+def settings(bundled_cell):
+    return bundled_cell.settings
 
 
 @pytest.fixture(scope="module")
@@ -61,15 +60,12 @@ def good(visit, assessed_of):
 def visited_twice(measurements, scatter_mm, seed=0):
     """Every pose once more, the ball elsewhere by some scatter that the encoders do not see."""
     random = np.random.default_rng(seed)
-    again = [
-        replace(
-            record,
-            orientation=record.orientation + AGAIN,
-            deviation=tuple((record.deviation + scatter_mm * random.standard_normal(3)).tolist()),
-        )
-        for record in measurements.records
-    ]
-    return MeasurementSet((*measurements.records, *again))
+
+    def again(record):
+        deviation = record.deviation + scatter_mm * random.standard_normal(3)
+        return {"orientation": record.orientation + AGAIN, "deviation": deviation}
+
+    return MeasurementSet((*measurements.records, *altered(measurements, again).records))
 
 
 def test_a_good_result_has_the_verdict_first_and_then_the_accuracy(good):
@@ -89,11 +85,7 @@ def test_far_too_much_noise_makes_it_doubtful_and_names_the_levels(visit, assess
 
 def test_residuals_that_are_too_large_are_followed_by_what_may_be(visit, assessed_of, good):
     measured = visit(seed=2).measured(0.01, seed=1)
-    turned = [
-        replace(record, deviation=tuple((np.array(record.deviation) @ TURNED).tolist()))
-        for record in measured.records
-    ]
-    assessed = assessed_of(MeasurementSet(tuple(turned)))
+    assessed = assessed_of(altered(measured, lambda r: {"deviation": np.array(r.deviation) @ TURNED}))
     verdict, causes, *_ = findings(assessed)
     assert verdict.startswith("Doubtful: ")
     assert causes.startswith("The model does not fit, and no cause is proven. What may be")

@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.cell.uncertainty import LengthCheckSettings, UncertaintySettings
 from hexacell.identification.estimator import identify
-from hexacell.measurements.records import MeasurementSet, joints_of
+from hexacell.measurements.records import MeasurementSet
 from hexacell.results.result import IdentificationResult, LengthResult
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import robot_of
@@ -20,6 +18,7 @@ from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import LengthMeasurements, length_standard
 from hexacell.verdict.outcome import outcome_line
 from hexacell.verdict.verification import HeldOut, Verification, verify
+from tests.hexacell.altered_records import altered, later
 from tests.hexacell.verdict.two_seat_records import two_seat_records
 
 FIXTURE = LengthCheckSettings(
@@ -38,31 +37,24 @@ NEAR = [(0.010, 0.002, -0.004), (0.003, 0.012, 0.002)]
 
 def scaled(measurements: MeasurementSet, long_um_m: float) -> MeasurementSet:
     """Records whose encoders show so much more."""
-    return MeasurementSet(
-        tuple(
-            replace(record, joints=joints_of(np.array(record.joints) * (1.0 + 1e-6 * long_um_m)))
-            for record in measurements.records
-        )
-    )
+    return altered(measurements, lambda r: {"joints": np.array(r.joints) * (1.0 + 1e-6 * long_um_m)})
 
 
 @pytest.fixture(scope="module")
-def verified(visit, paper, legs):
+def verified(bundled_cell, visit, paper, legs):
     """The verification of a machine whose encoders are long, with a length check or without."""
-    cell = load_cell(bundled_config("simulated-hexaglide"))
 
     def made(long_um_m=0.0, *, checked=True, fixture=FIXTURE, stated_um_m=15.0, celsius=None, **seats):
         sizes = UncertaintySettings(grade="ideal", common_encoder_scale_um_m=stated_um_m)
-        settings = cell.settings.model_copy(update={"length_check": fixture, "uncertainty": sizes})
-        robot = robot_of(replace(cell, settings=settings))
+        settings = bundled_cell.settings.model_copy(update={"length_check": fixture, "uncertainty": sizes})
+        robot = robot_of(replace(bundled_cell, settings=settings))
         exact = visit(seed=2, commanding=paper.actual, degrees=40.0)
         found = identify(robot.problem(scaled(exact.measured(0.005, 1), long_um_m)))
         written = robot.with_controller(as_written(settings, robot, found.geometry).geometry)
         wide = visit(points=3, orientations=6, seed=7, commanding=paper.actual).measured(0.005, 3)
-        moved = tuple(replace(record, point=record.point + 5) for record in wide.records)
         records = two_seat_records(written, fixture, paper, legs, long_um_m=long_um_m, **seats)
         held_out = HeldOut(
-            scaled(MeasurementSet(moved), long_um_m),
+            scaled(later(wide), long_um_m),
             FAR,
             NEAR,
             length=LengthMeasurements(records, celsius) if checked else None,

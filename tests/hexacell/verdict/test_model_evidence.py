@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.estimator import identify
-from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import robot_of
 from hexacell.verdict.model_evidence import (
     BEYOND_CHANCE,
@@ -21,6 +16,7 @@ from hexacell.verdict.model_evidence import (
     fails_narrowly,
     model_tests,
 )
+from tests.hexacell.altered_records import later
 
 NOISE_MM = 0.01
 NOISIER_MM = 0.014
@@ -28,8 +24,8 @@ NOISIER_MM = 0.014
 
 
 @pytest.fixture(scope="module")
-def robot():
-    return robot_of(load_cell(bundled_config("simulated-hexaglide")))
+def robot(bundled_cell):
+    return robot_of(bundled_cell)
 
 
 @pytest.fixture(scope="module")
@@ -42,10 +38,7 @@ def measure(visit):
     """Records of three held-out points with some noise, numbered after others."""
 
     def measured(noise_mm, after, seed):
-        exact = visit(points=3, orientations=8, seed=seed).measured(noise_mm, seed)
-        return MeasurementSet(
-            tuple(replace(record, point=record.point + after) for record in exact.records)
-        )
+        return later(visit(points=3, orientations=8, seed=seed).measured(noise_mm, seed), after)
 
     return measured
 

@@ -10,12 +10,10 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from hexacell.campaign.task_accuracy import Task
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.loader import Cell
 from hexacell.identification.diagnostics.pose_accuracy import error_jacobian
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
-from hexacell.measurements.records import MeasurementSet
 from hexacell.results.result import IdentificationResult
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot, robot_of
@@ -24,6 +22,7 @@ from hexacell.verdict.decision import Verdict
 from hexacell.verdict.model_evidence import ZEROS_DOUBTED
 from hexacell.verdict.outcome import outcome_line, reason_of
 from hexacell.verdict.verification import HeldOut, Verification, verify
+from tests.hexacell.altered_records import later
 from tests.small_cell import changed
 
 NOISE_MM = 0.01
@@ -37,8 +36,8 @@ def verified_by(cell: Cell, result: tuple[Robot, Identification], held_out: Held
 
 
 @pytest.fixture(scope="module")
-def cell():
-    return load_cell(bundled_config("simulated-hexaglide"))
+def cell(bundled_cell):
+    return bundled_cell
 
 
 @pytest.fixture(scope="module")
@@ -55,8 +54,7 @@ def held_out(visit):
 
     def measure(*machine, before=FAR, after=NEAR, left_travel=False):
         exact = visit(*machine, points=3, orientations=6, seed=7).measured(NOISE_MM, 3)
-        records = tuple(replace(record, point=record.point + 5) for record in exact.records)
-        return HeldOut(MeasurementSet(records), before, after, left_travel)
+        return HeldOut(later(exact), before, after, left_travel)
 
     return measure
 

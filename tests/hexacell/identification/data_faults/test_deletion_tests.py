@@ -20,24 +20,12 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.fit import fit_regularized
 from hexacell.identification.solver.result import DataFaultKind, GaugeFaultError
-from hexacell.measurements.records import MeasurementSet
+from tests.hexacell.altered_records import altered
 
 
 def with_encoders(measurements, error):
     """Joint variables q (6,) that are wrong by ``error(q)``: an imperfect machine with true gauges."""
-    return MeasurementSet(
-        tuple(
-            replace(
-                record, joints=tuple((np.array(record.joints) + error(np.array(record.joints))).tolist())
-            )
-            for record in measurements.records
-        )
-    )
-
-
-def scales(seed, size):
-    shares = size * np.random.default_rng(seed).standard_normal(6)
-    return lambda joints: shares * joints
+    return altered(measurements, lambda r: {"joints": r.joints + error(np.array(r.joints))})
 
 
 def waves(seed, amplitude_mm):
@@ -82,13 +70,7 @@ def test_a_large_gross_error_in_an_imperfect_machine_is_named(noisy, make_proble
     "error", [IMPERFECT[0], *(pytest.param(one, marks=pytest.mark.slow) for one in IMPERFECT[1:])]
 )
 def test_gauges_reversed_in_an_imperfect_machine_are_named(noisy, make_problem, error):
-    imperfect = with_encoders(noisy, error)
-    wrong = MeasurementSet(
-        tuple(
-            replace(record, deviation=tuple(-value for value in record.deviation))
-            for record in imperfect.records
-        )
-    )
+    wrong = altered(with_encoders(noisy, error), lambda r: {"deviation": np.negative(r.deviation)})
     with pytest.raises(GaugeFaultError) as raised:
         identify(make_problem(wrong))
     assert raised.value.fault.kind is DataFaultKind.REVERSED
@@ -106,13 +88,10 @@ def test_gauges_reversed_in_an_imperfect_machine_are_named(noisy, make_problem, 
 def test_a_slip_is_named_only_with_equations_to_spare(visit, make_problem, records, named):
     """Split at the slip, 2 x 10 records give 51 equations for 35 parameters; 2 x 9 only 45."""
     few = visit(points=2, orientations=records, seed=81).measured(0.01, seed=81)
-    slipped = MeasurementSet(
-        tuple(
-            replace(record, deviation=tuple(np.add(record.deviation, [0.0, 1.5, 0.5]).tolist()))
-            if record.point == 1 and record.orientation >= 4
-            else record
-            for record in few.records
-        )
+    slipped = altered(
+        few,
+        lambda r: {"deviation": np.add(r.deviation, [0.0, 1.5, 0.5])},
+        lambda r: r.point == 1 and r.orientation >= 4,
     )
     problem = make_problem(slipped)
     if named:

@@ -12,6 +12,7 @@ from hexacell.identification.diagnostics.model_tests import leave_one_point_out,
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
 from hexacell.measurements.records import MeasurementSet
+from tests.hexacell.altered_records import later
 
 NOISE_MM = 0.01
 REPETITIONS = 24
@@ -25,9 +26,7 @@ def measured(visit):
 
 def further(make_problem, exact, seed, **changes):
     """Noisy records at points of their own."""
-    records = exact.measured(NOISE_MM, seed).records
-    moved = tuple(replace(record, point=record.point + 5) for record in records)
-    return make_problem(MeasurementSet(moved), **changes)
+    return make_problem(later(exact.measured(NOISE_MM, seed)), **changes)
 
 
 def held_out_test(found, problem):
@@ -39,10 +38,8 @@ def test_an_update_is_the_fit_of_all_records_together(measured, make_problem):
     """Records are independent: first the ones and then the others is the same as all at once."""
     first = measured[0].measured(NOISE_MM, 1)
     updated = update(identify(make_problem(first)), further(make_problem, measured[1], 2))
-    moved = [
-        replace(record, point=record.point + 5) for record in measured[1].measured(NOISE_MM, 2).records
-    ]
-    together = identify(make_problem(MeasurementSet((*first.records, *moved))), find_outliers=False)
+    every = MeasurementSet((*first.records, *later(measured[1].measured(NOISE_MM, 2)).records))
+    together = identify(make_problem(every), find_outliers=False)
     sigma = np.sqrt(np.diag(together.free_covariance))
     assert np.abs(updated.free - together.free).max() < 0.02 * sigma.max()
     np.testing.assert_allclose(np.sqrt(np.diag(updated.free_covariance)), sigma, rtol=0.02)

@@ -12,14 +12,11 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
-from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.limits.limits import Limits
+from tests.hexacell.uncertainty.conftest import belief_of
 
 DRAWS = 60
 
@@ -28,14 +25,6 @@ def accuracy_of(*machine: Any, task: PoseBatch, workspace: PoseBatch) -> Accurac
     found = predicted_accuracy(belief_of(*machine), task=task, workspace=workspace)
     assert found is not None
     return found
-
-
-def belief_of(found: Identification, controller: Geometry, branch: Branch) -> RobotBelief:
-    problem = found.problem
-    limits = Limits(np.inf, np.inf, -np.inf, np.inf, 0.0)
-    return RobotBelief(
-        problem.mechanism, controller, branch, found.free, found.free_covariance, problem.noise, limits
-    )
 
 
 @pytest.fixture(scope="module")

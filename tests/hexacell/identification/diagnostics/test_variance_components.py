@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -12,9 +10,9 @@ from scipy.optimize import minimize
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.result import Identification
-from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.record_noise import NoiseLevel, NoiseLevels, noise_levels
 from hexacell.verdict.findings import noise_sentence
+from tests.hexacell.altered_records import altered
 
 REPETITIONS = 30
 
@@ -27,15 +25,12 @@ def levels_in(found: Identification) -> NoiseLevels:
 
 def with_noise(exact, encoder, gauge_mm, seed):
     random = np.random.default_rng(seed)
-    records = [
-        replace(
-            record,
-            joints=tuple((record.joints + encoder * random.standard_normal(6)).tolist()),
-            deviation=tuple((record.deviation + gauge_mm * random.standard_normal(3)).tolist()),
-        )
-        for record in exact.measured().records
-    ]
-    return MeasurementSet(tuple(records))
+
+    def noisy(record):
+        joints = record.joints + encoder * random.standard_normal(6)
+        return {"joints": joints, "deviation": record.deviation + gauge_mm * random.standard_normal(3)}
+
+    return altered(exact.measured(), noisy)
 
 
 @pytest.fixture(scope="module")

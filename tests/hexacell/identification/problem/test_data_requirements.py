@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -13,6 +11,7 @@ from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.result import Termination
 from hexacell.measurements.records import MeasurementSet
 from tests.geometries import hexaglide_geometry
+from tests.hexacell.altered_records import altered
 
 
 def test_one_point_is_refused_however_many_records_it_has(visit, make_problem):
@@ -64,13 +63,11 @@ def test_records_that_cannot_be_used_do_not_count(visit, make_problem, spoil):
 def test_joints_of_other_poses_are_refused_and_the_first_record_named(visit, make_problem):
     """For instance with the sign of the encoders reversed."""
     measured = visit(seed=2).measured()
-    reversed_encoders = [
-        replace(record, joints=tuple((-np.array(record.joints)).tolist())) for record in measured.records
-    ]
+    reversed_encoders = altered(measured, lambda r: {"joints": np.negative(r.joints)})
     with pytest.raises(
         IdentifiabilityError, match=r"\d+ of 55 records .* the first is point 1, orientation 1"
     ):
-        make_problem(MeasurementSet(tuple(reversed_encoders)))
+        make_problem(reversed_encoders)
 
 
 def test_a_drawing_of_another_machine_is_refused(paper, visit, make_problem):
@@ -82,10 +79,8 @@ def test_a_drawing_of_another_machine_is_refused(paper, visit, make_problem):
 def test_meaningless_deviations_never_give_a_good_fit(visit, make_problem):
     measured = visit(seed=2).measured()
     random = np.random.default_rng(0)
-    nonsense = [
-        replace(record, deviation=tuple(random.uniform(-5, 5, 3).tolist())) for record in measured.records
-    ]
-    found = identify(make_problem(MeasurementSet(tuple(nonsense))), find_outliers=False)
+    nonsense = altered(measured, lambda _: {"deviation": random.uniform(-5, 5, 3)})
+    found = identify(make_problem(nonsense), find_outliers=False)
     assert not found.converged or found.chi2 > 1000 * found.dof
 
 

@@ -78,19 +78,20 @@ def _station_precision(problem):
     )
 
 
-def test_more_noise_than_stated_is_reported_with_its_factor(visit, make_problem):
-    found = identify(make_problem(visit(seed=2).measured(0.03, seed=5)))
-    tested = found.goodness
-    assert tested.agreement is ChiSquareVerdict.TOO_LARGE
-    assert 2.5 < tested.ratio < 3.5
-    assert f"{tested.ratio:.1f} times the stated noise" in residual_sentence(tested)
-
-
-def test_less_noise_than_stated_is_reported_too(visit, make_problem):
-    found = identify(make_problem(visit(seed=2).measured(0.003, seed=5)))
-    tested = found.goodness
-    assert tested.agreement is ChiSquareVerdict.TOO_SMALL
-    assert "only 0." in residual_sentence(tested)
+@pytest.mark.parametrize(
+    ("noise_mm", "agreement", "least", "most", "words"),
+    [
+        (0.03, ChiSquareVerdict.TOO_LARGE, 2.5, 3.5, "residuals are {:.1f} times the stated noise"),
+        (0.003, ChiSquareVerdict.TOO_SMALL, 0.2, 0.4, "are only {:.2f} times the stated noise"),
+    ],
+)
+def test_another_noise_than_stated_is_reported_with_its_factor(
+    visit, make_problem, noise_mm, agreement, least, most, words
+):
+    tested = identify(make_problem(visit(seed=2).measured(noise_mm, seed=5))).goodness
+    assert tested.agreement is agreement
+    assert least < tested.ratio < most
+    assert words.format(tested.ratio) in residual_sentence(tested)
 
 
 def test_a_percent_too_much_noise_is_no_disagreement_however_certain():

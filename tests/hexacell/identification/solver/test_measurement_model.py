@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -12,6 +10,7 @@ from scipy.stats import chi2
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
 from hexacell.measurements.records import MeasurementSet
+from tests.hexacell.altered_records import altered
 
 ALIGNMENT = float(np.radians(0.3))
 SCALE = 0.002
@@ -27,21 +26,13 @@ def set_up(visit):
         random = np.random.default_rng(1000 + seed)
         turns = Rotation.from_rotvec(ALIGNMENT * random.standard_normal((5, 3))).as_matrix()
         scale = 1.0 + SCALE * random.standard_normal(3)
-        really = exact.measured()
-        seen = [
-            replace(
-                record,
-                joints=tuple(np.add(record.joints, 0.01 * random.standard_normal(6)).tolist()),
-                deviation=tuple(
-                    (
-                        scale * (turns[record.point - 1] @ record.deviation)
-                        + 0.01 * random.standard_normal(3)
-                    ).tolist()
-                ),
-            )
-            for record in really.records
-        ]
-        return MeasurementSet(tuple(seen))
+
+        def seen(record):
+            joints = np.add(record.joints, 0.01 * random.standard_normal(6))
+            shown = scale * (turns[record.point - 1] @ record.deviation)
+            return {"joints": joints, "deviation": shown + 0.01 * random.standard_normal(3)}
+
+        return altered(exact.measured(), seen)
 
     return measured
 

@@ -5,7 +5,7 @@ of the ball. :func:`.estimator.identify` goes through these steps:
 
 1. ``problem/``: :meth:`.Assumptions.problem` puts the records into the mechanism's frame convention, finds
    for each the geometry that commanded it and a start pose, and adds :class:`.Prior` and :class:`.Noise`.
-   :mod:`.data_requirements` refuses records that cannot determine the parameters.
+   :func:`.identify` refuses records that cannot determine the parameters.
 2. ``solver/``: :func:`.fit_regularized` fits the model (:func:`.predict`) by Levenberg-Marquardt with the
    prior, which is released where the data determine the parameters.
 3. ``data_faults/``: :func:`.select_faults` repeats the fit without records that have a fault.

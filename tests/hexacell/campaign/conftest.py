@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,12 +16,17 @@ from hexacell.cell.loader import load_cell
 from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
-from hexacell.robot.model import config_layout, make_robot
+from hexacell.robot.model import Robot, config_layout, make_robot
 from hexacell.robot.virtual_robot import VirtualRobot
 
 FEW = SearchEffort(candidates=64, dry_run_robots=1)
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 MakePlan = Callable[..., Plan]
+
+
+def at_two_points(**changes: Any) -> Plan:
+    """The plan with two points of eight orientations, with changes."""
+    return make(**{"identification__points": TWO_POINTS, "identification__orientations": 8} | changes)
 
 
 def make(**changes: Any) -> Plan:
@@ -36,6 +41,12 @@ def make(**changes: Any) -> Plan:
         settings = settings.model_copy(update={section: inner})
     controller = config_layout(settings).read(cell.config_path)
     return Plan(settings, make_robot(settings, controller), listed, FEW)
+
+
+def calibrated_to(robot: Robot, geometry: Geometry) -> Robot:
+    """The robot with this geometry in its controller."""
+    normal, frames = robot.mechanism.normalize_frames(geometry)
+    return replace(robot, controller=normal, frames=frames)
 
 
 @dataclass(frozen=True)
@@ -84,7 +95,7 @@ def carry_out(paper: Any) -> Callable[..., list[Taken]]:
 
 @pytest.fixture(scope="session")
 def two_points() -> Plan:
-    return make(identification__points=TWO_POINTS, identification__orientations=8)
+    return at_two_points()
 
 
 @pytest.fixture(scope="session")

@@ -19,6 +19,7 @@ from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.text.verdict import alarm_sentence, check_text
 from hexacell.uncertainty.effect_kinds import encoder_scales
 from hexacell.verdict.decision import ErrorLimits
+from tests.hexacell.campaign.conftest import calibrated_to
 
 SIGMA_MM = 0.005
 SCALE_UM_M = 100.0
@@ -28,8 +29,7 @@ SCALE_UM_M = 100.0
 def check(make_plan, paper) -> Check:
     """Of the paper's robot, whose controller has its true geometry."""
     plan = make_plan()
-    normal, frames = plan.robot.mechanism.normalize_frames(paper.actual)
-    robot = replace(plan.robot, controller=normal, frames=frames)
+    robot = calibrated_to(plan.robot, paper.actual)
     before = identified_before(robot, SIGMA_MM**2 * np.eye(len(robot.mechanism.parameters)), 0.02)
     return Check(
         plan.settings, robot, before, ErrorLimits(0.15, 0.05), 40, effort=SearchEffort(candidates=32)

@@ -16,23 +16,17 @@ from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot.model import Robot
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.uncertainty.effect_kinds import common_encoder_scale, encoder_scales
 from hexacell.verdict.check_statement import CheckStatement
 from hexacell.verdict.decision import ErrorLimits, Verdict
+from tests.hexacell.campaign.conftest import TWO_POINTS, calibrated_to
 
-TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 LIMITS = ErrorLimits(position_mm=0.15, orientation_deg=0.05)
 SIGMA_MM = 0.005
 """Of each parameter by the calibration."""
 
 MakeCheck = Callable[..., Check]
-
-
-def calibrated_to(robot: Robot, geometry: Geometry) -> Robot:
-    normal, frames = robot.mechanism.normalize_frames(geometry)
-    return replace(robot, controller=normal, frames=frames)
 
 
 @pytest.fixture(scope="module")

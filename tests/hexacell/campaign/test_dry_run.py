@@ -16,18 +16,14 @@ from hexacell.robot.model import make_robot
 from hexacell.robot.stated import stated_effects
 from hexacell.robot.virtual_robot import robots_within_tolerances
 from tests.geometries import hexaglide_geometry
+from tests.hexacell.campaign.conftest import at_two_points
 
-TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
-SMALL = {
-    "identification__points": TWO_POINTS,
-    "identification__orientations": 8,
-    "identification__seed": 2,  # whose first robot can be measured
-}
+SEED = {"identification__seed": 2}  # whose first robot can be measured
 
 
 @pytest.fixture(scope="module")
-def result(make_plan):
-    return dry_run(make_plan(**SMALL))
+def result():
+    return dry_run(at_two_points(**SEED))
 
 
 def test_the_result_is_that_of_a_campaign(result, campaign, two_points):
@@ -39,8 +35,8 @@ def test_the_result_is_that_of_a_campaign(result, campaign, two_points):
     assert outlook.now_mm / 4.0 < result.worst_sigma_mm < 4.0 * outlook.now_mm
 
 
-def test_systematic_effects_widen_the_expanded_uncertainty(result, make_plan):
-    plan = make_plan(**SMALL)
+def test_systematic_effects_widen_the_expanded_uncertainty(result):
+    plan = at_two_points(**SEED)
     stated = plan.settings.model_copy(update={"uncertainty": UncertaintySettings(grade="ordinary")})
     machine = replace(plan.robot, effects=stated_effects(stated))
     wider = dry_run(replace(plan, settings=stated, robot=machine))
@@ -48,13 +44,14 @@ def test_systematic_effects_widen_the_expanded_uncertainty(result, make_plan):
     assert wider.worst_sigma_mm == result.worst_sigma_mm < result.expanded_mm < wider.expanded_mm
 
 
-def test_the_dry_run_is_repeatable(result, make_plan):
-    assert dry_run(make_plan(**SMALL)) == result
+@pytest.mark.slow
+def test_the_dry_run_is_repeatable(result):
+    assert dry_run(at_two_points(**SEED)) == result
 
 
-def test_minutes_are_of_everything_that_is_measured(result, make_plan):
+def test_minutes_are_of_everything_that_is_measured(result):
     """Held-out poses are reached on straight lines."""
-    plan = make_plan(**SMALL)
+    plan = at_two_points(**SEED)
     timing, move_s = plan.settings.timing, usual_move_seconds(plan.settings)
     poses = 3 * (6 + 1) + 3 * (6 + 5 + 1)
     held_out = poses * (move_s + timing.window_s) / 60.0
@@ -65,8 +62,8 @@ def test_minutes_are_of_everything_that_is_measured(result, make_plan):
     assert result.minutes == pytest.approx(noise + records + held_out)
 
 
-def test_robots_that_cannot_be_measured_do_not_count(make_plan):
-    plan = make_plan(**SMALL, tolerances__S_mm=200.0)
+def test_robots_that_cannot_be_measured_do_not_count():
+    plan = at_two_points(**SEED, tolerances__S_mm=200.0)
     found = dry_run(plan)
     assert found.robots == 0
     assert found.drawn == 6

@@ -15,18 +15,12 @@ from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot.virtual_robot import VirtualRobot
-
-TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+from tests.hexacell.campaign.conftest import TWO_POINTS, at_two_points
 
 
 @pytest.fixture(scope="module")
-def plan(make_plan):
-    return make_plan(
-        identification__points=TWO_POINTS,
-        identification__orientations=8,
-        stations__alignment_deg=0.0,
-        noise__gauge_scale=0.0,
-    )
+def plan():
+    return at_two_points(stations__alignment_deg=0.0, noise__gauge_scale=0.0)
 
 
 def test_the_information_of_sets_is_that_of_the_estimator(plan):

@@ -185,16 +185,3 @@ def test_the_zero_is_where_the_gauges_were_zeroed(two_points, records, paper):
     assert np.abs(station.reference - zeroed.mean(axis=0)).max() < 0.05
     with pytest.raises(LimitError):
         known.gauge_zero(3)
-
-
-def test_a_problem_that_grows_by_a_record_is_the_problem_of_all(two_points, records):
-    robot, before = two_points.robot, None
-    for count in range(1, len(records) + 1):
-        some = MeasurementSet(records[:count])
-        before = robot.problem(some, before)
-        anew = robot.problem(some)
-        np.testing.assert_array_equal(before.labels, anew.labels)
-        np.testing.assert_array_equal(before.has_start_pose, anew.has_start_pose)
-        np.testing.assert_array_equal(before.initial_parameters, anew.initial_parameters)
-        np.testing.assert_allclose(before.start.positions, anew.start.positions, atol=1e-8)
-        np.testing.assert_allclose(before.start.rotations, anew.start.rotations, atol=1e-10)

@@ -9,11 +9,10 @@ import pytest
 
 from hexacell.campaign.decisions import CampaignState, StartPoint
 from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, are_counted, pilot_number, with_pilots
-from hexacell.campaign.planner import Plan
 from hexacell.campaign.stopping_rules import StoppingRules
 from hexacell.identification.estimator import estimate_online
 from hexacell.measurements.records import MeasurementSet
-from tests.hexacell.campaign.conftest import Campaign
+from tests.hexacell.campaign.conftest import Campaign, at_two_points
 
 
 @pytest.fixture(scope="module")
@@ -104,12 +103,8 @@ def test_the_identification_without_them_is_that_of_the_records_alone(two_points
     assert without.of_records_alone() is without.identification
 
 
-def test_records_that_do_not_determine_the_robot_reach_no_target_with_them(make_plan, campaign) -> None:
-    plan: Plan = make_plan(
-        identification__points=((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),
-        identification__orientations=8,
-        identification__target_mm=100.0,
-    )
+def test_records_that_do_not_determine_the_robot_reach_no_target_with_them(campaign) -> None:
+    plan = at_two_points(identification__target_mm=100.0)
     rules: StoppingRules = plan._stopping
     by_records = {len(one.state.measurements): one.state for one in campaign}
     few = next(state for count, state in by_records.items() if count >= 10)

@@ -47,7 +47,6 @@ def test_a_machine_without_effects_has_no_systematic_error(make_plan) -> None:
     plan = make_plan()
     assert plan.systematic_mm == 0.0
     forecast = plan.forecast(CampaignState())
-    assert forecast is not None
     assert forecast.expanded_mm(forecast.end_mm) == 2.0 * forecast.end_mm
 
 
@@ -76,9 +75,7 @@ def test_an_earlier_result_shares_its_constant_effects(ordinary) -> None:
     zero = np.zeros((35, 6))
     unaware = planned_systematic_mm(robot, task, sets, {"scale of each encoder": zero})
     aware = planned_systematic_mm(robot, task, sets, {"scale of each encoder": zero + 1e-3})
-    assert alone is not None
-    assert unaware is not None
-    assert aware is not None
+    assert None not in {alone, unaware, aware}
     assert aware != pytest.approx(unaware, rel=0.01)
 
 

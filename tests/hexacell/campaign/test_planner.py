@@ -17,8 +17,7 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import make_robot
 from tests.geometries import hexaglide_geometry
-
-TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+from tests.hexacell.campaign.conftest import TWO_POINTS, at_two_points
 
 
 def summary(taken):
@@ -72,10 +71,10 @@ def test_records_are_inside_the_travel_and_as_expected(campaign):
     assert np.median(wrong) < 1.5
 
 
-def test_decisions_depend_on_the_state_alone(campaign, make_plan):
+def test_decisions_depend_on_the_state_alone(campaign):
     """Another plan, without memory of what it decided before, decides the same to the last bit."""
     for one in (campaign[3], campaign[12], campaign[6]):
-        fresh = make_plan(identification__points=TWO_POINTS, identification__orientations=8)
+        fresh = at_two_points()
         assert fresh.decide(one.state) == one.decision
 
 
@@ -147,10 +146,8 @@ def test_records_of_another_robot_are_refused(campaign, two_points):
         two_points.decide(replace(state, measurements=MeasurementSet(strange)))
 
 
-def test_a_budget_of_records_ends_the_campaign(make_plan, carry_out):
-    plan = make_plan(
-        identification__points=TWO_POINTS,
-        identification__orientations=8,
+def test_a_budget_of_records_ends_the_campaign(carry_out):
+    plan = at_two_points(
         identification__budget_records=11,
     )
     taken = carry_out(plan)
@@ -160,20 +157,16 @@ def test_a_budget_of_records_ends_the_campaign(make_plan, carry_out):
     assert [forecast.records for forecast in forecasts_of(taken)] == [*range(10, 3, -1), 2, 1]
 
 
-def test_a_point_is_not_begun_for_a_single_record(make_plan, campaign):
-    plan = make_plan(
-        identification__points=TWO_POINTS,
-        identification__orientations=8,
+def test_a_point_is_not_begun_for_a_single_record(campaign):
+    plan = at_two_points(
         identification__budget_records=9,
     )
     between = next(one.state for one in campaign if summary([one]) == ["R2"])
     assert plan.decide(between) == Finished("the budget of 9 records is used")
 
 
-def test_a_budget_of_minutes_counts_moving_the_gauges(make_plan, carry_out):
-    plan = make_plan(
-        identification__points=TWO_POINTS,
-        identification__orientations=8,
+def test_a_budget_of_minutes_counts_moving_the_gauges(carry_out):
+    plan = at_two_points(
         identification__budget_minutes=16.0,
         identification__minutes_per_station=5.0,
         identification__seconds_per_record=30.0,
@@ -185,12 +178,10 @@ def test_a_budget_of_minutes_counts_moving_the_gauges(make_plan, carry_out):
     assert taken[-1].decision == Finished("the budget of 16 minutes is used")
 
 
-def test_the_plan_finishes_when_the_target_is_reached(make_plan, carry_out, campaign):
+def test_the_plan_finishes_when_the_target_is_reached(carry_out, campaign):
     errors = forecasts_of(campaign)
     target = 0.5 * (errors[-3].now_mm + errors[-2].now_mm)
-    plan = make_plan(
-        identification__points=TWO_POINTS,
-        identification__orientations=8,
+    plan = at_two_points(
         identification__target_mm=target,
     )
     taken = carry_out(plan)
@@ -199,20 +190,16 @@ def test_the_plan_finishes_when_the_target_is_reached(make_plan, carry_out, camp
     assert taken[-1].decision.reason.startswith("the predicted error at the task poses is ")
 
 
-def test_a_target_is_not_reached_before_the_records_can_identify(make_plan, carry_out):
-    plan = make_plan(
-        identification__points=TWO_POINTS,
-        identification__orientations=8,
+def test_a_target_is_not_reached_before_the_records_can_identify(carry_out):
+    plan = at_two_points(
         identification__target_mm=1000.0,
     )
     assert len(records_of(carry_out(plan))) == 14  # 3 x 12 equations for 35 parameters
 
 
-def test_a_point_is_finished_when_no_record_gains_enough(make_plan, carry_out, campaign):
+def test_a_point_is_finished_when_no_record_gains_enough(carry_out, campaign):
     gains = [forecast.now_mm - forecast.next_mm for forecast in forecasts_of(campaign)]
-    plan = make_plan(
-        identification__points=TWO_POINTS,
-        identification__orientations=8,
+    plan = at_two_points(
         identification__least_gain_mm=1.1 * min(gains[-4:]),
     )
     taken = carry_out(plan)
@@ -250,6 +237,7 @@ def test_points_are_chosen_by_their_gain_per_minute(make_plan, carry_out):
     assert worst[0] < worst[1]
 
 
+@pytest.mark.slow
 def test_points_that_take_long_to_set_up_are_left_later(make_plan, carry_out):
     def plan(minutes):
         return make_plan(
@@ -269,9 +257,9 @@ def test_points_that_take_long_to_set_up_are_left_later(make_plan, carry_out):
     assert isinstance(plan(60.0).decide(left.state), MeasurePose)
 
 
-def test_no_provisional_geometry_before_the_robot_is_known_well_enough(campaign, make_plan):
+def test_no_provisional_geometry_before_the_robot_is_known_well_enough(campaign):
     """After two records alone the orientation is uncertain by degrees, too much to command with."""
-    plan = make_plan(identification__points=TWO_POINTS, identification__orientations=8)
+    plan = at_two_points()
     by_records = {len(one.state.measurements): one.state for one in campaign}
     assert not plan.allows_provisional(CampaignState())
     assert len(by_records[2].pilots) == 14

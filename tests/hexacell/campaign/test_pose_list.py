@@ -12,18 +12,15 @@ import pytest
 from hexacell.campaign.decisions import CampaignState, Finished, FinishPoint, MeasurePose, StartPoint
 from hexacell.campaign.pose_list import PoseList, pose_list_of
 from hexacell.campaign.stopping_rules import REFUSALS
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
-
-TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+from tests.hexacell.campaign.conftest import TWO_POINTS, at_two_points
 
 
 @pytest.fixture(scope="module")
-def visited(make_plan, carry_out):
+def visited(carry_out):
     """The poses of a campaign without pilot poses, which are safe on its robot in their order."""
-    return at_both_points(carry_out(two_points(make_plan, noise__revisits=0)))
+    return at_both_points(carry_out(at_two_points(noise__revisits=0)))
 
 
 def at_both_points(taken):
@@ -32,15 +29,11 @@ def at_both_points(taken):
     return tuple(tuple(r.pose for r in records if r.point == point) for point in (1, 2))
 
 
-def two_points(make_plan, **changes):
-    return make_plan(identification__points=TWO_POINTS, identification__orientations=8, **changes)
-
-
 @pytest.fixture
-def plan_of(make_plan):
+def plan_of():
     def of(poses, **changes):
         listed = PoseList(Path("list.csv"), poses)
-        return two_points(make_plan, listed=listed, **changes)
+        return at_two_points(listed=listed, **changes)
 
     return of
 
@@ -64,9 +57,10 @@ def test_a_list_that_is_safe_is_visited_in_its_order(plan_of, visited, carry_out
     assert isinstance(taken[-1].decision, Finished)
 
 
-def test_a_list_without_small_rotations_is_visited_after_pilot_poses(plan_of, make_plan, carry_out):
+@pytest.mark.slow
+def test_a_list_without_small_rotations_is_visited_after_pilot_poses(plan_of, carry_out):
     """As one made of an earlier campaign, whose first poses already were chosen with them."""
-    poses = at_both_points(carry_out(two_points(make_plan)))
+    poses = at_both_points(carry_out(at_two_points()))
     turned = [poses[0][0].angle_to(pose) for pose in poses[0][1:]]
     assert min(turned) > np.radians(5.0)
     assert len(carry_out(plan_of(poses, noise__revisits=0))[-1].state.measurements) == 2
@@ -119,8 +113,8 @@ def _near(one, other):
 
 
 @pytest.fixture
-def cell(tmp_path):
-    source = load_cell(bundled_config("simulated-hexaglide"))
+def cell(tmp_path, bundled_cell):
+    source = bundled_cell
     plan = source.settings.identification.model_copy(update={"points": TWO_POINTS, "poses": "list.csv"})
     return replace(
         source,

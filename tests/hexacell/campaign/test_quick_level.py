@@ -19,6 +19,7 @@ from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.verdict.decision import ErrorLimits
+from tests.hexacell.campaign.conftest import calibrated_to
 
 LIMITS = ErrorLimits(position_mm=0.15, orientation_deg=0.05)
 CALIBRATED_MM = 0.02
@@ -32,8 +33,7 @@ MakeQuick = Callable[..., QuickLevel]
 def make_quick(make_plan, paper) -> MakeQuick:
     def make(*, budget: int = 24, calibrated_mm: float = CALIBRATED_MM) -> QuickLevel:
         plan = make_plan(noise__encoder=0.002, noise__gauge_mm=0.002)
-        normal, frames = plan.robot.mechanism.normalize_frames(paper.actual)
-        robot = replace(plan.robot, controller=normal, frames=frames)
+        robot = calibrated_to(plan.robot, paper.actual)
         covariance = calibrated_mm**2 * np.eye(len(robot.mechanism.parameters))
         before = identified_before(robot, covariance, DRIFT_MM)
         return QuickLevel(
@@ -75,14 +75,14 @@ def test_the_budget_is_kept_and_said(measured) -> None:
     assert said.calibrated_mm == quick.calibrated_mm
 
 
+@pytest.mark.slow
 def test_few_records_are_worth_half_a_calibration(make_plan, paper) -> None:
     """A sample of ``tests/benchmarks/test_quick_level.py``: one machine that drifted by 0.2 mm."""
     plan = make_plan()
-    normal, frames = plan.robot.mechanism.normalize_frames(paper.actual)
-    robot = replace(plan.robot, controller=normal, frames=frames)
+    robot = calibrated_to(plan.robot, paper.actual)
     whole = VirtualCampaign(
         replace(plan, robot=robot, with_forecast=False),
-        VirtualRobot(robot, normal, np.random.default_rng(3)),
+        VirtualRobot(robot, robot.commanding, np.random.default_rng(3)),
     )
     whole.carry_out()
     calibrated = identify(robot.problem(whole.measurements))

@@ -77,17 +77,14 @@ def test_limits_are_kept(found, belief):
     assert all(abs(part.degrees) < 15.0 for part in parts if part.axis != "z")
 
 
-def test_with_almost_no_travel_there_is_no_record(found, belief):
-    blind = replace(belief, limits=replace(belief.limits, gauge_travel_mm=1e-6))
-    pairs = found.strongly_correlated()[:3]
-    assert decorrelating_poses(blind, found, pairs) == (None, None, None)
-
-
-def test_where_no_pose_is_in_reach_there_is_no_record(found, belief):
-    stuck = replace(belief, limits=replace(belief.limits, joint_min=0.0, joint_max=1.0))
-    pairs = found.strongly_correlated()[:1]
-    assert decorrelating_poses(stuck, found, pairs) == (None,)
-
-
-def test_without_pairs_there_are_no_records(found, belief):
-    assert decorrelating_poses(belief, found, ()) == ()
+@pytest.mark.parametrize(
+    ("pairs", "change"),
+    [
+        (3, {"gauge_travel_mm": 1e-6}),  # with almost no travel
+        (1, {"joint_min": 0.0, "joint_max": 1.0}),  # where no pose is in reach
+        (0, {}),
+    ],
+)
+def test_there_may_be_no_record(found, belief, pairs, change):
+    tight = replace(belief, limits=replace(belief.limits, **change))
+    assert decorrelating_poses(tight, found, found.strongly_correlated()[:pairs]) == (None,) * pairs

@@ -8,7 +8,6 @@ import pytest
 from hexacell.drift.drift_watch import (
     DriftWatch,
     StepAlarm,
-    alarm_limit,
     watch_runs,
 )
 from hexacell.drift.single_cause import possible_legs
@@ -116,10 +115,6 @@ def test_alarms_come_as_the_runs_do() -> None:
     robot.state[3] += 30.0
     assert watch.add(next(robot.nights(1))) is not None
     assert watch.share_of_limit.max() == 0.0
-
-
-def test_more_streams_need_a_higher_limit() -> None:
-    assert alarm_limit(6) < alarm_limit(42) < alarm_limit(6) + 2.0
 
 
 def test_the_evidence_of_a_leg_is_that_of_all_its_parameters() -> None:

@@ -48,9 +48,3 @@ def test_drawn_sums_alarm_as_often() -> None:
 def test_the_limit_has_the_run_length_asked_for(streams) -> None:
     limit = limit_for_run_length(3650.0, REFERENCE, streams)
     assert two_sided_run_length(limit, REFERENCE) == pytest.approx(streams * 3650.0, rel=1e-4)
-
-
-def test_ten_years_and_all_parameters_cost_a_week() -> None:
-    alone, together = (limit_for_run_length(3650.0, REFERENCE, streams) for streams in (1, 42))
-    assert two_sided_run_length(alone, REFERENCE, 1.0) == pytest.approx(14.5, abs=0.1)
-    assert two_sided_run_length(together, REFERENCE, 1.0) == pytest.approx(21.9, abs=0.1)

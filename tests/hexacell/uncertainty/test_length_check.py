@@ -125,13 +125,8 @@ def test_an_effect_moves_the_result_as_is_propagated(laboratory, exact, paper, n
     check = LengthCheck.of(clean, fixture.standard(), NOISE, judged(exact, columns), [effect])
     predicted = 200.0 * check.observation.by_effects[effect.name][2]
     found = laboratory.identified(laboratory.records_of(machine))
-    same_weights = LengthCheck.of(
-        fixture.records(laboratory, found, machine),
-        fixture.standard(),
-        NOISE,
-        judged(exact, columns),
-        [effect],
-    )
+    records = fixture.records(laboratory, found, machine)
+    same_weights = LengthCheck.of(records, fixture.standard(), NOISE, judged(exact, columns), [effect])
     assert -same_weights.encoders_long_um_m == pytest.approx(predicted, abs=3.0 + 0.05 * abs(predicted))
     assert abs(predicted) > 20.0
 

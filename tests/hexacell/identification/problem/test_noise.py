@@ -12,12 +12,6 @@ ENCODERS = (0.01, 0.02, 0.005, 0.01, 0.03, 0.01)
 GAUGES = (0.004, 0.05, 0.01)
 
 
-def test_instruments_that_are_alike_have_one_figure() -> None:
-    noise = Noise(0.01, 0.02)
-    assert noise.encoders == pytest.approx(np.full(6, 0.01))
-    assert noise.gauges_mm == pytest.approx(np.full(3, 0.02))
-
-
 def test_each_instrument_keeps_its_own_noise_and_what_else_is_stated() -> None:
     noise = Noise(0.01, 0.01, alignment=0.005, gauge_scale=0.001).with_devices(ENCODERS, GAUGES)
     assert noise.encoders == pytest.approx(np.array(ENCODERS))

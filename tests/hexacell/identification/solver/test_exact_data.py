@@ -12,6 +12,7 @@ from hexacell.identification.solver.result import Termination
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.study import reference_solvers
+from tests.hexacell.altered_records import altered
 from tests.least_squares import least_squares_without_jacobian
 
 EXACT_MM = 1e-6
@@ -46,14 +47,8 @@ def test_some_of_these_data_need_the_solver_around_singularities(visit, make_pro
     ends = []
     for seed in SEEDS:
         problem = make_problem(visit(seed=seed).measured())
-        ends.append(
-            levenberg_marquardt.solve(
-                problem,
-                problem.prior.precision,
-                free=problem.prior.free,
-                poses=problem.start,
-            )
-        )
+        start = {"free": problem.prior.free, "poses": problem.start}
+        ends.append(levenberg_marquardt.solve(problem, problem.prior.precision, **start))
     blocked = [end for end in ends if end.termination is Termination.SINGULAR]
     assert blocked
     assert len(blocked) < len(ends)
@@ -102,14 +97,7 @@ def test_where_the_gauges_were_zeroed_does_not_matter(visit, make_problem):
     """The constant of each point is an unknown."""
     measured = visit(seed=2).measured(0.01, seed=3)
     offsets = np.random.default_rng(0).uniform(-4.0, 4.0, (5, 3))
-    from dataclasses import replace
-
-    moved = type(measured)(
-        tuple(
-            replace(record, deviation=tuple(np.add(record.deviation, offsets[record.point - 1]).tolist()))
-            for record in measured.records
-        )
-    )
+    moved = altered(measured, lambda r: {"deviation": np.add(r.deviation, offsets[r.point - 1])})
     there, here = identify(make_problem(moved)), identify(make_problem(measured))
     assert there.geometry.largest_difference(here.geometry) < EXACT_MM
     assert there.chi2 == pytest.approx(here.chi2)

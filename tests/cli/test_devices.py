@@ -75,6 +75,15 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No answer is expected: there is nothing to wait for."""
+    shorter = SearchTimeouts(gauge=0.3, adapter=0.3)
+    monkeypatch.setattr(
+        "hexacell.cli.commands.devices.search_devices", partial(search_devices, timeouts=shorter)
+    )
+
+
 @pytest.mark.usefixtures("no_ports")
 def test_a_machine_without_devices_is_told_what_to_plug_in(typed_here) -> None:
     outcome = typed_here("devices", "--controller", NOBODY)
@@ -85,6 +94,7 @@ def test_a_machine_without_devices_is_told_what_to_plug_in(typed_here) -> None:
     assert "For your cell file" not in outcome.out
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_ports", "patient")
 def test_every_protocol_is_found_and_the_text_is_that_of_a_cell_file(typed_here, served, addresses) -> None:
     gauges, adapter, controller = addresses
@@ -123,7 +133,7 @@ def test_an_instrument_of_each_protocol_that_is_tried_is_found(typed_here) -> No
     assert "Not tried" not in outcome.err
 
 
-@pytest.mark.usefixtures("no_ports", "patient")
+@pytest.mark.usefixtures("no_ports", "hasty")
 def test_what_no_protocol_understands_is_told(typed_here) -> None:
     """As of a gauge at another baud rate."""
     with answering(lambda received: bytes(byte ^ 0x55 for byte in received) + b"\r") as port:
@@ -171,7 +181,7 @@ def streams() -> Iterator[SimulatedGaugeBank]:
         yield bank
 
 
-@pytest.mark.usefixtures("no_ports", "patient")
+@pytest.mark.usefixtures("no_ports", "hasty")
 def test_gauges_that_send_unasked_are_heard(typed_here, streams) -> None:
     ports = [streams.gauges[0].port, streams.gauges[2].port]
     outcome = typed_here("devices", *ports, "--controller", NOBODY, "--json")
@@ -216,7 +226,7 @@ def test_an_instrument_with_visa_is_asked_its_name(typed_here) -> None:
     assert f"{at}: is HEXACELL,SIMULATED,0,1. Say what it is asked with protocol" in said
 
 
-@pytest.mark.usefixtures("no_ports")
+@pytest.mark.usefixtures("no_ports", "hasty")
 def test_ports_of_nothing_and_of_nobody_are_told(typed_here, tmp_path) -> None:
     near, far = os.openpty()
     name = os.ttyname(far)

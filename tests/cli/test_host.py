@@ -192,6 +192,7 @@ async def test_a_host_that_cannot_begin_says_why(cell, run) -> None:
     await until(lambda: not hosts_of(cell))
 
 
+@pytest.mark.slow
 async def test_a_killed_host_is_missed_and_its_run_resumed(cell, run) -> None:
     connection = await start_host(socket_path(cell), arguments(cell, run))
     await until_told(connection, is_record)

@@ -198,6 +198,7 @@ def test_a_list_of_poses_goes_through_the_same_preflight(
         assert word in outcome.err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("one_robot")
 def test_a_list_of_poses_that_can_be_measured(typed_here: Any, cell_folder: Any) -> None:
     """Gauges with a long travel can measure it even on an uncalibrated robot."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import signal
 from pathlib import Path
 
 import pytest
@@ -125,26 +124,6 @@ class TestAPersonAtTheTerminal:
         assert ": fail" in process.out
         assert "/45" in terminal.shown  # the bar
         assert re.search(r"point 1  +\d+ records", process.out), "not swallowed by the bar's terminal"
-
-    def test_pauses_undoes_and_resumes_by_letters(self, quick_cell, start, terminal):
-        quick_cell.edit(BY_HAND)
-        process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
-        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
-        terminal.type("\n")
-        terminal.type("p\n")
-        process.wait_for("paused\n", lambda: process.out)
-        terminal.type("x\nr\n")
-        process.wait_for("resumed\n", lambda: process.out)
-        assert process.out.count("Letters, each with Enter") == 2, (
-            "at the beginning, and for what means none"
-        )
-        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
-        process.popen.send_signal(signal.SIGTERM)
-        assert ended(process, terminal) == 130
-        [run] = quick_cell.runs()
-        kinds = [event.kind for event in read_journal(run / "journal.jsonl")]
-        assert (kinds.count("paused"), kinds.count("resumed")) == (1, 1)
-        assert kinds[-1] == "interrupted"
 
     def test_is_asked_how_to_go_on_after_a_fault(self, quick_cell, start, terminal):
         quick_cell.edit(BY_HAND, ("[acceptance]", "[acceptance]\ndrift_mm = 0.00001"))

@@ -125,6 +125,7 @@ def test_a_closed_terminal_stops_the_run_with_a_json_document(start, good_cell):
     assert "To continue:" in outcome.err
 
 
+@pytest.mark.slow
 def test_sigterm_stops_a_run_that_ignores_ctrl_c(start, good_cell):
     """As in the background job of a shell script."""
     process = start("run", good_cell.cell, "--unattended", through="trap '' INT; exec \"$@\"")

@@ -56,6 +56,7 @@ def test_the_experiment_is_repeated(typed, tmp_path: Path) -> None:
     assert (tmp_path / "kept" / "experiment.svg").read_text().startswith("<svg ")
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_goes_on_where_it_was(start, typed, tmp_path: Path) -> None:
     """Also after a power cut in the middle of a line."""
     process = start(*PAPER)

@@ -34,12 +34,11 @@ class ResultState(IntEnum):
 
 
 EVALUATIONS = {
+    None: ResultEvaluation.UNDEFINED,
     Verdict.PASS: ResultEvaluation.OK,
     Verdict.FAIL: ResultEvaluation.NOT_OK,
-    Verdict.CONDITIONAL_PASS: ResultEvaluation.NOT_DECIDABLE,
-    Verdict.CONDITIONAL_FAIL: ResultEvaluation.NOT_DECIDABLE,
-    Verdict.NOT_EVALUATED: ResultEvaluation.NOT_DECIDABLE,
 }
+"""By the verdict of a run; for other verdicts it cannot be decided."""
 
 SEVERITIES = {
     ResultEvaluation.OK: 100,
@@ -82,7 +81,7 @@ def published_result(cell: str, run: PastRun, *, is_simulated: bool) -> Publishe
         is_simulated,
         ResultState.ABORTED if verdict is None else ResultState.COMPLETED,
         summary.ended,
-        ResultEvaluation.UNDEFINED if verdict is None else EVALUATIONS[verdict],
+        EVALUATIONS.get(verdict, ResultEvaluation.NOT_DECIDABLE),
         summary.line,
         summary.mode,
         "" if verdict is None else verdict.value,

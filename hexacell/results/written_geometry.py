@@ -16,7 +16,6 @@ from hexacell.cell.model import CellSettings
 from hexacell.identification.diagnostics.frame_alignment import PoseErrors, choose_frames
 from hexacell.identification.identified_zeros import ParameterChoice
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.pose import PoseBatch
 from hexacell.robot.model import Robot
 
 
@@ -67,17 +66,12 @@ def as_written(settings: CellSettings, robot: Robot, identified: Geometry) -> Wr
     """
     if robot.identifies is not ParameterChoice.ALL:
         return WrittenGeometry(robot.for_controller(identified), None)
+    task = Task.of(settings, robot, robot.belief())
     choice = choose_frames(
         robot.mechanism,
         robot.branch,
         taught=robot.taught,
         new=identified,
-        poses=_task_commands(settings, robot),
+        poses=robot.frames.inverse().poses(task.poses),
     )
     return WrittenGeometry(choice.geometry, TaskDisplacement.of(choice.displacement, settings.acceptance))
-
-
-def _task_commands(settings: CellSettings, robot: Robot) -> PoseBatch:
-    """The task poses, as they are commanded."""
-    task = Task.of(settings, robot, robot.belief())
-    return robot.frames.inverse().poses(task.poses)

@@ -95,11 +95,11 @@ class ScreenModel:
             ScreenAction.START: self._start,
             ScreenAction.PREVIEW: self._preview,
             ScreenAction.EXCLUDE: self._exclude,
-            ScreenAction.COMPARE: self._compare,
+            ScreenAction.COMPARE: partial(self._show_below, workplace.compare),
             ScreenAction.ROLL_BACK: partial(self._change_config, workplace.roll_back),
             ScreenAction.APPLY: partial(self._change_config, workplace.apply),
             ScreenAction.OPEN: self._open,
-            ScreenAction.DRIFT: self._drift,
+            ScreenAction.DRIFT: partial(self._show_below, lambda _: workplace.drift()),
             ScreenAction.STEP: self._step,
             ScreenAction.PLAY: self._play,
         }
@@ -391,11 +391,8 @@ class ScreenModel:
         await self._workplace.toggle_exclusion(name, () if self._tried is None else self._tried.poses)
         await self._preview("")
 
-    async def _compare(self, run: str) -> None:
-        self._compared = await self._workplace.compare(run)
-
-    async def _drift(self, _: str) -> None:
-        self._compared = await self._workplace.drift()
+    async def _show_below(self, found: Callable[[str], Awaitable[tuple[str, ...]]], run: str) -> None:
+        self._compared = await found(run)
 
     async def _change_config(
         self, change: Callable[[str, str], Awaitable[tuple[str, ...]]], run: str

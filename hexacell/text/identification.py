@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from hexacell.identification.diagnostics.model_tests import contradicted_points
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.result import Identification
@@ -28,6 +26,8 @@ def identification_report(assessed: Assessment) -> str:
     expanded = ""
     if budget is not None and not assessed.refused:
         expanded = f" U at the task poses is {budget.expanded_mm:.3f} mm."
+    pairs = [wrapped(sentence, indent=2) for sentence in pair_sentences(assessed)]
+    more = len(assessed.correlated) - len(pairs)
     parts = (
         "\n".join(wrapped(sentence) for sentence in findings(assessed)),
         wrapped(f"Verdict: {Verdict.NOT_EVALUATED}, as no held-out records test this model.{expanded}"),
@@ -44,7 +44,12 @@ def identification_report(assessed: Assessment) -> str:
         noise_table(assessed.noise),
         "" if assessed.measured_noise is None else measured_noise_text(assessed.measured_noise),
         repeatability_lines(assessed.repeatability),
-        correlation_lines(pair_sentences(assessed), len(assessed.correlated)),
+        "\n".join(
+            [
+                *pairs,
+                *([f"and {_counted(more, 'more pair')} beyond 0.9 (--json lists them)"] if more else []),
+            ]
+        ),
     )
     return "\n\n".join(part for part in parts if part)
 
@@ -139,17 +144,6 @@ def repeatability_lines(scatter: Repeatability | None) -> str:
         f"x {x:.4f}, y {y:.4f}, z {z:.4f} mm "
         f"({_counted(scatter.degrees_of_freedom, 'degree')} of freedom)."
     )
-
-
-def correlation_lines(sentences: Sequence[str], strong: int) -> str:
-    """The strongest correlations, and how many of the ``strong`` ones are not printed."""
-    if not strong:
-        return ""
-    lines = [wrapped(sentence, indent=2) for sentence in sentences]
-    more = strong - len(sentences)
-    if more:
-        lines.append(f"and {_counted(more, 'more pair')} beyond 0.9 (--json lists them)")
-    return "\n".join(lines)
 
 
 def _counted(number: int, noun: str) -> str:

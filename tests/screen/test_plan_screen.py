@@ -6,18 +6,20 @@ import asyncio
 import shutil
 from pathlib import Path
 
+import pytest
 from textual.events import Key
 from textual.pilot import Pilot
 
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.dry_run.campaign import VisitedPose
+from hexacell.errors import UsageError
 from hexacell.kinematics.pose import Pose
 from hexacell.screen.child import TriedPlan
-from hexacell.screen.further_screens import PlanScreen
 from hexacell.screen.overlays import FaultOverlay
+from hexacell.screen.preferences import ONCE, ScreenAction
 from hexacell.screen.widgets import RowList
 from hexacell.services.preflight import toggle_exclusion
-from tests.screen.conftest import Opened, settled
+from tests.screen.conftest import Opened, attended
 from tests.screen.test_job import press, shown, until_shown
 from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot
 from tests.waiting import until
@@ -83,16 +85,14 @@ async def test_a_key_excludes_in_the_cell_file_and_the_plan_is_tried_anew(
         assert workplace.cell.path.read_text() == before
 
 
-async def test_nothing_is_excluded_while_a_run_goes_on(cell: Cell, opened: Opened, tmp_path: Path) -> None:
+async def test_nothing_is_excluded_while_a_run_goes_on(cell: Cell, tmp_path: Path) -> None:
     workplace, run = FileWorkplace(cell, tmp_path), ToldRun()
     run.begin(workplace.cell)
     workplace.run = run
-    async with opened(workplace) as pilot:
-        await until(lambda: pilot.app.current_mode == "measure")
-        await press(pilot, "2", "x")
-        await until(lambda: bool(rows(pilot)))
-        await press(pilot, "x", "down", "x")
-        await settled(pilot)
+    async with attended(workplace) as model:
+        await until(lambda: model.may_leave_run)
+        with pytest.raises(UsageError, match="exclude has no effect now"):
+            await model.perform(ScreenAction.EXCLUDE, "1")
         assert not workplace.cell.settings.exclusions
 
 
@@ -117,10 +117,9 @@ async def test_the_latest_trial_counts_and_keys_are_heard_meanwhile(
         await until_shown(pilot, "15 records give 0.076 mm.")
 
 
-async def test_a_plan_that_cannot_be_tried_says_why(cell: Cell, opened: Opened) -> None:
-    workplace = ToldWorkplace(cell, live=[snapshot()], plan=TriedPlan(lines=("The config is not there.",)))
-    async with opened(workplace) as pilot:
-        await press(pilot, "2", "x")
-        assert isinstance(pilot.app.screen, PlanScreen)
-        await press(pilot, "x", "escape")
-        await until_shown(pilot, "The config is not there.")
+async def test_a_plan_that_cannot_be_tried_says_why(cell: Cell) -> None:
+    plan = TriedPlan(lines=("The config is not there.",))
+    async with attended(ToldWorkplace(cell, live=[snapshot()], plan=plan)) as model:
+        await model.perform(ScreenAction.PREVIEW, ONCE)
+        assert model.shown("preflight")["plan"] == (["The config is not there."],)
+        assert list(model.shown("plan")["poses"][0]) == []

@@ -104,8 +104,8 @@ def traceability_chapter(run: ReportedRun) -> Chapter:
             number = f"{number} (U {one.expanded_um:g} um)"
         due = "" if one.due is None else f"{one.due.isoformat()}{': EXPIRED' if one.due < day else ''}"
         rows.append((one.device.name, one.device.description, one.serial_number or NOT_STATED, number, due))
-    expired = run.settings.expired_on(day)
-    text = f"Expired on the day of the run: {', '.join(expired)}."
+    expired = ", ".join(run.settings.expired_on(day))
+    text = f"Expired on the day of the run: {expired}."
     note = (Paragraph(text, is_strong=True),) if expired else ()
     table = Table(("Instrument", "kind", "serial number", "certificate", "due"), tuple(rows), None)
     return Chapter("Instruments and traceability", (table, *note))

@@ -123,7 +123,15 @@ def _with_event(picture: RunPicture, message: EventRecorded) -> RunPicture:
     picture = replace(picture, state=apply(picture.state, event), last=event, refusal=None)
     match event:
         case events.StepBegun(step=step):
-            return _with_step(picture, step)
+            picture = replace(picture, step=step, setback=None)
+            if not isinstance(step, Move) or (expected := step.expected) is None:
+                return picture
+            records, forecast = len(picture.state.samples(Phase.IDENTIFY)), expected.forecast
+            return replace(
+                picture,
+                expected={**picture.expected, (step.at, step.orientation): expected},
+                forecasts=(*picture.forecasts, *([] if forecast is None else [(records, forecast)])),
+            )
         case events.RecordTaken():
             return replace(picture, record_times=(*picture.record_times, message.at), step=None)
         case events.CommandRejected():
@@ -132,18 +140,6 @@ def _with_event(picture: RunPicture, message: EventRecorded) -> RunPicture:
             return replace(_with_setback(picture, event), step=None)
         case _:
             return picture
-
-
-def _with_step(picture: RunPicture, step: Step) -> RunPicture:
-    picture = replace(picture, step=step, setback=None)
-    if not isinstance(step, Move) or step.expected is None:
-        return picture
-    expected = {**picture.expected, (step.at, step.orientation): step.expected}
-    picture = replace(picture, expected=expected)
-    if step.expected.forecast is None:
-        return picture
-    records = len(picture.state.samples(Phase.IDENTIFY))
-    return replace(picture, forecasts=(*picture.forecasts, (records, step.expected.forecast)))
 
 
 def _with_setback(picture: RunPicture, setback: Setback) -> RunPicture:
@@ -158,16 +154,14 @@ def header_line(cell: str, picture: RunPicture) -> tuple[str, str, Urgency]:
     activity = MODES[described.mode]
     if described.is_recorded:
         where = f"hexacell | {cell} | recorded {activity} {described.folder.name}"
-        return where, _cursor(picture.cursor), Urgency.CALM
+        cursor = picture.cursor
+        if cursor is None:
+            return where, "RECORDED", Urgency.CALM
+        speed = f"x{cursor.speed:g}" if cursor.speed else "halted"
+        state = f"{cursor.at:%Y-%m-%d %H:%M:%S} {cursor.sequence}/{cursor.last} {speed}"
+        return where, state, Urgency.CALM
     state = picture.status.value.upper()
     if control is not None:
         watching = f"watching, {control.who or 'nobody'} is in control"
         state += f" | {'you are in control' if control.is_in_control else watching}"
     return f"hexacell | {cell} | {activity}", state, URGENT.get(picture.status, Urgency.CALM)
-
-
-def _cursor(cursor: CursorMoved | None) -> str:
-    if cursor is None:
-        return "RECORDED"
-    speed = f"x{cursor.speed:g}" if cursor.speed else "halted"
-    return f"{cursor.at:%Y-%m-%d %H:%M:%S} {cursor.sequence}/{cursor.last} {speed}"

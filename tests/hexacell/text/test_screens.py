@@ -35,7 +35,7 @@ from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import Verification
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
-from procedures.run.questions import ask_acceptance, ask_mounting, ask_startup
+from procedures.run.questions import Question, ask_acceptance, ask_mounting, ask_startup
 from procedures.run.state import fold
 from procedures.run.trips import Guard
 from procedures.steps import events
@@ -121,30 +121,41 @@ def test_what_is_urgent_is_said_in_words_too() -> None:
     ]
 
 
-def test_without_devices_that_is_said() -> None:
-    assert device_lines(None) == [("No device is connected.", Urgency.CALM)]
-
-
 def test_a_line_of_a_gauge_fits_a_narrow_terminal() -> None:
+    assert device_lines(None) == [("No device is connected.", Urgency.CALM)]
     snapshot = LiveSnapshot(gauges=(gauge(shown_mm=-12.3456, noise_mm=0.0123, travel_mm=25.0),))
     line, _ = device_lines(snapshot, 12.0, (1.0, 1.0, 1.0))[0]
     assert len(line) <= 78
 
 
-def test_a_length_check_says_which_seat_and_not_to_zero() -> None:
-    view = question_view(ask_mounting(2, 2, Pose(0.0, 0.0, 500.0)), None)
-    assert view.title == "Mount the gauges in seat 2 of the fixture (mounting 2)"
-    assert "Do not zero them, and leave the fixture where it is." in view.paragraphs
-
-
-def test_an_emergency_stop_is_a_persons() -> None:
-    view = question_view(ask_startup(StartupAction.RESET_ESTOP, "it is stopped", is_theirs=True), None)
-    assert "this program does not. Is it reset?" in view.paragraphs[1]
-    assert [choice.key for choice in view.choices] == ["y", "n"]
-
-
-def test_guidance_without_a_run() -> None:
-    assert guidance(RunPicture(), None)["Now"] == "no run is being measured here"
+@pytest.mark.parametrize(
+    ("question", "words", "labels"),
+    [
+        (
+            ask_mounting(2, 2, Pose(0.0, 0.0, 500.0)),
+            ("Mount the gauges in seat 2 of the fixture (mounting 2)", "Do not zero them, and leave"),
+            ["they are in place: measure"],
+        ),
+        (
+            ask_startup(StartupAction.RESET_ESTOP, "it is stopped", is_theirs=True),
+            ("The controller is not ready", "this program does not. Is it reset?"),
+            ["yes", "no"],
+        ),
+        (
+            ask_acceptance("0.1 mm", Verification(verdict=Verdict.CONDITIONAL_PASS)),
+            ("The result did not pass.", "Without your word the old one is restored."),
+            ["yes, keep it", "no, restore the old config"],
+        ),
+    ],
+    ids=["mounting", "emergency stop", "result"],
+)
+def test_a_question_says_what_it_is_about_and_what_each_answer_does(
+    question: Question, words: tuple[str, ...], labels: list[str]
+) -> None:
+    view = question_view(question, None)
+    said = "\n".join((view.title, *view.paragraphs))
+    assert [text for text in words if text not in said] == []
+    assert [choice.label for choice in view.choices] == labels
 
 
 @pytest.mark.parametrize(
@@ -164,6 +175,7 @@ def test_guidance_without_a_run() -> None:
 )
 def test_guidance_says_what_happens_now(messages: tuple[HostMessage, ...], now: str) -> None:
     assert guidance(pictured(described(), *messages), None)["Now"] == now
+    assert guidance(RunPicture(), None)["Now"] == "no run is being measured here"
 
 
 def test_the_time_that_is_left_follows_from_the_pace() -> None:
@@ -178,12 +190,6 @@ def test_who_watches_is_told_who_is_in_control() -> None:
     assert guidance(picture, None)["Stop"] == "you only watch: grace is in control; c takes over"
     asked = picture_after(picture, QuestionOpened(question=ask_mounting(1, 1, Pose(0.0, 0.0, 0.0))), 0.0)
     assert guidance(asked, None)["Now"] == "a question waits for who is in control"
-
-
-def test_who_does_not_keep_a_result_knows_that_the_old_config_comes_back() -> None:
-    verification = Verification(verdict=Verdict.CONDITIONAL_PASS, before_mm=3.0, after_mm=0.1)
-    view = question_view(ask_acceptance("0.1 mm", verification), None)
-    assert [choice.label for choice in view.choices] == ["yes, keep it", "no, restore the old config"]
 
 
 def test_a_record_has_its_largest_residual_and_how_many_sigma_that_is() -> None:

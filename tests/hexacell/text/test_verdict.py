@@ -105,23 +105,29 @@ def test_a_check_names_the_parameter_that_changed_most(
 
 
 @pytest.mark.parametrize(
-    ("changes", "reason"),
+    ("verdict", "changes", "end"),
     [
-        ({"further_records": 12}, "about 12 more records would decide"),
-        ({}, "further records would not decide"),
-        ({"is_consistent": False}, "the residuals are larger than the stated noise explains"),
-        ({"accuracy": None}, "the robot can take none of the task poses"),
+        (
+            Verdict.PASS,
+            {},
+            "points; position error at the task poses 0.036 +- 0.040 mm (limit 0.15): pass",
+        ),
+        (Verdict.NOT_EVALUATED, {"further_records": 12}, "(about 12 more records would decide)"),
+        (Verdict.NOT_EVALUATED, {}, "(further records would not decide)"),
+        (
+            Verdict.NOT_EVALUATED,
+            {"is_consistent": False},
+            "(the residuals are larger than the stated noise explains)",
+        ),
+        (Verdict.NOT_EVALUATED, {"accuracy": None}, "(the robot can take none of the task poses)"),
     ],
 )
-def test_a_check_that_decides_nothing_says_why(changes: dict[str, object], reason: str) -> None:
-    assert check_line(result(Verdict.NOT_EVALUATED, **changes)).endswith(f": not evaluated ({reason})")
-
-
-def test_a_check_that_decides_states_error_and_limit() -> None:
-    assert check_line(result(Verdict.PASS)) == (
-        "check: 15 records at 2 points; position error at the task poses 0.036 +- 0.040 mm "
-        "(limit 0.15): pass"
-    )
+def test_the_line_of_a_check_has_its_figures_or_why_it_decides_nothing(
+    verdict: Verdict, changes: dict[str, object], end: str
+) -> None:
+    line = check_line(result(verdict, **changes))
+    assert line.startswith("check: ")
+    assert line.endswith(end)
 
 
 @pytest.mark.parametrize(

@@ -114,6 +114,7 @@ def test_what_will_be_stated_is_as_large_as_in_simulated_verifications(cell, sim
         assert np.std(seen) == pytest.approx(np.std(expected), rel=0.4)
 
 
+@pytest.mark.slow
 def test_as_many_simulated_machines_get_each_verdict_as_forecast(cell, simulated, forecast) -> None:
     middle = float(np.median([one.position.value + one.position.expanded for one in simulated]))
     limits = ErrorLimits(middle, 1.0)

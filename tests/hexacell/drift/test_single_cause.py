@@ -27,14 +27,14 @@ def test_unchanged_robots_alarm_as_seldom_as_stated() -> None:
 
 
 def test_scores_are_standard_normal() -> None:
-    scores = np.array([outcome(seed).scores for seed in range(400)])
+    scores = np.array([outcome(seed).scores for seed in range(200)])
     assert np.abs(scores.mean(axis=0)).max() < 0.2
     assert np.abs(scores.std(axis=0) - 1.0).max() < 0.15
 
 
 def test_a_change_is_estimated_with_its_sigma() -> None:
     change = np.array([0.0, 0.0, 0.0, 6.0, 0.0, 0.0])
-    found = [outcome(seed, change) for seed in range(150)]
+    found = [outcome(seed, change) for seed in range(100)]
     errors = [(one.changes[3] - 6.0) / one.sigmas[3] for one in found]
     assert np.mean(errors) == pytest.approx(0.0, abs=0.33)
     assert np.std(errors) == pytest.approx(1.0, abs=0.25)

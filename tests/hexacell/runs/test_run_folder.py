@@ -35,15 +35,6 @@ class Noon(datetime):
         return datetime(2026, 11, 20, 12, 0, 0, tzinfo=UTC).astimezone(tz)
 
 
-def test_runs_are_kept_beside_the_cell_file(cell: Cell) -> None:
-    assert runs_folder(cell) == cell.path.parent / "runs" / "simulated-hexaglide"
-
-
-def test_a_run_is_named_after_its_beginning(cell: Cell, monkeypatch) -> None:
-    monkeypatch.setattr(run_folder, "datetime", Noon)
-    assert new_run(cell).path == runs_folder(cell) / "2026-11-20T120000Z"
-
-
 def test_naming_a_run_makes_nothing(cell: Cell) -> None:
     new_run(cell)
     assert not runs_folder(cell).exists()

@@ -1,3 +1,5 @@
+"""One process at a time holds a cell, whoever made the lock file; a process that is gone holds none."""
+
 import fcntl
 import getpass
 import os

@@ -1,3 +1,5 @@
+"""Every value of a TOML text is found where it stands, whatever stands around it."""
+
 import re
 import tomllib
 from typing import Any

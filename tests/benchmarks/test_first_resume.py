@@ -1,7 +1,7 @@
 """A first resume must do: killed at random instants, runs of the bundled, noisy cell are resumed once.
 
 The program runs as it is installed, in processes of its own. A sample on a small cell without noise
-is in ``make test`` (``tests/faults/test_killed_at_random.py``).
+is in ``make test-full`` (``tests/faults/test_killed.py``).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from procedures.journal.journal import read_journal
 from tests.benchmarks.figures import NEVER
 from tests.benchmarks.samples import sample
 from tests.faults.steps import step_of
-from tests.faults.test_killed_at_random import instants
+from tests.faults.test_killed import instants
 
 KILLS = sample(__name__, "KILLS")
 

@@ -1,15 +1,23 @@
-"""SIGKILL after every record of a run, within records, and again while it is resumed."""
+"""SIGKILL after and within records, at random instants, while a run resumes, beside a living cell."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import random
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
 
 from procedures.steps import events
+from tests.faults.cell import Site
+from tests.faults.conftest import ROOT
 from tests.faults.killing import KILLED, after, finish, history_of, places, within
 from tests.faults.promises import require_identical
+from tests.faults.steps import STEPS
+from tests.signals import terminal_signals
 
 Break = Callable[..., None]
 
@@ -100,3 +108,77 @@ def test_a_run_killed_after_any_record_of_the_noise_is_resumed(program, new_site
         assert program.run(site, **after(records)).code == KILLED
         finish(program, site)
         require_identical(site, noise_measured.site)
+
+
+INSTANTS = 200
+
+SOONER = 0.95
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_a_run_killed_at_a_random_instant_is_resumed(program: Any, new_site: Any, undisturbed: Any) -> None:
+    duration_s = undisturbed.ended.seconds
+    for share in instants(INSTANTS):
+        site, duration_s = killed(program, new_site, share, duration_s)
+        finish(program, site)
+        require_identical(site, undisturbed.site)
+
+
+def instants(number: int) -> list[float]:
+    """Evenly over the time that a run takes, as shares of it, each moved at random."""
+    chance = random.Random(number)
+    return [(place + chance.random()) / number for place in range(number)]
+
+
+def killed(program: Any, new_site: Any, share: float, duration_s: float) -> tuple[Any, float]:
+    """A run killed at an instant of it; and how long a run takes, less if it was over already then."""
+    while True:
+        site = new_site()
+        ended = program.run(site, die_after_s=share * duration_s)
+        if ended.code == KILLED:
+            return site, duration_s
+        assert ended.code == 0, ended.words
+        duration_s = SOONER * min(duration_s, ended.seconds)
+
+
+STEPS_OF_A_RUN = [step for step in STEPS if step not in {"beginning", "revisiting", "ending"}]
+"""Those that begin in a run that nothing has disturbed yet."""
+
+
+@contextmanager
+def served(site: Site) -> Iterator[None]:
+    """Have another process serve the site's cell; its cell file leads there."""
+    own = site.folder / "own.toml"
+    site.cell_path.rename(own)
+    with terminal_signals():
+        simulating = subprocess.Popen(
+            [sys.executable, "-m", "hexacell", "simulate", own, "--output", site.cell_path],
+            cwd=ROOT,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    with simulating as process:
+        try:
+            assert process.stderr is not None
+            assert "serving" in process.stderr.readline()
+            own.unlink()
+            yield
+        finally:
+            process.terminate()
+
+
+def run_over_killed(records: int, program: Any, site: Site, whole: Any) -> None:
+    with served(site):
+        assert program.run(site, **after(records)).code == KILLED
+        finish(program, site, code=whole.ended.code)
+        require_identical(site, whole.site)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("step", STEPS_OF_A_RUN)
+def test_a_run_killed_at_any_kind_of_step_is_resumed(step, program, new_site, whole_with):
+    whole = whole_with(step)
+    records = places(whole.history)[step]
+    run_over_killed(records, program, new_site(*whole.changes), whole)

@@ -12,7 +12,7 @@ from procedures.steps.base import StepWithoutMotion
 from procedures.steps.registry import STEPS as STEPS_OF_RUNS
 from tests.faults.killing import KILLED
 from tests.faults.steps import STEPS, step_of
-from tests.faults.test_killed_at_random import killed
+from tests.faults.test_killed import killed
 
 WITHOUT_MOTION: list[Any] = [step for step in STEPS_OF_RUNS if issubclass(step, StepWithoutMotion)]
 

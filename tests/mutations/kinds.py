@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from tests.mutations import trials, unattended
+from tests.mutations import trials
 from tests.mutations.prompts import answers_to_prompts
 from tests.mutations.trials import Trial
 
@@ -20,10 +20,10 @@ SHARES: dict[Trial, int] = {
     trials.run_resumed: 10,
     trials.run_checked: 5,
     answers_to_prompts: 5,
-    unattended.cell_file_scheduled: 60,
-    unattended.earlier_runs_listed: 30,
-    unattended.config_writes_listed: 20,
-    unattended.run_reported: 30,
+    trials.cell_file_scheduled: 60,
+    trials.earlier_runs_listed: 30,
+    trials.config_writes_listed: 20,
+    trials.run_reported: 30,
 }
 """How many of a thousand trials are of which kind; those that compute much are rarer."""
 

@@ -1,19 +1,30 @@
-"""From any position of the robot: a checked line, a checked route, or a refusal."""
+"""From any position of the robot: a checked line, a checked route, or a refusal; and the way back."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from hexacell.campaign.planner import Plan
+from hexacell.campaign.stopping_rules import REFUSALS
+from hexacell.errors import IdentifiabilityError
+from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.motion import paths
 from hexacell.motion import paths as route_module
+from hexacell.motion.trajectory import interpolate_line
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
+from procedures.run.keys import Phase
 from procedures.run.state import fold
 from procedures.steps import events
 from procedures.steps.move import Move
 from procedures.workflow import sets as path_planning
+from procedures.workflow.points import IdentificationSteps
 from procedures.workflow.sets import NoSafePath
 from tests.procedures.story import located, next_step
 
@@ -115,3 +126,140 @@ async def test_without_a_route_the_run_ends_without_moving(make_rig, monkeypatch
     assert [e.failure.value for e in read_journal(rig.folder.journal) if isinstance(e, events.Failed)] == [
         "no_way"
     ]
+
+
+ORIENTATIONS = 9
+
+
+class ClearLines:
+    """Stands in for the check of straight lines: only those to some orientations are clear."""
+
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, *clear_to: int, stops: tuple[Pose, ...] = ()
+    ) -> None:
+        self.clear_to = clear_to
+        self.stops = stops
+        monkeypatch.setattr(IdentificationSteps, "_known", lambda *_: (None, self))
+        monkeypatch.setattr(paths, "is_clear", self._is_clear)
+        monkeypatch.setattr(paths, "PathPlanner", self._departure)
+        self.reference = np.zeros(3)
+
+    def _departure(self, _: Any, start: Any, home: Any, reference: Any) -> Any:
+        def plan(end: Any) -> Any:
+            clear = self._is_clear(_, start, end, reference)
+            return [SimpleNamespace(waypoints=self.stops) if clear else None]
+
+        assert home is None
+        return SimpleNamespace(plan=plan)
+
+    def _is_clear(self, _: Any, present: Any, target: Any, reference: Any) -> bool:
+        assert reference is self.reference
+        # A story's poses differ in their angle a: orientation less one, in degrees.
+        return round(target.pose(0).a) + 1 in self.clear_to
+
+
+@pytest.mark.parametrize(
+    ("clear_to", "way"),
+    [((1,), [1]), ((4, 1), [1]), ((4,), [4, 3, 2, 1]), ((), [8, 7, 6, 5, 4, 3, 2, 1]), ((6, 5, 2), [2, 1])],
+)
+def test_the_return_to_the_reference_uses_clear_lines_or_visited_poses(
+    make_rig, story, monkeypatch, clear_to, way
+) -> None:
+    ClearLines(monkeypatch, *clear_to)
+    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
+    visited: list[int] = []
+    while isinstance(step := next_step(calibration, fold(happened)), Move):
+        visited.append(step.orientation)
+        happened.append(story().arrived(step.orientation, step.pose))
+    assert visited == way
+    assert step.key == "P1/close"
+
+
+def test_a_return_path_over_waypoints_visits_each_of_them(make_rig, story, monkeypatch) -> None:
+    stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
+    ClearLines(monkeypatch, 1, stops=(stop,))
+    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
+    step = next_step(calibration, fold(happened))
+    assert isinstance(step, Move)
+    assert step.key == "P1/o00/move"
+    assert step.pose == pytest.approx(stop.as_tuple())
+    step = next_step(calibration, fold([*happened, story().arrived(0, step.pose)]))
+    assert step.key == "P1/o01/move"
+
+
+def test_a_return_path_is_not_planned_again_at_its_waypoint(make_rig, story, monkeypatch) -> None:
+    """No line is clear from the waypoint; planning from there would go back and forth endlessly."""
+    stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
+    stands_in = ClearLines(monkeypatch, 1, stops=(stop,))
+    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
+    to_stop = next_step(calibration, fold(happened))
+    assert isinstance(to_stop, Move)
+    asked: list[float] = []
+
+    def from_the_last_record_only(_: Any, start: Any, home: Any, reference: Any) -> Any:
+        asked.append(start.pose(0).a)
+        return stands_in._departure(_, start, home, reference)
+
+    monkeypatch.setattr(paths, "PathPlanner", from_the_last_record_only)
+    monkeypatch.setattr(paths, "is_clear", lambda *_: False)
+    step = next_step(calibration, fold([*happened, story().arrived(0, to_stop.pose)]))
+    assert step.key == "P1/o01/move"
+    assert asked == pytest.approx([ORIENTATIONS - 1.0])
+
+
+def test_without_a_clear_line_the_return_visits_the_waypoints_passed_before(make_rig, story, monkeypatch):
+    ClearLines(monkeypatch)
+    stop = (100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
+    s = story()
+    led = [s.arrived(0, stop), s.arrived(3), s.sampled(3)]
+    step = next_step(
+        make_rig().calibration, fold([*s.whole(2)[:-2], *led, *[s.refused(4)] * (REFUSALS + 1)])
+    )
+    assert isinstance(step, Move)
+    assert (step.key, step.pose) == ("P1/o00/move", stop)
+
+
+def test_the_return_from_a_refused_pose_begins_at_the_last_record(make_rig, story, monkeypatch) -> None:
+    ClearLines(monkeypatch)
+    refusals = [story().arrived(5), story().refused(5)] * (REFUSALS + 1)
+    step = next_step(make_rig().calibration, fold([*story().whole(4)[:-2], *refusals]))
+    assert step.key == "P1/o04/move"
+
+
+def test_without_an_estimate_the_return_visits_every_previous_pose(make_rig, story, monkeypatch) -> None:
+    def unknown(*_: Any) -> Any:
+        raise IdentifiabilityError("the records cannot be followed")
+
+    monkeypatch.setattr(Plan, "estimate", unknown)
+    step = next_step(make_rig().calibration, fold(story().whole(ORIENTATIONS)[:-2]))
+    assert step.key == f"P1/o{ORIENTATIONS - 1:02d}/move"
+
+
+def test_the_ball_stays_inside_the_travel_on_every_path(recording, make_rig) -> None:
+    """Judged by the truth, which the procedure does not know."""
+    rig = make_rig()
+    robot, truth = rig.calibration.robot, rig.physics._truth
+    settings = rig.cell.settings
+    here: dict[Any, PoseBatch] = {}
+    reference: dict[Any, Any] = {}
+    farthest = 0.0
+    for event in recording.history:
+        if not isinstance(event, events.Arrived) or event.at.phase is not Phase.IDENTIFY:
+            continue
+        there = PoseBatch.of([Pose(*event.pose)])
+        way = interpolate_line(here.get(event.at, there), there)
+        joints = inverse_kinematics(robot.mechanism, robot.controller, robot.branch, way)
+        really = continue_solution(
+            robot.mechanism,
+            truth,
+            joints,
+            start=way,
+            start_geometry=robot.controller,
+            start_joints=joints,
+        )
+        assert really.found.all()
+        balls = really.poses.positions
+        farthest = max(farthest, np.abs(balls - reference.setdefault(event.at, balls[0])).max())
+        here[event.at] = there
+    # The estimate that the ways were checked with was a little wrong itself.
+    assert 1.0 < farthest < 1.1 * settings.limits.gauge_travel_mm

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.interfaces import ControllerStatus
+from drivers.interfaces import ControllerStatus, GaugeReading
 from hexacell.cell.measuring import TimingSettings
 from hexacell.errors import DeviceError
-from procedures.devices.device_set import Devices, LiveValues
+from procedures.devices.device_set import Devices, LiveValues, poll_for_screens
 from procedures.devices.settling import settle
 from procedures.guards.guards import Guards
+from tests.waiting import until
 
 
 @pytest.fixture
@@ -92,3 +93,43 @@ async def test_a_slow_subscriber_gets_the_latest_and_no_older_ones(live, devices
     assert live.encoders.value is not None
     await changes.aclose()
     assert not live._subscribers
+
+
+async def test_every_device_is_read_again_and_again_whatever_fails(bench) -> None:
+    live = LiveValues(bench.clock.now)
+    devices = replace(bench.devices, live=live)
+    bench.encoders.failure = DeviceError("is silent", subject="encoders")
+    polling = asyncio.ensure_future(poll_for_screens(devices, period_s=0.0))
+    await until(lambda: live.gauge("z").value is not None and live.encoders.problem != "")
+    assert live.controller.value is not None
+    assert live.stop_reason.value == ""
+    bench.gauges[2].shown = lambda: 1.5
+    await until(lambda: live.gauge("z").value == GaugeReading(1.5, "+1.500"))
+    bench.clock.time_s += 10.0
+    bench.encoders.failure = None
+    polling.cancel()
+    await asyncio.wait([polling])
+    assert polling.cancelled()
+
+
+async def test_what_somebody_else_reads_is_left_alone(bench) -> None:
+    live = LiveValues(bench.clock.now)
+    devices = replace(bench.devices, live=live)
+    reads = 0
+
+    def shown() -> float:
+        nonlocal reads
+        reads += 1
+        return 0.0
+
+    bench.gauges[0].shown = shown
+    await devices.read_gauge_once(devices.gauges[0].gauge)
+    polling = asyncio.ensure_future(poll_for_screens(devices, period_s=0.001))
+    await until(lambda: live.gauge("y").value is not None)
+    for _ in range(50):
+        await asyncio.sleep(0)
+    assert reads == 1, "its value is as young as it was: the clock stands"
+    bench.clock.time_s += 1.0
+    await until(lambda: reads > 1)
+    polling.cancel()
+    await asyncio.wait([polling])

@@ -1,4 +1,4 @@
-"""Damaged journals and unknown versions are refused with the line number and not changed."""
+"""A torn last line is dropped; damaged journals and unknown versions are refused with the line."""
 
 from __future__ import annotations
 
@@ -13,6 +13,100 @@ from hypothesis import strategies as st
 from hexacell.errors import FileError
 from procedures.journal.journal import VERSION, Journal, read_journal
 from tests.procedures.journal.told import TOLD, checked, write_told
+
+
+def test_a_tail_torn_at_any_byte_is_dropped(path: Path, written: bytes) -> None:
+    begin = written.rindex(b"\n", 0, -1) + 1
+    for end in range(begin, len(written)):
+        path.write_bytes(written[:end])
+        assert read_journal(path) == TOLD[:-1]
+        with Journal(path) as journal:
+            assert journal.events == TOLD[:-1]
+        assert path.read_bytes() == written[:begin]
+
+
+def test_a_journal_is_continued_after_a_torn_tail(path: Path, written: bytes) -> None:
+    path.write_bytes(written[:-10])
+    with Journal(path) as journal:
+        journal.append(TOLD[-1])
+    assert read_journal(path) == TOLD
+
+
+def test_a_valid_last_line_of_an_unknown_kind_is_refused(path: Path, written: bytes) -> None:
+    body = b'{"n":%d,"at":"2026-11-20T10:30:00Z","s":1.0,"event":{"kind":"teleported"}}' % (len(TOLD) + 1)
+    path.write_bytes(written + checked(body))
+    with pytest.raises(FileError, match=r":5: .*not understood .*'teleported'") as refusal:
+        Journal(path)
+    assert refusal.value.action == "Use the version of hexacell that wrote it"
+    assert path.read_bytes().startswith(written)
+
+
+@pytest.mark.parametrize("twice", [0, 3])
+def test_a_repeated_record_as_last_line_is_damage(path: Path, written: bytes, twice: int) -> None:
+    path.write_bytes(written + written.splitlines(keepends=True)[twice])
+    with pytest.raises(FileError, match=rf":5: .*damaged: record {twice + 1} is in the place of record 5"):
+        read_journal(path)
+
+
+def zeros(data: bytes, begin: int, end: int) -> bytes:
+    return data[:begin] + bytes(len(data[begin:end])) + data[end:]
+
+
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_last_line_with_zeros_for_bytes_is_a_torn_tail(path: Path, data) -> None:
+    """As file systems leave it that lengthen a file before its blocks are written."""
+    written = path.read_bytes() if path.exists() else write_told(path)
+    last = written.rindex(b"\n", 0, -1) + 1
+    begin = data.draw(st.integers(last, len(written) - 1))
+    end = data.draw(st.integers(begin + 1, len(written)))
+    torn = path.with_name("torn")
+    torn.write_bytes(zeros(written, begin, end) + bytes(data.draw(st.sampled_from([0, 1, 4096]))))
+    assert read_journal(torn) == TOLD[:-1]
+    with Journal(torn) as journal:
+        journal.append(TOLD[-1])
+    assert read_journal(torn) == TOLD
+
+
+@pytest.mark.parametrize(
+    "tail", [b"\n", b"\r", b"ab\rcd", b"ab\r\n", b"\x85\n", b"{}\n", b'"crc":"00000000"}\n', bytes(512)]
+)
+def test_any_bytes_after_the_last_record_are_one_torn_line(path: Path, written: bytes, tail: bytes) -> None:
+    path.write_bytes(written + tail)
+    assert read_journal(path) == TOLD
+
+
+@pytest.mark.parametrize("tail", [b"\n\n", b"ab\ncd", b"ab\ncd\n"])
+def test_two_damaged_lines_are_more_than_a_torn_tail(path: Path, written: bytes, tail: bytes) -> None:
+    path.write_bytes(written + tail)
+    with pytest.raises(FileError, match=r":5: .*damaged"):
+        read_journal(path)
+
+
+def test_a_lost_line_end_before_the_last_line_loses_no_record(path: Path, written: bytes) -> None:
+    """Both lines together look like one torn tail, but the first of them had been acknowledged."""
+    place = written.rindex(b"\n", 0, -1)
+    path.write_bytes(written[:place] + b"\x00" + written[place + 1 :])
+    with pytest.raises(FileError, match=r":3: .*damaged"):
+        read_journal(path)
+
+
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_journal_cut_at_any_byte_keeps_all_whole_lines(path: Path, data) -> None:
+    written = path.read_bytes() if path.exists() else write_told(path)
+    cut = path.with_name("cut")
+    cut.write_bytes(written[: data.draw(st.integers(0, len(written)))])
+    whole = cut.read_bytes().count(b"\n")
+    assert read_journal(cut) == TOLD[:whole]
+
+
+def test_a_line_without_end_does_not_fill_the_memory(path: Path, written: bytes) -> None:
+    path.write_bytes(written + b"x" * 1000)
+    assert read_journal(path, longest_line=2000) == TOLD
+    path.write_bytes(written + b"x" * 5000)
+    with pytest.raises(FileError, match=r":5: .*damaged"):
+        read_journal(path, longest_line=2000)
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])

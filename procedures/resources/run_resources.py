@@ -36,7 +36,12 @@ from procedures.run.trips import Guard, Trip, WatchedSet
 
 @dataclass(frozen=True, eq=False)
 class RunResources:
-    """The resources of one run; a replay has others of the same kind."""
+    """The resources of one run; a replay has others of the same kind.
+
+    Attributes:
+        most_refusals: the controller refuses at most so many poses of one set; then a person is to look at
+            its limits.
+    """
 
     cell: Cell
     calibration: Calibration
@@ -45,6 +50,7 @@ class RunResources:
     operator: Operator
     folder: RunFolder
     thermometers: Thermometers = field(default_factory=Thermometers)
+    most_refusals: int = 40
 
     @property
     def settings(self) -> CellSettings:

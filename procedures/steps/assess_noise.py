@@ -13,19 +13,17 @@ from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.noise.noise_assessment import NoiseReadings, assess_noise
 from hexacell.noise.standstill import display_step
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import SetKey
 from procedures.run.state import RunState, SetState
-from procedures.steps.base import BaseEvent, Computation
+from procedures.steps.base import Computation, EventOfSet
 
 
-class NoiseMeasured(BaseEvent):
+class NoiseMeasured(EventOfSet):
     """The noise of gauges and encoders that the run counts with from now on.
 
     If records are the mean of several windows from now on, the set's reference is recorded again.
     """
 
     kind: Literal["noise measured"] = "noise measured"
-    at: SetKey
     noise: MeasuredNoise
 
     def applied_to(self, state: RunState) -> RunState:

@@ -32,6 +32,19 @@ class BaseEvent(Frozen):
         return None
 
 
+class EventOfSet(BaseEvent):
+    """Something that happened in a set."""
+
+    at: SetKey
+
+
+class EventAtPose(EventOfSet):
+    """Something that happened at one pose of a set; the first orientation is its reference."""
+
+    orientation: int
+    pose: SixNumbers
+
+
 class BaseStep(Frozen, ABC):
     """A step of a run.
 

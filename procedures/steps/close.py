@@ -9,21 +9,20 @@ import numpy as np
 
 from hexacell.measurements.records import deviation_of
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import SetKey, ThreeNumbers
+from procedures.run.keys import ThreeNumbers
 from procedures.run.readings import Reading, in_words
 from procedures.run.state import RunState
 from procedures.run.trips import Guard, Trip
-from procedures.steps.base import BaseEvent, StepOfSet
+from procedures.steps.base import EventOfSet, StepOfSet
 
 
-class SetClosed(BaseEvent):
+class SetClosed(EventOfSet):
     """The reference was read again; ``drift_mm`` is the change since it was zeroed.
 
     The ``reason`` is why the set has fewer records than planned; empty where it has all.
     """
 
     kind: Literal["closed"] = "closed"
-    at: SetKey
     drift_mm: ThreeNumbers
     reading: Reading
     reason: str = ""

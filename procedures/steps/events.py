@@ -23,7 +23,7 @@ from procedures.run.state import RunState, place_of
 from procedures.run.trips import Guard, Trip
 from procedures.steps.accept import ResultAccepted
 from procedures.steps.assess_noise import NoiseMeasured
-from procedures.steps.base import BaseEvent
+from procedures.steps.base import BaseEvent, EventOfSet
 from procedures.steps.close import SetClosed
 from procedures.steps.commit import Committed
 from procedures.steps.identify import Identified
@@ -151,11 +151,10 @@ class RunRecalled(BaseEvent):
         return f"the run is to end: {self.reason}; back to the reference"
 
 
-class RecordDiscarded(BaseEvent):
+class RecordDiscarded(EventOfSet):
     """A record no longer counts and is taken again at the same pose. It stays in the journal."""
 
     kind: Literal["undone"] = "undone"
-    at: SetKey
     orientation: int
 
     def applied_to(self, state: RunState) -> RunState:

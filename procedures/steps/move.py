@@ -19,13 +19,9 @@ from procedures.run.cancellation import in_thread
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.state import RunState
 from procedures.run.trips import Guard, GuardTripped, WatchedSet
-from procedures.steps.base import BaseEvent, StepAtPose
+from procedures.steps.base import BaseEvent, EventAtPose, StepAtPose
 from procedures.steps.identify import Identified
 from procedures.steps.sample import RecordRejected
-
-MOST_REFUSALS = 40
-"""The controller refuses at most so many poses of one set; then a person is to look at its limits."""
-
 
 OFF_THE_PLATE = {Guard.GAUGE_END, Guard.PLATE}
 """Guards that trip on the pose alone, while all devices work."""
@@ -34,13 +30,10 @@ STUCK_GAUGE_SIGMAS = 5.0
 """An expected displacement is reduced by so many standard deviations before a gauge counts as stuck."""
 
 
-class Arrived(BaseEvent):
+class Arrived(EventAtPose):
     """A move has ended at its pose."""
 
     kind: Literal["arrived"] = "arrived"
-    at: SetKey
-    orientation: int
-    pose: SixNumbers
 
     def applied_to(self, state: RunState) -> RunState:
         """The gauges of all other open sets may be carried away now."""
@@ -69,7 +62,7 @@ class Arrived(BaseEvent):
         return (*state.path_from_reference, (self.orientation, self.pose)) if is_at_its_end else ()
 
 
-class PoseExcluded(BaseEvent):
+class PoseExcluded(EventAtPose):
     """The controller refused a pose and did not move; it is not commanded again in this run.
 
     ``axis`` is the axis beyond whose limit it is, the highest or the lowest; then no pose is commanded that
@@ -78,9 +71,6 @@ class PoseExcluded(BaseEvent):
     """
 
     kind: Literal["excluded"] = "excluded"
-    at: SetKey
-    orientation: int
-    pose: SixNumbers
     reason: str
     axis: Literal["x", "y", "z", "a", "b", "c"] | None = None
     is_highest: bool = True
@@ -180,7 +170,7 @@ class Move(StepAtPose):
         """A refusal of the pose is no failure: the robot is where it was, and others may be possible."""
         has_stayed = await run.has_stayed(state)
         refusals = sum(one.at == self.at for one in state.excluded)
-        if refusals >= MOST_REFUSALS or not has_stayed:
+        if refusals >= run.most_refusals or not has_stayed:
             raise refusal
         excluded = PoseExcluded(
             at=self.at,

@@ -10,20 +10,16 @@ import numpy as np
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Record, deviation_of
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import SetKey, SixNumbers
 from procedures.run.readings import Reading
 from procedures.run.state import RunState
-from procedures.steps.base import BaseEvent, StepAtPose
+from procedures.steps.base import EventAtPose, StepAtPose
 from procedures.steps.sample import RecordRejected, read_inside
 
 
-class PilotTaken(BaseEvent):
+class PilotTaken(EventAtPose):
     """The reference was left for a pilot pose, and the gauges were read there."""
 
     kind: Literal["piloted"] = "piloted"
-    at: SetKey
-    orientation: int
-    pose: SixNumbers
     reading: Reading
 
     def record(self, zero: Reading) -> Record:

@@ -8,21 +8,20 @@ from typing import ClassVar, Literal
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import Phase, SetKey, SixNumbers
+from procedures.run.keys import Phase, SixNumbers
 from procedures.run.questions import ask_mounting, ask_placement
 from procedures.run.state import RunState
-from procedures.steps.base import BaseEvent, StepOfSet
+from procedures.steps.base import EventOfSet, StepOfSet
 
 
 class MountingError(DeviceError):
     """Gauges are not mounted as a set needs them; nothing can be measured with them before they are."""
 
 
-class GaugesPlaced(BaseEvent):
+class GaugesPlaced(EventOfSet):
     """The gauges are placed around the ball."""
 
     kind: Literal["placed"] = "placed"
-    at: SetKey
 
     def applied_to(self, state: RunState) -> RunState:
         return state.with_set(self.at, replace(state.set(self.at), placed=True))

@@ -6,17 +6,16 @@ from dataclasses import replace
 from typing import ClassVar, Literal
 
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import SetKey, ThreeNumbers
+from procedures.run.keys import ThreeNumbers
 from procedures.run.readings import Reading
 from procedures.run.state import RunState
-from procedures.steps.base import BaseEvent, StepOfSet
+from procedures.steps.base import EventOfSet, StepOfSet
 
 
-class GaugesProbed(BaseEvent):
+class GaugesProbed(EventOfSet):
     """The ball was moved by a small known distance from a set's reference, and the gauges were read."""
 
     kind: Literal["probed"] = "probed"
-    at: SetKey
     moved_mm: ThreeNumbers
     reading: Reading
 

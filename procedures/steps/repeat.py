@@ -6,17 +6,15 @@ from dataclasses import replace
 from typing import ClassVar, Literal
 
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import SetKey
 from procedures.run.readings import Reading
 from procedures.run.state import RunState
-from procedures.steps.base import BaseEvent, StepOfSet
+from procedures.steps.base import EventOfSet, StepOfSet
 
 
-class ReferenceRepeated(BaseEvent):
+class ReferenceRepeated(EventOfSet):
     """The reference was left, visited again from another direction, and read."""
 
     kind: Literal["repeated"] = "repeated"
-    at: SetKey
     reading: Reading
 
     def applied_to(self, state: RunState) -> RunState:

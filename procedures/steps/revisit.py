@@ -14,14 +14,13 @@ from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase, SetKey, ThreeNumbers
 from procedures.run.readings import Reading, in_words
 from procedures.run.state import RunState
-from procedures.steps.base import BaseEvent, StepOfSet
+from procedures.steps.base import EventOfSet, StepOfSet
 
 
-class ReferenceConfirmed(BaseEvent):
+class ReferenceConfirmed(EventOfSet):
     """The reference was read again after an interruption: ``change_mm`` is small, the set continues."""
 
     kind: Literal["confirmed"] = "confirmed"
-    at: SetKey
     change_mm: ThreeNumbers
     reading: Reading
 
@@ -32,14 +31,13 @@ class ReferenceConfirmed(BaseEvent):
         return f"{self.at.name} continues: its reference is unchanged"
 
 
-class SetInvalidated(BaseEvent):
+class SetInvalidated(EventOfSet):
     """The set does not count and is measured again. Its records stay in the journal.
 
     There is a ``reading`` if its reference was read again and had changed.
     """
 
     kind: Literal["voided"] = "voided"
-    at: SetKey
     reason: str
     reading: Reading | None = None
 

@@ -14,20 +14,17 @@ from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Record, deviation_of
 from hexacell.robot.stated import gauge_travel_of
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import SetKey, SixNumbers, ThreeNumbers
+from procedures.run.keys import ThreeNumbers
 from procedures.run.readings import Reading, in_words
 from procedures.run.state import RunState
-from procedures.steps.base import BaseEvent, StepAtPose
+from procedures.steps.base import EventAtPose, EventOfSet, StepAtPose
 from procedures.steps.place import MountingError
 
 
-class RecordTaken(BaseEvent):
+class RecordTaken(EventAtPose):
     """A record was taken; ``deviation_mm`` is from the set's reference."""
 
     kind: Literal["sampled"] = "sampled"
-    at: SetKey
-    orientation: int
-    pose: SixNumbers
     reading: Reading
     deviation_mm: ThreeNumbers
 
@@ -45,14 +42,13 @@ class RecordTaken(BaseEvent):
         return state.with_set(self.at, replace(measured, samples=samples, again=again, has_left=False))
 
 
-class RecordRejected(BaseEvent):
+class RecordRejected(EventOfSet):
     """A record was rejected: the ball left the travel. Its orientation is chosen again.
 
     There is no ``reading`` if a plunger was at its end.
     """
 
     kind: Literal["refused"] = "refused"
-    at: SetKey
     orientation: int
     reason: str
     reading: Reading | None = None

@@ -15,9 +15,9 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of
 from hexacell.noise.gauge_trial import GaugeMistake, TrialFinding, judge_response, response_of
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import SetKey, ThreeNumbers
+from procedures.run.keys import ThreeNumbers
 from procedures.run.state import RunState
-from procedures.steps.base import BaseEvent, StepOfSet
+from procedures.steps.base import EventOfSet, StepOfSet
 from procedures.steps.place import MountingError
 
 MISTAKES: Mapping[GaugeMistake, tuple[str, str, str]] = {
@@ -45,14 +45,13 @@ MISTAKES: Mapping[GaugeMistake, tuple[str, str, str]] = {
 """What each mistake of one gauge and of several is called, and what to do."""
 
 
-class GaugesTried(BaseEvent):
+class GaugesTried(EventOfSet):
     """The gauges of a set follow the ball, each on its axis, with its sign and scale.
 
     ``response`` is what the gauges x, y, z showed per length of a move along x, y, z.
     """
 
     kind: Literal["tried"] = "tried"
-    at: SetKey
     response: tuple[ThreeNumbers, ThreeNumbers, ThreeNumbers]
 
     def applied_to(self, state: RunState) -> RunState:

@@ -66,7 +66,7 @@ class HeldOutSteps:
         elif measured.rejections:
             raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
         if measured.reference_unverified:
-            return self.sets.at_reference(state, key) or self._to_reference(state, key)
+            return self.sets.at_or_to_reference(state, key, self._ball(state, key))
         if measured.samples and (trial := self.trials.next_step(state, key, self._ball(state, key))):
             return trial
         if (orientation := self._next_orientation(state, key)) is not None:
@@ -110,7 +110,7 @@ class HeldOutSteps:
         if not measured.reference_unverified:
             return None
         try:
-            return self.sets.at_reference(state, key) or self._to_reference(state, key)
+            return self.sets.at_or_to_reference(state, key, self._ball(state, key))
         except LimitError:
             return Judge()
 

@@ -71,9 +71,7 @@ class LengthSteps:
             return trial
         orientation = measured.next_orientation
         if measured.reference_unverified or orientation > self._records:
-            return self.sets.at_reference(state, key) or self.sets.to_reference(
-                state, key, self._zero(state, key)
-            )
+            return self.sets.at_or_to_reference(state, key, self._zero(state, key))
         samples = measured.samples  # where the seat is beside its stated place, by the first reading in it
         is_known = key.point != 1 and bool(samples)
         off = BESIDE_MM - np.array(samples[0].deviation_mm) if is_known else np.zeros(3)

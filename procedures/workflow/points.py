@@ -135,7 +135,7 @@ class IdentificationSteps:
             return Locate()
         require_zero(state, key)
         if measured.reference_unverified:
-            return self._at_or_to_reference(state, key)
+            return self.sets.at_or_to_reference(state, key, self._ball(state, key))
         if trial := self.trials.next_step(state, key, self._ball(state, key)):
             return trial
         measuring_noise = self.noise.next_step(state, key, self._known(state, key))
@@ -162,12 +162,7 @@ class IdentificationSteps:
             is_last = isinstance(step, CloseSet) and is_short
             return step.model_copy(update={"reason": finish.reason}) if is_last else step
         # Also at a waypoint of the path back: a new plan could return to where the robot came from.
-        back = self.sets.paths.back(state, key, self._known(state, key))
-        return back or self._at_or_to_reference(state, key)
-
-    def _at_or_to_reference(self, state: RunState, key: SetKey) -> Step:
-        step = self.sets.at_reference(state, key)
-        return step or self.sets.to_reference(state, key, self._ball(state, key))
+        return self.way_back(state, key)
 
     def way_back(self, state: RunState, key: SetKey) -> Step:
         """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""

@@ -171,6 +171,10 @@ class SetSteps:
             return None
         return Revisit(at=key) if state.set(key).reference_unverified else CloseSet(at=key)
 
+    def at_or_to_reference(self, state: RunState, key: SetKey, ball: Array | None) -> Step:
+        """What is due at the set's reference, or the move there."""
+        return self.at_reference(state, key) or self.to_reference(state, key, ball)
+
     def to_reference(self, state: RunState, key: SetKey, ball: Array | None) -> Move:
         """Move to the set's reference by a checked path.
 

@@ -47,8 +47,6 @@ SMALL: dict[str, Any] = FREE | {
     "simulation.encoders.latency_s": 0.0,
     "simulation.motion.ringing_mm": 0.0,
 }
-WHATEVER_IS_FREE: dict[str, Any] = {"guards.free_disk_mb": 0.0}
-"""Nobody looks beforehand how full the disk is."""
 NEVER_GOOD_ENOUGH: dict[str, Any] = {
     "acceptance.position_mm": 1e-9,
 }

@@ -50,14 +50,7 @@ class Story:
         deviation: ThreeNumbers = NOTHING_IS_ZERO,
         pose: SixNumbers | None = None,
     ) -> events.Event:
-        reading = Reading(
-            gauges_mm=deviation,
-            spread_mm=NOTHING_IS_ZERO,
-            joints=(0.0,) * 6,
-            answers=(),
-            counts=(),
-            skews_s=(),
-        )
+        reading = READING.model_copy(update={"gauges_mm": deviation})
         where = self.arrived(orientation, pose).model_dump(exclude={"kind"})
         return events.RecordTaken(**where, reading=reading, deviation_mm=deviation)
 

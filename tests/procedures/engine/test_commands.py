@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator, Callable, Iterator
-from pathlib import Path
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import pytest
@@ -16,19 +15,16 @@ from procedures.engine.commands import Abort, Answer, MeasureAgain, Pause, Resum
 from procedures.engine.engine import Engine
 from procedures.journal.journal import Journal, read_journal
 from procedures.run.keys import Phase, SetKey
-from procedures.run.readings import Reading
 from procedures.run.state import RunState, fold
 from procedures.steps import events
 from procedures.steps.move import Move
 from procedures.steps.registry import Step
 from procedures.steps.sample import Sample
 from tests.procedures.fakes import SilentOperator
+from tests.procedures.story import READING
 from tests.waiting import until
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
-READING = Reading(
-    gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints=(0.0,) * 6, answers=(), counts=(), skews_s=()
-)
 
 
 def pose(orientation: int) -> Any:
@@ -66,12 +62,6 @@ class Script:
         return events.RecordTaken(
             at=P1, orientation=step.orientation, pose=step.pose, reading=READING, deviation_mm=(0.0,) * 3
         )
-
-
-@pytest.fixture
-def journal(tmp_path: Path) -> Iterator[Journal]:
-    with Journal(tmp_path / "journal.jsonl") as opened:
-        yield opened
 
 
 class Stage:
@@ -253,22 +243,16 @@ async def test_a_stop_ends_the_run_after_the_current_step(stage: Stage, bench) -
     assert bench.controller.log == ["prepare", "stop"]
 
 
-async def test_an_abort_ends_the_run_within_a_step_and_stops_motion(stage: Stage, bench) -> None:
+@pytest.mark.parametrize("commands", [[Abort()], [Stop("aborted"), Abort()]])
+async def test_an_abort_ends_the_run_within_a_step_and_stops_motion(stage: Stage, bench, commands) -> None:
     await stage.held_at("P1/o02/move")
-    stage.engine.command(Abort())
+    for command in commands:
+        stage.engine.command(command)
     with pytest.raises(Interruption):
         await stage.running  # type: ignore[misc]  # the step is never let go
     assert stage.journal.events[-1] == events.Interrupted(reason="aborted", exit_code=130)
     assert stage.journal.events[-2].kind == "begun"
     assert bench.controller.log == ["prepare", "stop"]
-
-
-async def test_an_abort_after_a_stop_ends_the_run_at_once(stage: Stage) -> None:
-    await stage.held_at("P1/o02/move")
-    stage.engine.command(Stop())
-    stage.engine.command(Abort())
-    with pytest.raises(Interruption):
-        await stage.running  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("command", [Stop(), Abort()])

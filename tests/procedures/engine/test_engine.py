@@ -5,8 +5,6 @@ from __future__ import annotations
 import asyncio
 import errno
 import os
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,7 +21,7 @@ from hexacell.errors import (
 )
 from hexacell.verdict.decision import Verdict
 from procedures.engine.engine import Engine
-from procedures.journal.journal import Journal, read_journal
+from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.run.trips import RobotNotStopped
@@ -64,17 +62,6 @@ class Script:
             await asyncio.Event().wait()
         self.done.append(step.key)
         return events.Arrived(at=step.at, orientation=step.orientation, pose=step.pose)
-
-
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "journal.jsonl"
-
-
-@pytest.fixture
-def journal(path: Path) -> Iterator[Journal]:
-    with Journal(path) as opened:
-        yield opened
 
 
 @pytest.fixture

@@ -89,47 +89,52 @@ def test_a_device_without_an_answer_trips_only_by_its_silence() -> None:
     assert tripped(encoders=polled("encoders", silent_s=0.13)).guard is Guard.STALE
 
 
-def test_the_stop_line_gives_its_reason() -> None:
-    trip = tripped(stop_input=polled("stop line", value="/cell/stop exists"))
-    assert trip.guard is Guard.STOP_LINE
-    assert "/cell/stop exists" in trip.problem
+ALARM = DeviceError("reports no magnet", subject="leg 3", action="Look at it")
 
 
 @pytest.mark.parametrize(
-    ("heard", "guard", "words"),
+    ("changes", "guard", "device", "words"),
     [
-        (status(estop=True, enabled=False), Guard.EMERGENCY_STOP, "is in emergency stop"),
-        (status(estop=True, enabled=True), Guard.EMERGENCY_STOP, "is in emergency stop"),
-        (status(enabled=False), Guard.CONTROLLER, "was switched off"),
-        (status("drive 2 too hot", enabled=False), Guard.CONTROLLER, "was switched off: drive 2 too hot"),
-        (status("joint 3 following error", enabled=False), Guard.FOLLOWING, "joint 3 following error"),
-        (status("a", "Joint 0 Following Error", enabled=False), Guard.FOLLOWING, "Joint 0 Following Error"),
+        (
+            {"stop_input": polled("stop line", value="/cell/stop exists")},
+            *(Guard.STOP_LINE, "stop line", "/cell/stop exists"),
+        ),
+        ({"encoders": polled("encoders", error=ALARM)}, Guard.ENCODERS, "leg 3", "reports no magnet"),
+        ({"gauges": (gauge(4.0, error=AT_END),)}, Guard.GAUGE_END, "gauge x", "plunger at its end"),
+        *(
+            ({"controller": status(*said, estop=estop, enabled=enabled)}, guard, "controller", words)
+            for said, estop, enabled, guard, words in [
+                ((), True, False, Guard.EMERGENCY_STOP, "is in emergency stop"),
+                ((), True, True, Guard.EMERGENCY_STOP, "is in emergency stop"),
+                ((), False, False, Guard.CONTROLLER, "was switched off"),
+                (("too hot",), False, False, Guard.CONTROLLER, "was switched off: too hot"),
+                (
+                    ("a", "Joint 0 Following Error"),
+                    False,
+                    False,
+                    Guard.FOLLOWING,
+                    "Joint 0 Following Error",
+                ),
+            ]
+        ),
     ],
 )
-def test_a_controller_that_forbids_motion_trips_with_its_reason(heard, guard, words):
-    trip = tripped(controller=heard)
-    assert (trip.guard, trip.device) == (guard, "controller")
+def test_a_fault_trips_its_guard_with_device_and_reason(changes, guard, device, words) -> None:
+    trip = tripped(**changes)
+    assert (trip.guard, trip.device) == (guard, device)
     assert words in trip.problem
+    assert trip.action
 
 
-def test_error_messages_of_an_enabled_controller_trip_nothing() -> None:
-    enabled = PolledDevices(controller=status("joint 3 following error"))
-    assert first_trip(enabled, LIMITS) is None
-
-
-def test_an_encoder_is_named_with_its_error() -> None:
-    error = DeviceError("reports no magnet", subject="leg 3", action="Look at it")
-    trip = tripped(encoders=polled("encoders", error=error))
-    assert (trip.guard, trip.device, trip.action) == (Guard.ENCODERS, "leg 3", "Look at it")
-
-
-def test_a_plunger_that_comes_to_its_end() -> None:
-    trip = tripped(gauges=(gauge(4.0, error=AT_END),))
-    assert (trip.guard, trip.device) == (Guard.GAUGE_END, "gauge x")
-
-
-def test_a_plunger_that_was_at_its_end_may_leave_it() -> None:
-    assert first_trip(PolledDevices((gauge(None, None, error=AT_END),)), LIMITS) is None
+@pytest.mark.parametrize(
+    "harmless",
+    [
+        PolledDevices(controller=status("joint 3 following error")),  # it is enabled
+        PolledDevices((gauge(None, None, error=AT_END),)),  # a plunger at its end may leave it
+    ],
+)
+def test_what_explains_itself_trips_no_guard(harmless: PolledDevices) -> None:
+    assert first_trip(harmless, LIMITS) is None
 
 
 def test_the_ball_may_go_as_far_as_each_side_has_room() -> None:

@@ -13,9 +13,9 @@ from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.journal.journal import decode
 from procedures.replay.replayer import Change, changes, is_wording
 from procedures.run.keys import Phase, SetKey
-from procedures.run.readings import Reading
 from procedures.steps import events
 from tests.procedures.journal.told import checked
+from tests.procedures.story import READING
 
 KEY = SetKey(phase=Phase.BEFORE, point=2)
 
@@ -77,10 +77,7 @@ def test_a_field_missing_in_the_recorded_event_is_no_difference() -> None:
     line = b'{"n":2,"at":"2026-11-20T10:30:00.000Z","s":1.5,"event":%b}' % body
     entry = decode(checked(line), Path("journal.jsonl"), 2)
     assert entry is not None
-    reading = Reading(
-        gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints=(0.0,) * 6, answers=(), counts=(), skews_s=()
-    )
-    again = events.RecordRejected(at=KEY, orientation=2, reason="so", reading=reading)
+    again = events.RecordRejected(at=KEY, orientation=2, reason="so", reading=READING)
     assert changes(entry.event, again, 1e-9) == []
     assert changes(again, again.model_copy(update={"reading": None}), 1e-9) != []
 

@@ -12,6 +12,7 @@ from procedures.run.readings import (
     mean_leg_temperatures,
     mean_temperature,
 )
+from tests.procedures.story import READING
 
 ROOM = ThermometerSettings(name="room", path="/room")
 PAIR = ThermometerSettings(name="pair", path="/pair", legs=(1, 2))
@@ -21,15 +22,8 @@ BEFORE = (20.0, 21.0, None, None, None, 19.0)
 
 
 def sample(**celsius: float | None) -> Reading:
-    return Reading(
-        gauges_mm=(0.0,) * 3,
-        spread_mm=(0.0,) * 3,
-        joints=(0.0,) * 6,
-        answers=(),
-        counts=(),
-        skews_s=(),
-        temperatures=tuple(Temperature(name=name, celsius=one) for name, one in celsius.items()),
-    )
+    shown = tuple(Temperature(name=name, celsius=one) for name, one in celsius.items())
+    return READING.model_copy(update={"temperatures": shown})
 
 
 SHOWN = (sample(room=5.0, pair=22.0, sixth=20.0), sample(room=5.0, pair=24.0, sixth=None))

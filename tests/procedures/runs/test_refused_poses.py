@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,6 @@ from hexacell.kinematics.pose import Pose
 from procedures.run.keys import Phase
 from procedures.run.state import fold
 from procedures.steps import events
-from procedures.steps import move as move_step
 from tests.procedures.fakes import refused
 from tests.procedures.runs.listening import happened, run_until
 
@@ -160,9 +160,9 @@ async def test_a_robot_that_moved_was_not_refused(make_rig) -> None:
     assert not excluded(rig)
 
 
-async def test_a_controller_that_refuses_one_pose_after_another_ends_the_run(make_rig, monkeypatch):
-    monkeypatch.setattr(move_step, "MOST_REFUSALS", 3)
+async def test_a_controller_that_refuses_one_pose_after_another_ends_the_run(make_rig):
     rig = make_rig()
+    rig.performer = replace(rig.performer, most_refusals=3)
     controller, machine = rig.controller, rig.machine
 
     async def move(pose: Pose, duration_s: float) -> None:

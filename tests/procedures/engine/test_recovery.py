@@ -63,25 +63,6 @@ async def test_an_unattended_run_ends_after_a_bounded_number_of_attempts(at_seco
     assert rig.controller.log[-1] == "stop"
 
 
-async def test_after_a_lost_encoder_bus_the_reference_is_confirmed_again(at_second_point) -> None:
-    rig = at_second_point
-    encoders = rig.bench.encoders
-
-    def unplug() -> None:
-        encoders.failure = BusError("has died", subject="encoder bus")
-
-    async def back() -> Any:
-        encoders.failure = None
-        return encoders._answering("encoder 1")
-
-    encoders.open = back
-    assert await until_closed(rig, failing(KEY, unplug), policy=UNATTENDED)
-    (failure,) = happened(rig, events.Failed)
-    assert (failure.failure, failure.action) == (FailureKind.LINK_LOST, Action.MEASURE_AGAIN)
-    assert [str(event.at) for event in happened(rig, events.ReferenceConfirmed)] == ["P2"]
-    assert not happened(rig, events.SetInvalidated)
-
-
 def jumped_while_away(rig: Any, jump_mm: float) -> Any:
     """The bus of the encoders is lost at a record; that of leg 3 comes back with another zero."""
     encoders, shown = rig.bench.encoders, rig.bench.encoders.shown
@@ -96,6 +77,15 @@ def jumped_while_away(rig: Any, jump_mm: float) -> Any:
 
     encoders.open = back
     return failing(KEY, unplug)
+
+
+async def test_after_a_lost_encoder_bus_the_reference_is_confirmed_again(at_second_point) -> None:
+    rig = at_second_point
+    assert await until_closed(rig, jumped_while_away(rig, 0.0), policy=UNATTENDED)
+    (failure,) = happened(rig, events.Failed)
+    assert (failure.failure, failure.action) == (FailureKind.LINK_LOST, Action.MEASURE_AGAIN)
+    assert [str(event.at) for event in happened(rig, events.ReferenceConfirmed)] == ["P2"]
+    assert not happened(rig, events.SetInvalidated)
 
 
 async def test_an_encoder_that_jumped_while_it_was_away_is_named(at_second_point) -> None:

@@ -28,11 +28,6 @@ def test_that_fails_narrowly(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(model_evidence, "SMALLEST_PROBABILITY", 1.0)
 
 
-def nobody_keeps(rig: Any) -> Any:
-    rig.operator.name = None
-    return rig
-
-
 async def test_confirming_records_that_agree_end_the_run_with_a_pass(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
     ended = await rig.run()
@@ -60,32 +55,25 @@ def recording_poses(state: RunState) -> list[Any]:
     return [sample.pose for phase in phases for sample in state.samples(phase)]
 
 
-async def test_confirming_records_that_do_not_agree_leave_the_result_not_evaluated(
-    recording, replayed, monkeypatch
-) -> None:
-    monkeypatch.setattr(model_evidence, "CONFIRMING_PROBABILITY", 1.0)
-    rig = nobody_keeps(replayed(recording.until(events.Proposed)))
+@pytest.mark.parametrize(
+    ("where", "name", "value", "planned"),
+    [
+        pytest.param(model_evidence, "CONFIRMING_PROBABILITY", 1.0, 1, id="new records do not agree"),
+        pytest.param(model_evidence, "BEYOND_CHANCE", 1.0, 0, id="beyond chance"),
+        pytest.param(HeldOutPoses, "confirming", lambda *_: ((), ()), 0, id="no pose can be taken"),
+    ],
+)
+async def test_a_failure_that_is_not_explained_leaves_the_result_not_evaluated(
+    recording, replayed, monkeypatch, where, name, value, planned
+):
+    monkeypatch.setattr(where, name, value)
+    rig = replayed(recording.until(events.Proposed))
+    rig.operator.name = None
     ended = await rig.run()
-    assert len(happened(rig, events.ConfirmationPlanned)) == 1, "once is enough"
+    assert len(happened(rig, events.ConfirmationPlanned)) == planned
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.NOT_EVALUATED
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert rig.config == recording.config_before
-
-
-async def test_a_failure_beyond_chance_asks_for_no_confirming_records(recording, replayed, monkeypatch):
-    monkeypatch.setattr(model_evidence, "BEYOND_CHANCE", 1.0)
-    rig = nobody_keeps(replayed(recording.until(events.Proposed)))
-    await rig.run()
-    assert not happened(rig, events.ConfirmationPlanned)
-    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.NOT_EVALUATED
-
-
-async def test_where_no_confirming_pose_can_be_taken_the_verdict_stays(recording, replayed, monkeypatch):
-    monkeypatch.setattr(HeldOutPoses, "confirming", lambda *_: ((), ()))
-    rig = nobody_keeps(replayed(recording.until(events.Proposed)))
-    await rig.run()
-    assert not happened(rig, events.ConfirmationPlanned)
-    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.NOT_EVALUATED
 
 
 async def test_a_run_killed_among_confirming_records_goes_on_there(recording, replayed) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, get_args
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
@@ -53,12 +53,13 @@ st.register_type_strategy(float, NUMBERS)  # for what is drawn by its annotation
 GEOMETRY = st.fixed_dictionaries({"S": st.tuples(*[st.tuples(*[NUMBERS] * 3)] * 6)})
 RESULT = st.builds(an_identification, converged=st.booleans(), chi2=NUMBERS, frame=st.text())
 GIVEN: dict[type[Any], dict[str, Any]] = {
-    events.RunStarted: {"controller": GEOMETRY, "taught": GEOMETRY},
+    events.RunStarted: {"controller": GEOMETRY, "taught": GEOMETRY, "accepted": st.none()},
     events.ProvisionalApplied: {"geometry": GEOMETRY},
-    events.Identified: {"result": RESULT},
+    events.Identified: {"result": RESULT, "improvement": st.none(), "quick": st.none()},
+    events.ResultValidated: {"check": st.none(), "length": st.none()},
     events.Proposed: {"written": GEOMETRY},
 }
-"""What their annotations do not say: a geometry has lists of equal length."""
+"""What their annotations do not say, as that a geometry has lists of equal length; and what is large."""
 
 
 def drawn(kind: type[Any]) -> st.SearchStrategy[Any]:
@@ -73,7 +74,7 @@ def test_steps_survive_json(step: Any) -> None:
     assert repr(adapter.validate_json(adapter.dump_json(step))) == repr(step)
 
 
-@settings(max_examples=25)  # each forces every event to the disk
+@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])  # events go to the disk
 @given(history=st.lists(st.one_of([drawn(kind) for kind in EVENTS]), max_size=4))
 def test_events_survive_the_journal(history: list[events.Event], tmp_path_factory: Any) -> None:
     path = tmp_path_factory.mktemp("journal") / "journal.jsonl"

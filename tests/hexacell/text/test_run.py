@@ -43,27 +43,15 @@ def test_the_resume_command_parses_to_the_same_request(request_of, mode):
     assert resume_hint(request).splitlines()[1].strip() == resume_command(request)
 
 
-def test_the_result_is_the_last_line(request_of):
-    request = request_of(Mode.OPTIMISE)
-    where, line = closing_lines(request, events.Ended(exit_code=0, line="all well"))
-    assert where.endswith(str(request.folder.path))
-    assert line == "all well"
-
-
 def test_one_line_before_the_result_says_what_must_be_taught_anew(request_of):
     moved = TaskDisplacement(position_mm=8.25, orientation_deg=3.0, poses=6, is_within_limits=False)
     ended = events.Ended(exit_code=0, line="all well", displacement=moved)
     request = request_of(Mode.OPTIMISE)
-    _, teaching, line = closing_lines(request, ended)
-    assert teaching == teaching_line(moved)
-    assert line == "all well"
+    where, teaching, line = closing_lines(request, ended)
+    assert where.endswith(str(request.folder.path))
+    assert (teaching, line) == (teaching_line(moved), "all well")
     document = run_document(request, ended, RunState())
-    assert document["displacement"] == {
-        "position_mm": 8.25,
-        "orientation_deg": 3.0,
-        "poses": 6,
-        "is_within_limits": False,
-    }
+    assert document["displacement"] == moved.model_dump()
     assert document["teaching"] == teaching_sentence(moved)
     untouched = run_document(request, events.Ended(exit_code=0, line="all well"), RunState())
     assert untouched["displacement"] is untouched["teaching"] is untouched["measured_noise"] is None

@@ -199,7 +199,7 @@ class ScreenModel:
                 }
             case "plan":
                 note = plan_note(tried.poses, is_trying=is_trying)
-                return {"plan-note": (note,), "poses": (plan_rows(cell.settings, tried.poses),)}
+                return {"plan-note": (note,), "poses": ([*plan_rows(cell.settings, tried.poses)],)}
             case "measure":
                 return {
                     "guidance": (guidance(picture, cell.settings),),

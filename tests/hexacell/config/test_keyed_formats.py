@@ -230,31 +230,22 @@ class TestWhatLinuxcncSees:
 
     FORM = LinuxcncIni(HEXAGLIDE_PARAMETERS, INI)
 
-    def test_a_second_section_of_the_same_name(self, written) -> None:
+    @pytest.mark.parametrize(
+        ("inserted", "reason"),
+        [
+            ("[EMC]\n[HEXAGLIDE]", "it does not look into a second section"),
+            ("[HEXAGLIDE", r"the line that begins its section has no ']'"),
+            (" [HEXAGLIDE \t", r"the line that begins its section has no ']'"),
+            ("# millimetres \\", "the line before ends with a backslash"),
+            ("NOTE = of the\\", "the line before ends with a backslash"),
+        ],
+    )
+    def test_a_variable_that_a_person_sees_and_it_does_not(self, written, inserted, reason) -> None:
         rows = write_ini(lambda _: "1.5", " ")
-        text = "\n".join([*rows[:10], "[EMC]", "[HEXAGLIDE]", *rows[10:]])
-        problem = r"does not see \[HEXAGLIDE\] S4X: it does not look into a second section"
-        with pytest.raises(FileError, match=problem) as caught:
+        text = "\n".join([*rows[:10], inserted, *rows[10:]])
+        with pytest.raises(FileError, match=rf"does not see \[HEXAGLIDE\] S4X: {reason}") as caught:
             self.FORM.read(written(text))
-        assert caught.value.line == 13
-
-    @pytest.mark.parametrize("begin", ["[HEXAGLIDE", " [HEXAGLIDE \t"])
-    def test_a_section_whose_bracket_is_not_closed(self, written, begin) -> None:
-        rows = write_ini(lambda _: "1.5", " ")
-        text = "\n".join([*rows[:10], begin, *rows[10:]])
-        problem = r"does not see \[HEXAGLIDE\] S4X: the line that begins its section has no ']'"
-        with pytest.raises(FileError, match=problem) as caught:
-            self.FORM.read(written(text))
-        assert caught.value.line == 12
-
-    @pytest.mark.parametrize("before", ["# millimetres \\", "NOTE = of the\\"])
-    def test_a_line_behind_a_backslash(self, written, before) -> None:
-        rows = write_ini(lambda _: "1.5", " ")
-        text = "\n".join([*rows[:10], before, *rows[10:]])
-        problem = r"does not see \[HEXAGLIDE\] S4X: the line before ends with a backslash"
-        with pytest.raises(FileError, match=problem) as caught:
-            self.FORM.read(written(text))
-        assert caught.value.line == 12
+        assert caught.value.line == 12 + inserted.count("\n")
 
     def test_a_comment_behind_a_number(self, written) -> None:
         rows = write_ini(lambda name: "1.5 # mm" if name == "B1x" else "1.5", " ")

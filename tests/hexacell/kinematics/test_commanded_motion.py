@@ -26,11 +26,6 @@ def test_the_actual_pose_closes_the_actual_geometry_at_the_joints_of_the_command
     assert np.abs(actual.poses.positions[:2] - COMMANDS.positions[:2]).max() > 1.0
 
 
-def test_an_unreachable_command_changes_nothing_for_the_others(robot):
-    together, alone = robot.actual_poses(COMMANDS), robot.actual_poses(COMMANDS[:2])
-    np.testing.assert_array_equal(together.poses.positions[:2], alone.poses.positions)
-
-
 def test_the_command_computed_for_an_actual_pose_is_the_original_command(robot):
     actual = robot.actual_poses(COMMANDS[:2])
     commands = robot.commands_for(actual.poses, actual.joints)

@@ -211,14 +211,14 @@ def test_legs_stay_apart_along_the_line(exactly, paper):
     assert not is_clear(near, at(0, 0, 550), at(-100, 100, 500))
 
 
-def test_a_robot_beyond_a_cone_may_come_back_and_not_go_farther(exactly, paper):
+@pytest.mark.parametrize("limit", ["cone", "tilt"])
+def test_a_robot_beyond_a_limit_may_come_back_and_not_go_farther(exactly, paper, limit):
     """It was moved there by hand, or its geometry is known better now."""
-    limited = exactly(legs=cones(20.0)(paper.nominal, paper.branch))
+    change = (
+        {"legs": cones(20.0)(paper.nominal, paper.branch)}
+        if limit == "cone"
+        else {"tilt": np.radians(20.0)}
+    )
+    limited = exactly(**change)
     assert is_clear(limited, at(0, 0, 550, 26), at(0, 0, 550))
     assert not is_clear(limited, at(0, 0, 550, 26), at(0, 0, 550, 29))
-
-
-def test_a_robot_beyond_the_tilt_may_come_back_and_not_go_farther(exactly):
-    limited = exactly(tilt=np.radians(20.0))
-    assert is_clear(limited, at(0, 0, 550, 26), at(0, 0, 550))
-    assert not is_clear(limited, at(0, 0, 550, 26), at(0, 0, 550, 28))

@@ -68,25 +68,6 @@ def test_every_geometry_can_be_brought_to_the_convention(hexaglide, paper, error
     np.testing.assert_allclose(change.base[0], [1, 0, 0], atol=1e-15)
 
 
-@given(geometries(), frame_changes())
-def test_normalized_geometries_do_not_depend_on_the_frames(hexaglide, paper, errors, change):
-    geometry, _ = hexaglide.normalize_frames(Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + errors))
-    back, _ = hexaglide.normalize_frames(hexaglide.change_frames(geometry, change))
-    np.testing.assert_allclose(back.vector, geometry.vector, atol=CONVENTION_MM)
-
-
-@given(frame_changes())
-def test_a_frame_change_and_its_inverse_cancel(hexaglide, paper, change):
-    there_and_back = hexaglide.change_frames(
-        hexaglide.change_frames(paper.actual, change), change.inverse()
-    )
-    np.testing.assert_allclose(there_and_back.vector, paper.actual.vector, atol=CONVENTION_MM)
-    pose = PoseBatch.at([1.0, 2.0, 3.0], Rotation.from_rotvec([[0.2, -0.1, 0.3]]).as_matrix())
-    back = change.inverse().poses(change.poses(pose))
-    np.testing.assert_allclose(back.positions, pose.positions, atol=CONVENTION_MM)
-    np.testing.assert_allclose(back.rotations, pose.rotations, atol=1e-12)
-
-
 @given(frame_changes())
 def test_differences_of_ball_positions_rotate_with_the_base_and_do_not_depend_on_the_origin(change):
     positions = np.array([[1.0, 2.0, 3.0], [-4.0, 5.0, 6.5], [0.0, 0.1, -7.0]])

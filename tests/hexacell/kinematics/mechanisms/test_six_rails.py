@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.mechanisms.six_rails import (
     SixRails,
 )
@@ -40,25 +38,6 @@ def machine(seed: int = 3) -> dict[str, np.ndarray]:
 def directions_of_rails(turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     axes = TurnedAxes.by(turns)
     return axes.axis, axes.by_turns[2]
-
-
-@given(
-    st.builds(Pose, st.floats(-50, 50), st.floats(-100, 50), st.floats(500, 580), degrees, degrees, degrees)
-)
-def test_a_hexaglide_is_its_special_case(hexaglide: Hexaglide, paper, pose: Pose) -> None:
-    """Rails along x: the same joint variables, and the same derivatives by the numbers of both."""
-    values, batch = paper.actual.document(), PoseBatch.of([pose])
-    geometry = six_rails_geometry(values["S"], np.tile([0.0, np.pi / 2], (6, 1)), values["B"], values["l"])
-    joints = hexaglide.inverse(paper.actual, paper.branch, batch)
-    np.testing.assert_allclose(MECHANISM.inverse(geometry, paper.branch, batch), joints, atol=1e-9)
-    if np.isnan(joints).any():
-        return
-    theirs = hexaglide.derivatives(paper.actual, batch, joints)
-    ours = MECHANISM.derivatives(geometry, batch, joints)
-    np.testing.assert_allclose(ours.pose, theirs.pose, atol=1e-9)
-    np.testing.assert_allclose(ours.joints, theirs.joints, atol=1e-12)
-    np.testing.assert_allclose(np.delete(ours.parameters, [3, 4], axis=-1), theirs.parameters, atol=1e-12)
-    np.testing.assert_array_equal(MECHANISM.branch(geometry, batch, joints), [paper.branch])
 
 
 def test_rail_1_and_slider_3_are_the_base_frame() -> None:

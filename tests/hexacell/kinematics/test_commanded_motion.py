@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from hexacell.kinematics.commanded_motion import CommandedRobot
+from hexacell.kinematics.commanded_motion import CommandedRobot, RefusedCommand, RefusedCommands
 from hexacell.kinematics.pose import Pose, PoseBatch
 
 COMMANDS = PoseBatch.of([Pose(0, 0, 550), Pose(50, -40, 520, 10, -5, 8), Pose(0, 0, 5000)])
@@ -32,6 +34,11 @@ def test_the_command_computed_for_an_actual_pose_is_the_original_command(robot):
     assert commands.found.all()
     np.testing.assert_allclose(commands.poses.positions, COMMANDS.positions[:2], atol=1e-8)
     np.testing.assert_allclose(commands.poses.rotations, COMMANDS.rotations[:2], atol=1e-10)
+
+
+def test_a_refused_command_is_not_taken(robot):
+    refusing = replace(robot, refused=RefusedCommands((RefusedCommand(COMMANDS.pose(1).as_tuple()),)))
+    np.testing.assert_array_equal(refusing.actual_poses(COMMANDS).found, [True, False, False])
 
 
 def test_no_command_leads_to_joints_that_the_controllers_geometry_cannot_take(robot):

@@ -73,7 +73,9 @@ def test_limits_that_include_a_pose_allow_it_and_nothing_beyond():
 
 
 @pytest.mark.parametrize("distance", [0.0, 40.0])
-@pytest.mark.parametrize("wanted", [0.0, 0.05])
+@pytest.mark.parametrize(
+    "wanted", [0.0, 0.05, np.linspace(0.2, 0.0, 13)], ids=["none", "one", "each its own"]
+)
 def test_limits_are_kept_where_no_margin_is_less_than_wanted(distance, wanted):
     random = np.random.default_rng(3)
     some = [turned(random.normal(size=3), angle) for angle in random.uniform(0.0, 25.0, 40)]
@@ -82,6 +84,7 @@ def test_limits_are_kept_where_no_margin_is_less_than_wanted(distance, wanted):
         for name in ("base_joints", "platform_joints", "rotations")
     )
     legs = Legs(base + random.normal(scale=40.0, size=base.shape), platform, rotations)
+    wanted = wanted if np.isscalar(wanted) else wanted[: 12 + (distance > 0.0)]
     kept = limits(distance=distance).keeps(legs, wanted)
     np.testing.assert_array_equal(kept, are_kept(limits(distance=distance), legs, wanted))
     assert kept.any()

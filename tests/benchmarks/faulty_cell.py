@@ -28,6 +28,8 @@ IDLE_S = 0.1
 PATIENCE_S = 0.002
 UM = 1e-3
 JUMP_COUNTS = 400_000
+TRACE_BYTES = 50_000
+"""Of each line: so little that it is full soon, and grows no more."""
 
 SEEN_BY_ALL = {"silent", "unplugged", "late", "at its end", "in inches"}
 SEEN_BY_SETTINGS = {"on hold", "in peak mode", "reversed"}
@@ -65,7 +67,7 @@ class FaultyCell:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.plungers_mm, self.joints_mm = [1.0] * 3, [0.0] * 6
-        self.ports = SharedSerialPorts(trace=WireTrace())
+        self.ports = SharedSerialPorts(trace=WireTrace(TRACE_BYTES))
         self.elapsed_s = 0.0
         self._jumped = dict.fromkeys(NODES, 0)
         self.indicators, self.lines, mounted = {}, {}, []
@@ -87,7 +89,7 @@ class FaultyCell:
                     "largest_speed_mm_s": 100.0,
                 }
             ),
-            WireTrace(),
+            WireTrace(TRACE_BYTES),
         )
         self.devices = Devices(tuple(mounted), encoders, None)  # type: ignore[arg-type]
 

@@ -144,7 +144,7 @@ class Day:
 
 
 async def test_a_day_of_polling_with_random_faults(figure, monkeypatch, caplog) -> None:
-    caplog.set_level(logging.CRITICAL, logger="drivers")  # pytest would keep all that is logged
+    caplog.set_level(logging.CRITICAL, logger="drivers")  # pytest keeps all that is logged
     cell = FaultyCell(monkeypatch)
     day = Day(cell, Random(24))
     await cell.open()

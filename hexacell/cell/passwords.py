@@ -18,7 +18,7 @@ from hexacell.cell.loader import Cell, SectionType, validated
 from hexacell.cell.model import CellSettings
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import FileError, UsageError
-from hexacell.storage.atomic_files import os_error_to_file_error, read_text
+from hexacell.storage.atomic_files import os_errors, read_text
 from hexacell.storage.toml_document import TomlDocument, clear_secrets
 
 VARIABLES = {
@@ -118,10 +118,8 @@ def private_content(path: Path, model: type[SectionType]) -> SectionType:
     Raises:
         FileError: it cannot be read, has another content, or others can read or change it.
     """
-    try:
+    with os_errors("the passwords cannot be read", path):
         mode = path.stat().st_mode
-    except OSError as error:
-        raise os_error_to_file_error("the passwords cannot be read", path, error) from error
     if mode & (stat.S_IRWXO | stat.S_IWGRP):
         raise FileError(
             f"others can read or change the passwords in it (mode {stat.S_IMODE(mode):o})",

@@ -74,10 +74,8 @@ def note_path(paths: Sequence[Path]) -> Path:
     Raises:
         FileError: one of them is a link that cannot be read.
     """
-    try:
+    with atomic_files.os_errors("cannot be read", paths[0]):
         target = Path(min(os.path.realpath(path) for path in paths))
-    except OSError as error:
-        raise atomic_files.os_error_to_file_error("cannot be read", paths[0], error) from error
     return target.with_name(f".{target.name}.hexacell-write")
 
 
@@ -101,10 +99,8 @@ def note_write(paths: Sequence[Path], before: Contents, after: Contents) -> None
 def forget_write(paths: Sequence[Path]) -> None:
     """Remove the note, if there is one: all files are new, or all are old. Raises ``FileError``."""
     path = note_path(paths)
-    try:
+    with atomic_files.os_errors("the note cannot be removed", path):
         path.unlink(missing_ok=True)
-    except OSError as error:
-        raise atomic_files.os_error_to_file_error("the note cannot be removed", path, error) from error
     # A power cut may bring the note back; then it says of complete files that they are complete.
     with suppress(OSError):
         atomic_files.sync_folder(path.parent)
@@ -162,10 +158,8 @@ def _is_replaced(one: _NotedFile, data: bytes, note: _Note, path: Path) -> bool:
 
 def _readers(path: Path) -> int:
     """How many may read a file: the bits of its mode that let the group and all others."""
-    try:
+    with atomic_files.os_errors("cannot be read", path):
         return path.stat().st_mode & 0o044
-    except OSError as error:
-        raise atomic_files.os_error_to_file_error("cannot be read", path, error) from error
 
 
 @contextmanager

@@ -214,7 +214,7 @@ def append_line(path: Path, line: bytes) -> None:
     Raises:
         FileError: the line is not in the file.
     """
-    try:
+    with atomic_files.os_errors("cannot be written", path):
         is_new = True
         try:
             descriptor = os.open(path, _FLAGS | os.O_CREAT | os.O_EXCL, _NEW_FILE)
@@ -228,8 +228,6 @@ def append_line(path: Path, line: bytes) -> None:
             _append(descriptor, path, line + b"\n")
         finally:
             os.close(descriptor)
-    except OSError as error:
-        raise atomic_files.os_error_to_file_error("cannot be written", path, error) from error
 
 
 def _append(descriptor: int, path: Path, line: bytes) -> None:

@@ -127,12 +127,10 @@ def ensure_certificate(folder: Path, uri: str, host: str) -> tuple[Path, Path]:
     if not (certificate.is_file() and key.is_file()):
         atomic_files.create_folder_durably(folder)
         made_certificate, made_key = _made_certificate(uri, host)
-        try:
+        with atomic_files.os_errors("cannot be written", key):
             key.unlink(missing_ok=True)
             with os.fdopen(os.open(key, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
                 stream.write(made_key)
-        except OSError as error:
-            raise atomic_files.os_error_to_file_error("cannot be written", key, error) from error
         atomic_files.write_atomically(certificate, made_certificate)
     return certificate, key
 

@@ -136,15 +136,12 @@ def run_study(
     atomic_files.create_folder_durably(folder)
     results = {key: result for key, result in _known(path, kept).items() if key in tasks}
     on_progress(len(results), len(tasks))
-    try:
-        with path.open("a", encoding="utf-8") as file:
-            for key, result in results_of(tasks, study.carry_out, new_executor, done=set(results)):
-                results[key] = result
-                file.write(kept.dump_json(_Kept(key=key, outcome=result)).decode() + "\n")
-                file.flush()
-                on_progress(len(results), len(tasks))
-    except OSError as error:
-        raise atomic_files.os_error_to_file_error("cannot be written", path, error) from error
+    with atomic_files.os_errors("cannot be written", path), path.open("a", encoding="utf-8") as file:
+        for key, result in results_of(tasks, study.carry_out, new_executor, done=set(results)):
+            results[key] = result
+            file.write(kept.dump_json(_Kept(key=key, outcome=result)).decode() + "\n")
+            file.flush()
+            on_progress(len(results), len(tasks))
     return study.summary(tasks, results)
 
 

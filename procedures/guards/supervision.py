@@ -202,11 +202,8 @@ class GuardMonitor:
 def low_disk_space(folder: Path, limit_mb: float) -> Trip | None:
     """The trip of a folder, which need not exist yet, with too little free space; raises ``FileError``."""
     there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
-    try:
+    with atomic_files.os_errors("its free space cannot be determined", there):
         free_mb = shutil.disk_usage(there).free / 1e6
-    except OSError as error:
-        problem = "its free space cannot be determined"
-        raise atomic_files.os_error_to_file_error(problem, there, error) from error
     if free_mb >= limit_mb:
         return None
     problem = f"only {free_mb:.0f} MB are free where the run is kept, less than {limit_mb:g} MB"

@@ -89,11 +89,11 @@ def read_journal(path: Path, longest_line: int = LONGEST_LINE) -> tuple[Event, .
 
 def read_entries(path: Path, longest_line: int = LONGEST_LINE) -> tuple[Entry, ...]:
     """All events of a journal with number and time of each; raises ``FileError``."""
-    try:
-        with open(path, "rb", opener=_open_without_waiting) as stream:
-            return _parse(path, stream, longest_line)[0]
-    except OSError as error:
-        raise atomic_files.os_error_to_file_error("cannot be read", path, error) from error
+    with (
+        atomic_files.os_errors("cannot be read", path),
+        open(path, "rb", opener=_open_without_waiting) as stream,
+    ):
+        return _parse(path, stream, longest_line)[0]
 
 
 class Journal(AbstractContextManager["Journal"]):

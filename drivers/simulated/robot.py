@@ -22,7 +22,12 @@ from hexacell.kinematics.rotations import Array
 from hexacell.motion.trajectory import interpolate_line
 
 LINE_STEPS = 24
-"""Number of segments of a straight line, at whose ends joint variables are computed."""
+"""Fewest segments of a straight line, at whose ends joint variables are computed."""
+
+LINE_MM = 0.2
+"""Largest error of a joint in the middle of a segment, mm: near a leg's dead point segments are halved."""
+
+MOST_STEPS = 1024
 
 
 @dataclass(eq=False)
@@ -71,8 +76,7 @@ class SimulatedMachine:
         stop_count = self._stop_count
         with self._lock:
             here = self._pose_now()
-        line = interpolate_line(here, PoseBatch.of([pose]), LINE_STEPS)
-        joints = self._joints(line)
+        line, joints = self._straight_line(here, PoseBatch.of([pose]))
         if np.isnan(joints).any():
             raise MotionRefused("fails kinematicsInverse")
         with self._lock:
@@ -138,6 +142,17 @@ class SimulatedMachine:
         turn = rotations.to_vector(line.rotations[row + 1] @ line.rotations[row].T)
         position = (1.0 - share) * line.positions[row] + share * line.positions[row + 1]
         return PoseBatch(position[None], (rotations.from_vector(share * turn) @ line.rotations[row])[None])
+
+    def _straight_line(self, start: PoseBatch, end: PoseBatch) -> tuple[PoseBatch, Array]:
+        """Poses (n) on a line and their joints (n, 6), between which joints may go at one rate."""
+        steps = LINE_STEPS
+        while True:
+            line = interpolate_line(start, end, 2 * steps)
+            joints = self._joints(line)
+            error = np.abs(joints[1::2] - 0.5 * (joints[:-1:2] + joints[2::2])).max()
+            if not error > LINE_MM or steps >= MOST_STEPS:
+                return line[::2], joints[::2]
+            steps *= 2
 
     def _joints(self, poses: PoseBatch) -> Array:
         return self.mechanism.inverse(self._geometry.geometry, self._geometry.branch, poses)

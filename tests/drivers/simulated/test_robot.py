@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -161,3 +162,14 @@ def test_a_geometry_that_cannot_hold_the_sliders_is_refused(twin) -> None:
     twin.config.write_text(kept)
     twin.machine.move(TILTED)
     assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+
+
+def test_a_stop_near_the_dead_point_of_a_leg_leaves_joints_where_the_controller_has_them(twin) -> None:
+    """There a slider goes far while the platform hardly moves, so that a coarse line would miss it."""
+    twin.machine.move(Pose(-41.2, -29.6, 540.4, -5.7, -20.7, -7.0))
+    twin.machine.move(Pose(31.7, 77.2, 593.5, 39.6, 2.3, -7.8))
+    motion = twin.physics._motion
+    for share in np.linspace(0.02, 0.98, 97):
+        twin.physics._motion = replace(motion, stopped_s=motion.start_s + share * motion.duration_s)
+        off = np.abs(np.array(twin.machine.joints()) - twin.physics.encoder_positions())
+        assert off.max() < 0.5

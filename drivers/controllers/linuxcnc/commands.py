@@ -96,12 +96,12 @@ class ControllerCommands:
 
     async def pose(self) -> Pose:
         """The actual pose, mm and deg, by the controller's own kinematics."""
-        x, y, z, *angles = self._parsed(await self.get("abs_act_pos"))
+        x, y, z, *angles = self.positions_in(await self.get("abs_act_pos"))
         return Pose(self.unit_mm * x, self.unit_mm * y, self.unit_mm * z, *angles)
 
     async def joints(self) -> tuple[float, ...]:
         """The six actual joint variables, mm or deg."""
-        return tuple(self.joint_unit_mm * value for value in self._parsed(await self.get("joint_pos")))
+        return tuple(self.joint_unit_mm * value for value in self.positions_in(await self.get("joint_pos")))
 
     async def all_homed(self) -> bool:
         """Whether every joint is homed."""
@@ -142,7 +142,8 @@ class ControllerCommands:
         response = await self.connection.request(f"get {what}")
         return response if response.accepted else await self.connection.request(f"get {what}")
 
-    def _parsed(self, text: str) -> tuple[float, ...]:
+    def positions_in(self, text: str) -> tuple[float, ...]:
+        """Six numbers of an answer; raises ``DeviceError`` where it has none."""
         try:
             return parse_positions(text)
         except ValueError as error:

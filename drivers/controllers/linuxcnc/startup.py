@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from drivers.controllers.linuxcnc.commands import NO_REASON, ControllerCommands
-from drivers.controllers.linuxcnc.protocol import Timeouts, loop_time, parse_number, parse_positions
+from drivers.controllers.linuxcnc.protocol import Timeouts, loop_time, parse_number
 from drivers.errors import CommandRefused, MotionInterrupted
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
@@ -178,7 +178,7 @@ async def check_coordinate_system(commands: ControllerCommands) -> str:
     if "G43" in codes:
         raise refusal("adds a tool length (G43)", f"G49 is needed. {_MODAL_ACTION}")
     offset = await commands.get_if_known("pos_offset")
-    if offset and any(abs(value) > _OFFSET_MM for value in parse_positions(offset)):
+    if offset and any(abs(value) > _OFFSET_MM for value in commands.positions_in(offset)):
         action = "Clear it: G10 L2 P1 X0 Y0 Z0 A0 B0 C0 and G92.1 in MDI"
         raise refusal(f"adds an offset of {offset} to every coordinate (G54, G92)", action)
     percent = await commands.get_if_known("feed_override")

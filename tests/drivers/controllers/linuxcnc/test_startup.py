@@ -156,6 +156,7 @@ FALSE_COORDINATES = pytest.mark.parametrize(
         ([UNITS, *said("get program_codes: G0 G91 G49")], r"takes coordinates as relative \(G91\). G90"),
         ([UNITS, *said("get program_codes: G0 G90 G43")], r"adds a tool length \(G43\). G49"),
         ([UNITS, CODES, *said("get pos_offset: 0 -5.0 0 0 0 0")], r"adds an offset of 0 -5\.0 .*Clear it"),
+        ([UNITS, CODES, *said("get pos_offset: 0 garbled")], "'0 garbled' where six positions belong"),
     ],
 )
 

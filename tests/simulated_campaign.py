@@ -32,11 +32,7 @@ class SimulatedCampaign(VirtualCampaign):
     """
 
     def __init__(
-        self,
-        settings: CellSettings,
-        robot: Robot,
-        truth: Geometry,
-        random: np.random.Generator,
+        self, settings: CellSettings, robot: Robot, truth: Geometry, random: np.random.Generator
     ) -> None:
         plan = Plan(settings, robot, with_forecast=False)
         super().__init__(plan, VirtualRobot(robot, truth, random))

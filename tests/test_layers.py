@@ -13,15 +13,7 @@ import pytest
 
 CHECKOUT = Path(__file__).parent.parent
 PACKAGES = ("hexacell", "drivers", "procedures")
-MATHEMATICS = (
-    "kinematics",
-    "limits",
-    "identification",
-    "uncertainty",
-    "motion",
-    "design",
-    "drift",
-)
+MATHEMATICS = ("kinematics", "limits", "identification", "uncertainty", "motion", "design", "drift")
 
 FORBIDDEN = [
     ("hexacell.errors", "hexacell.cli"),

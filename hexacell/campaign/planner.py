@@ -25,12 +25,7 @@ from hexacell.campaign.decisions import (
 )
 from hexacell.campaign.forecast import Forecaster, PlannedInformation, select_sets
 from hexacell.campaign.online_estimate import OnlineEstimate, OnlineEstimator, RecordEstimator
-from hexacell.campaign.pilots import (
-    CAUTION,
-    FIRST_PILOT,
-    most_pilots,
-    pilots_per_departure,
-)
+from hexacell.campaign.pilots import CAUTION, FIRST_PILOT, most_pilots, pilots_per_departure
 from hexacell.campaign.pose_chooser import PoseChooser, is_well_known
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.stopping_rules import Goal, StoppingRules
@@ -214,13 +209,7 @@ class Plan:
         """Chooses the next pose at a point."""
         known_then = None if self.goal else self.forecaster.known_beside_next
         return PoseChooser(
-            self.settings,
-            self.robot,
-            self.pose_list,
-            self.task,
-            self.effort,
-            known_then,
-            self.most_turned,
+            self.settings, self.robot, self.pose_list, self.task, self.effort, known_then, self.most_turned
         )
 
     @cached_property

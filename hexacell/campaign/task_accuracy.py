@@ -108,12 +108,7 @@ class Task:
         if not len(reached.poses) or not len(reached.workspace):
             return None
         propagation = Propagation.of(
-            found,
-            belief,
-            task=reached.poses,
-            workspace=reached.workspace,
-            earlier=earlier,
-            zeros=zeros,
+            found, belief, task=reached.poses, workspace=reached.workspace, earlier=earlier, zeros=zeros
         )
         return UncertaintyBudget.of(propagation, effects, scale)
 

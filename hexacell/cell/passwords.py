@@ -21,10 +21,7 @@ from hexacell.errors import FileError, UsageError
 from hexacell.storage.atomic_files import os_errors, read_text
 from hexacell.storage.toml_document import TomlDocument, clear_secrets
 
-VARIABLES = {
-    "connect_password": "HEXACELL_CONNECT_PASSWORD",
-    "enable_password": "HEXACELL_ENABLE_PASSWORD",
-}
+VARIABLES = {"connect_password": "HEXACELL_CONNECT_PASSWORD", "enable_password": "HEXACELL_ENABLE_PASSWORD"}
 """The environment variable of each password."""
 
 LARGEST_FILE_BYTES = 10_000
@@ -83,10 +80,7 @@ def password_path(controller: ControllerSettings, folder: Path) -> Path | None:
 
 
 def stated_secrets(
-    path: Path | None,
-    model: type[Section],
-    variables: Mapping[str, str],
-    environment: Mapping[str, str],
+    path: Path | None, model: type[Section], variables: Mapping[str, str], environment: Mapping[str, str]
 ) -> dict[str, SecretStr]:
     """Secrets by name: from the environment, or else from a file of their own, if there is one.
 

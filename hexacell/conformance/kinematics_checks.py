@@ -18,12 +18,7 @@ ROUNDING = 1e-9
 DIFFERENCES = 1e-6
 """Accuracy of central differences, relative to the largest derivative of the same kind."""
 
-STEPS = {
-    ParameterUnit.MM: 1e-3,
-    ParameterUnit.RAD: 1e-6,
-    ParameterUnit.DEG: 1e-4,
-    ParameterUnit.NONE: 1e-6,
-}
+STEPS = {ParameterUnit.MM: 1e-3, ParameterUnit.RAD: 1e-6, ParameterUnit.DEG: 1e-4, ParameterUnit.NONE: 1e-6}
 JOINT_STEPS = {JointUnit.MM: 1e-3, JointUnit.DEG: 1e-4}
 TWIST_STEPS = np.repeat([STEPS[ParameterUnit.MM], STEPS[ParameterUnit.RAD]], 3)
 OFF = np.repeat([3.0, 0.01], 3)

@@ -16,11 +16,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from hexacell.design.candidates import rows_apart, targets_within_limits
-from hexacell.design.predicted_records import (
-    GaugeZero,
-    PredictedRecords,
-    predict_clear_records,
-)
+from hexacell.design.predicted_records import GaugeZero, PredictedRecords, predict_clear_records
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import Batch, PoseBatch

@@ -13,12 +13,7 @@ import numpy as np
 
 from hexacell.design.candidates import reachable
 from hexacell.design.criteria import update_factors
-from hexacell.design.predicted_records import (
-    SAFETY_SIGMAS,
-    TRAVEL_SHARE,
-    gauge_zero_at,
-    predict_records,
-)
+from hexacell.design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE, gauge_zero_at, predict_records
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import CorrelatedPair, Identification
 from hexacell.kinematics import rotations

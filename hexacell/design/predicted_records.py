@@ -19,11 +19,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import modes_of
 from hexacell.kinematics.pose import Batch, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import (
-    POSITION,
-    free_sensitivity,
-    sensitivity_and_margin,
-)
+from hexacell.kinematics.sensitivity import POSITION, free_sensitivity, sensitivity_and_margin
 from hexacell.limits.limits import Limits
 
 SAFETY_SIGMAS = 4.0

@@ -98,9 +98,5 @@ def _stated_effects(settings: CellSettings, measured: MeasuredNoise) -> object:
     key = repeatability_key(approaches.unit)
     sources = stated.sources | {key: f"{approaches.visits} visits of the first reference"}
     return stated.model_copy(
-        update={
-            key: 1e3 * approaches.excess,
-            "stop_repeatability_acts": "at work",
-            "sources": sources,
-        }
+        update={key: 1e3 * approaches.excess, "stop_repeatability_acts": "at work", "sources": sources}
     )

@@ -205,10 +205,7 @@ class Robot:
         """
         commanding = self.for_controller(geometry) if is_used else self.controller
         return replace(
-            self,
-            provisional=(geometry,),
-            uses_provisional=is_used,
-            limits=self.limits_with(commanding),
+            self, provisional=(geometry,), uses_provisional=is_used, limits=self.limits_with(commanding)
         )
 
     def limits_with(self, commanding: Geometry) -> Limits:

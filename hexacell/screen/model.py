@@ -45,13 +45,7 @@ from hexacell.text.screens.reviewing import (
     verdict_urgency,
 )
 from hexacell.text.screens.run_picture import header_line
-from hexacell.text.screens.views import (
-    ChecklistItem,
-    FaultView,
-    Line,
-    QuestionView,
-    Urgency,
-)
+from hexacell.text.screens.views import ChecklistItem, FaultView, Line, QuestionView, Urgency
 from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo

@@ -102,10 +102,7 @@ def fit_measurements(
     robot, settings, measured = robot_of(cell), cell.settings, None
     if folder is not None and folder.journal.is_file():
         from hexacell.noise.measured_noise import with_measured_noise  # noqa: PLC0415 - only for a run
-        from hexacell.services.recorded.recorded_robot import (  # noqa: PLC0415 - likewise
-            commanding_geometries,
-            noise_of_run,
-        )
+        from hexacell.services.recorded.recorded_robot import commanding_geometries, noise_of_run  # noqa: PLC0415 - likewise
 
         recorded = commanding_geometries(folder, cell.settings)
         robot = replace(robot, earlier=(*recorded, *robot.earlier))
@@ -154,11 +151,7 @@ def try_plan(cell: Cell) -> PlanTrial:
         FileError: see :func:`plan_of`.
     """
     from hexacell.dry_run.campaign import dry_run  # noqa: PLC0415 - takes seconds anyway
-    from hexacell.noise.noise_assessment import (  # noqa: PLC0415
-        WINDOWS,
-        AveragingForecaster,
-        mean_of_independent,
-    )
+    from hexacell.noise.noise_assessment import WINDOWS, AveragingForecaster, mean_of_independent  # noqa: PLC0415
 
     plan = plan_of(cell)
     averaging, noise = AveragingForecaster(plan), plan.robot.noise

@@ -12,11 +12,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.cell.model import CellSettings
 from hexacell.design.candidates import ReachableTargets, commands_for, reachable_targets
 from hexacell.design.criteria import D_OPTIMAL, covariance_update
-from hexacell.design.predicted_records import (
-    GaugeZero,
-    estimate_gauge_zero,
-    predict_records,
-)
+from hexacell.design.predicted_records import GaugeZero, estimate_gauge_zero, predict_records
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief

@@ -36,11 +36,7 @@ def error_vector(problem: Problem, residuals: Array) -> Array:
 
 
 def gauss_newton(
-    problem: Problem,
-    *,
-    start: Identification | None = None,
-    steps: int = 30,
-    tolerance_mm: float = 1e-9,
+    problem: Problem, *, start: Identification | None = None, steps: int = 30, tolerance_mm: float = 1e-9
 ) -> Geometry:
     """Eq. 13: ``d <- d - (A^T A)^-1 A^T E``, from the drawing, or from a result for these records.
 

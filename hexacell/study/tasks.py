@@ -87,9 +87,7 @@ def results_of(
 
 
 def _until_broken(
-    left: Mapping[str, TaskType],
-    carry_out: Callable[[TaskType], ResultType],
-    new_executor: NewExecutor,
+    left: Mapping[str, TaskType], carry_out: Callable[[TaskType], ResultType], new_executor: NewExecutor
 ) -> Iterator[tuple[str, ResultType]]:
     executor = new_executor()
     keys: dict[Future[ResultType], str] = {}

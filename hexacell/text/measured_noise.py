@@ -6,11 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource
-from hexacell.noise.measured_noise import (
-    AveragingForecast,
-    InstrumentNoise,
-    MeasuredNoise,
-)
+from hexacell.noise.measured_noise import AveragingForecast, InstrumentNoise, MeasuredNoise
 from hexacell.noise.noise_assessment import worthwhile_windows
 from hexacell.text.layout import duration, wrapped
 

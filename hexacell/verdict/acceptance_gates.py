@@ -6,11 +6,7 @@ from collections.abc import Sequence
 
 from hexacell.cell.fields import Frozen
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
-from hexacell.identification.solver.chi_square import (
-    CONTRADICTED_RATIO,
-    ChiSquareTest,
-    ChiSquareVerdict,
-)
+from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.kinematics.geometry import Geometry
 

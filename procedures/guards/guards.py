@@ -140,11 +140,7 @@ class Guards:
         return GuardLimits(guards.stale_s, plate, rest, self._settings.mechanism.words)
 
     def _pollers(
-        self,
-        *,
-        controller: bool = False,
-        encoders: bool = True,
-        gauges: tuple[WatchedGauge, ...] = (),
+        self, *, controller: bool = False, encoders: bool = True, gauges: tuple[WatchedGauge, ...] = ()
     ) -> PolledDevices:
         devices, guards = self._devices, self._settings.guards
         watched = WatchedController(devices, self._clock, guards.following, guards.stale_s)

@@ -12,12 +12,7 @@ from typing import Self, TypeVar
 import numpy as np
 
 from drivers.errors import GaugeAtEnd
-from drivers.interfaces import (
-    ControllerStatus,
-    DeviceIdentity,
-    EncoderSample,
-    ReportedPosition,
-)
+from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, ReportedPosition
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
 from hexacell.errors import AnswerNeeded, DeviceError

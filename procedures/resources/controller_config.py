@@ -121,10 +121,7 @@ PROVISIONAL_FOLDER = "lent"
 
 _NAMES = {WriteKind.RESULT: "the new geometry", WriteKind.PROVISIONAL: "the provisional geometry"}
 
-_UNDOES = {
-    WriteKind.RESULT: WriteKind.TAKEN_BACK,
-    WriteKind.PROVISIONAL: WriteKind.PROVISIONAL_TAKEN_BACK,
-}
+_UNDOES = {WriteKind.RESULT: WriteKind.TAKEN_BACK, WriteKind.PROVISIONAL: WriteKind.PROVISIONAL_TAKEN_BACK}
 
 
 @dataclass(frozen=True, eq=False)

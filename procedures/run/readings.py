@@ -63,9 +63,7 @@ def in_words(deviation_mm: Iterable[float]) -> str:
 
 
 def legs_warmer(
-    thermometers: Iterable[ThermometerSettings],
-    readings: Sequence[Reading],
-    before: Sequence[float | None],
+    thermometers: Iterable[ThermometerSettings], readings: Sequence[Reading], before: Sequence[float | None]
 ) -> Array:
     """By how much each leg (n, 6), K, was warmer at n records than ``before``, deg C a leg.
 

@@ -91,10 +91,7 @@ async def device_failures(devices: Devices) -> list[HexacellError]:
 async def start_failures(devices: Devices, folder: Path, free_disk_mb: float) -> list[HexacellError]:
     """What prevents the start of a run, apart from the devices: the stop line, and a full disk."""
     pressed = await devices.stop_input.active_reason()
-    trips = [
-        None if pressed is None else motion_forbidden(pressed),
-        low_disk_space(folder, free_disk_mb),
-    ]
+    trips = [None if pressed is None else motion_forbidden(pressed), low_disk_space(folder, free_disk_mb)]
     return [trip.as_error() for trip in trips if trip is not None]
 
 

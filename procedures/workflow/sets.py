@@ -239,9 +239,6 @@ def move_to_chosen(state: RunState, chosen: MeasurePose) -> Move:
         orientation=chosen.orientation if is_pilot else state.set(at).next_orientation,
         pose=chosen.pose.as_tuple(),
         expected=Expectation(
-            deviation_mm=chosen.deviation,
-            sigma_mm=chosen.sigma,
-            gain=chosen.gain,
-            forecast=chosen.forecast,
+            deviation_mm=chosen.deviation, sigma_mm=chosen.sigma, gain=chosen.gain, forecast=chosen.forecast
         ),
     )

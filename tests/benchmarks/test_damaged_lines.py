@@ -52,10 +52,7 @@ ONE_IN = 100_000
 MEMORY_MIB = 8.0
 
 ID_H = RequestSettings(
-    ask="GA01\r\n",
-    answer=r"GN01,([+-]\d{4}\.\d{4})",
-    example="GN01,+0016.2345\r\n",
-    at_end=r"GA01,ER\d",
+    ask="GA01\r\n", answer=r"GN01,([+-]\d{4}\.\d{4})", example="GN01,+0016.2345\r\n", at_end=r"GA01,ER\d"
 )
 
 

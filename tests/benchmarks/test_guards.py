@@ -107,12 +107,7 @@ async def watched(folder: Path, protocol: str) -> AsyncIterator[Watched]:
     cell = load_cell(folder / source.name)
     settings = settings_of(cell, protocol)
     served = SimulatedCell(
-        settings,
-        settings.simulation,
-        Hexaglide(),
-        NATIVE,
-        cell.config_paths,
-        other_processes=False,
+        settings, settings.simulation, Hexaglide(), NATIVE, cell.config_paths, other_processes=False
     )
     with served as simulated:
         links = SharedSerialPorts()

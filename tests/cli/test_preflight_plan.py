@@ -38,14 +38,8 @@ IMPOSSIBLE: dict[str, tuple[tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         (("gauge_mm = 0.01", "gauge_mm = 2.0"),),
         ("identification point 1: no orientation", "identification point 5: no orientation"),
     ),
-    "tolerances": (
-        (("S_mm = 7.0", "S_mm = 150.0"),),
-        ("identification point 1", "cannot reach it"),
-    ),
-    "tilt": (
-        (("tilt_deg = 45.0", "tilt_deg = 0.5"),),
-        ("parameters undetermined", "Allow more tilt"),
-    ),
+    "tolerances": ((("S_mm = 7.0", "S_mm = 150.0"),), ("identification point 1", "cannot reach it")),
+    "tilt": ((("tilt_deg = 45.0", "tilt_deg = 0.5"),), ("parameters undetermined", "Allow more tilt")),
     "points on one spot": (
         ((P5, "[0.0, 1.0, 550.0],\n]\norientations = 2"),),
         ("5 points with 2 orientations give 15 equations for 35 parameters",),
@@ -170,12 +164,7 @@ LISTS: dict[str, tuple[Callable[[list[str]], list[str]], tuple[str, ...]]] = {
         ("point 1, poses 11 and 12 of the list: the straight line between them",),
     ),
     "out of reach, too steep and elsewhere, all at once": (
-        lambda rows: [
-            *rows,
-            "1,12,0,0,1550,0,0,0",
-            "2,12,0,-200,550,46,0,0",
-            "3,12,60,-100,500,0,0,0",
-        ],
+        lambda rows: [*rows, "1,12,0,0,1550,0,0,0", "2,12,0,-200,550,46,0,0", "3,12,60,-100,500,0,0,0"],
         (
             "point 1, pose 12 of the list: leg ",
             "point 2, pose 12 of the list: is tilted by 46.0 deg, beyond tilt_deg = 45",

@@ -114,8 +114,7 @@ def test_a_local_controller_that_the_network_can_reach_is_warned_of(
     typed_here, cell_folder, monkeypatch, is_open
 ):
     monkeypatch.setattr(
-        "hexacell.services.preflight.accepts_from_network",
-        lambda port: is_open and port == 5007,
+        "hexacell.services.preflight.accepts_from_network", lambda port: is_open and port == 5007
     )
     real(cell_folder, "127.0.0.1")
     outcome = typed_here("cell", "validate", cell_folder.cell)

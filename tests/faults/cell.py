@@ -47,9 +47,7 @@ SMALL: dict[str, Any] = FREE | {
     "simulation.encoders.latency_s": 0.0,
     "simulation.motion.ringing_mm": 0.0,
 }
-NEVER_GOOD_ENOUGH: dict[str, Any] = {
-    "acceptance.position_mm": 1e-9,
-}
+NEVER_GOOD_ENOUGH: dict[str, Any] = {"acceptance.position_mm": 1e-9}
 """No result passes this, so that what was written is rolled back."""
 PROVISIONAL: dict[str, Any] = {"identification.provisional": True}
 """The controller is lent a geometry after the first point, which is taken back after the last."""

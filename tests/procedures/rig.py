@@ -53,12 +53,7 @@ class Rig:
         self.clock, self.gauges, self.controller = bench.clock, bench.gauges, bench.controller
         home, config = Pose(*self.cell.settings.identification.points[0]), self.cell.config_path
         self.physics: RobotPhysics = RobotPhysics(
-            Hexaglide(),
-            simulation,
-            self.clock,
-            NATIVE.read(config),
-            home,
-            self.cell.settings.length_check,
+            Hexaglide(), simulation, self.clock, NATIVE.read(config), home, self.cell.settings.length_check
         )
         self.machine = SimulatedMachine(
             Hexaglide(), NATIVE, (config,), self.physics, self.clock, home, simulation.soft_limits

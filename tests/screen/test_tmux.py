@@ -21,10 +21,7 @@ from tests.waiting import wait_until
 NAME = "simulated-hexaglide"
 TMUX = shutil.which("tmux")
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(TMUX is None, reason="tmux is not installed"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(TMUX is None, reason="tmux is not installed")]
 
 
 async def end_run(path: Path) -> None:

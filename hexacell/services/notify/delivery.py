@@ -80,10 +80,7 @@ def variable(name: str, part: str) -> str:
 
 
 def resolved_address(
-    settings: NotificationSettings,
-    cell: str,
-    folder: Path,
-    environment: Mapping[str, str] = os.environ,
+    settings: NotificationSettings, cell: str, folder: Path, environment: Mapping[str, str] = os.environ
 ) -> NoticeAddress:
     """The address of a recipient; ``folder`` has the cell file, ``cell`` is the cell's name.
 

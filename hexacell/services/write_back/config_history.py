@@ -14,13 +14,7 @@ from pathlib import Path
 
 from hexacell.cell.loader import Cell
 from hexacell.config.change import Receipt
-from hexacell.config.write_record import (
-    RECORDS,
-    THE_RUN,
-    WriteKind,
-    WriteRecord,
-    read_records,
-)
+from hexacell.config.write_record import RECORDS, THE_RUN, WriteKind, WriteRecord, read_records
 from hexacell.errors import HexacellError
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.write_back.config_rollback import receipts_of

@@ -18,13 +18,7 @@ from hexacell.config.change import (
 from hexacell.config.layout import Contents, are_same_files, fingerprint_of, read_contents
 from hexacell.config.pending_write import held_config
 from hexacell.config.write_back import restore
-from hexacell.config.write_record import (
-    Recording,
-    WriteCause,
-    WriteKind,
-    recorded_write,
-    stated_reason,
-)
+from hexacell.config.write_record import Recording, WriteCause, WriteKind, recorded_write, stated_reason
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import find_run, run_folders, runs_folder

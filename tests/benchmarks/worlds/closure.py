@@ -46,9 +46,7 @@ class Bodies:
         sliders = geometry["S"] + joints[..., None] * np.array([1.0, 0.0, 0.0])
         shape = (len(joints), 6)
         return cls(
-            sliders,
-            np.broadcast_to(geometry["B"], (*shape, 3)),
-            np.broadcast_to(geometry["l"], shape),
+            sliders, np.broadcast_to(geometry["B"], (*shape, 3)), np.broadcast_to(geometry["l"], shape)
         )
 
     def blend(self, other: Bodies, share: float) -> Bodies:

@@ -81,10 +81,7 @@ UNFIT = [
     ({(0x1018, 4): None}, r"serial number \(none\), the cell file says 505"),
     ({(0x1018, 4): "4d000000"}, "serial number 77, the cell file says 505"),
     ({(0x1801, 1): None, (0x1800, 1): None}, "no transmit PDO"),
-    (
-        {(0x1A01, 0): "02", (0x1A01, 1): "04003060", (0x1A01, 2): "20000460"},
-        "position 4 bits into TPDO 2",
-    ),
+    ({(0x1A01, 0): "02", (0x1A01, 1): "04003060", (0x1A01, 2): "20000460"}, "position 4 bits into TPDO 2"),
     ({(0x1001, 0): "21"}, "1001h:0"),
 ]
 """Objects of a node, in hexadecimal or not there, and why it is refused."""

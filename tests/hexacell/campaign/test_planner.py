@@ -147,9 +147,7 @@ def test_records_of_another_robot_are_refused(campaign, two_points):
 
 
 def test_a_budget_of_records_ends_the_campaign(carry_out):
-    plan = at_two_points(
-        identification__budget_records=11,
-    )
+    plan = at_two_points(identification__budget_records=11)
     taken = carry_out(plan)
     assert len(records_of(taken)) == 11
     assert summary(taken)[-2:] == ["C2", "end"]
@@ -158,9 +156,7 @@ def test_a_budget_of_records_ends_the_campaign(carry_out):
 
 
 def test_a_point_is_not_begun_for_a_single_record(campaign):
-    plan = at_two_points(
-        identification__budget_records=9,
-    )
+    plan = at_two_points(identification__budget_records=9)
     between = next(one.state for one in campaign if summary([one]) == ["R2"])
     assert plan.decide(between) == Finished("the budget of 9 records is used")
 
@@ -181,9 +177,7 @@ def test_a_budget_of_minutes_counts_moving_the_gauges(carry_out):
 def test_the_plan_finishes_when_the_target_is_reached(carry_out, campaign):
     errors = forecasts_of(campaign)
     target = 0.5 * (errors[-3].now_mm + errors[-2].now_mm)
-    plan = at_two_points(
-        identification__target_mm=target,
-    )
+    plan = at_two_points(identification__target_mm=target)
     taken = carry_out(plan)
     assert len(records_of(taken)) == 14
     assert isinstance(taken[-1].decision, Finished)
@@ -191,17 +185,13 @@ def test_the_plan_finishes_when_the_target_is_reached(carry_out, campaign):
 
 
 def test_a_target_is_not_reached_before_the_records_can_identify(carry_out):
-    plan = at_two_points(
-        identification__target_mm=1000.0,
-    )
+    plan = at_two_points(identification__target_mm=1000.0)
     assert len(records_of(carry_out(plan))) == 14  # 3 x 12 equations for 35 parameters
 
 
 def test_a_point_is_finished_when_no_record_gains_enough(carry_out, campaign):
     gains = [forecast.now_mm - forecast.next_mm for forecast in forecasts_of(campaign)]
-    plan = at_two_points(
-        identification__least_gain_mm=1.1 * min(gains[-4:]),
-    )
+    plan = at_two_points(identification__least_gain_mm=1.1 * min(gains[-4:]))
     taken = carry_out(plan)
     assert len(records_of(taken)) < 16
     closed = [one.decision for one in taken if isinstance(one.decision, FinishPoint)]
@@ -218,11 +208,7 @@ def test_points_are_chosen_by_their_gain_per_minute(make_plan, carry_out):
 
     def plan(choose_points):
         return make_plan(
-            identification__points=(
-                (100.0, -100.0, 500.0),
-                (100.0, -99.0, 500.0),
-                (-100.0, 100.0, 500.0),
-            ),
+            identification__points=((100.0, -100.0, 500.0), (100.0, -99.0, 500.0), (-100.0, 100.0, 500.0)),
             identification__orientations=8,
             identification__choose_points=choose_points,
             identification__budget_records=14,

@@ -22,12 +22,7 @@ from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 SIGNS = [1, 1, 1, -1, -1, -1]
 INI = {"section": "HEXAGLIDE", "branch": "BRANCH{leg}"}
 HAL = {"component": "hexaglidekins", "branch": SIGNS}
-LINES = {
-    "lines": [
-        "JOINT[{leg}] := {{{S.x}, {S.y}, {S.z}}}",
-        "B{index}: {B.x} {B.y} {B.z} {l} {branch}",
-    ]
-}
+LINES = {"lines": ["JOINT[{leg}] := {{{S.x}, {S.y}, {S.z}}}", "B{index}: {B.x} {B.y} {B.z} {l} {branch}"]}
 
 OWNERS_LINES = [
     "",

@@ -10,12 +10,7 @@ import pytest
 
 from hexacell.config.change import AFTER, BEFORE, ConfigChange, Receipt
 from hexacell.config.layout import read_contents
-from hexacell.config.pending_write import (
-    is_interrupted,
-    note_path,
-    note_write,
-    settle_interrupted_write,
-)
+from hexacell.config.pending_write import is_interrupted, note_path, note_write, settle_interrupted_write
 from hexacell.config.write_back import commit, restore, rollback
 from hexacell.errors import FileError, HexacellError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry

@@ -57,13 +57,7 @@ def test_commits_are_undone_one_after_another(
     further = NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry.interpolate_from(geometry, 2.0)
     further = hexaglide_geometry(S=further["S"] + 1.0, B=further["B"], l=further["l"])
     second = commit(
-        propose(
-            (config,),
-            NATIVE,
-            further,
-            fingerprint_at_start=fingerprint(config),
-        ),
-        run / "2",
+        propose((config,), NATIVE, further, fingerprint_at_start=fingerprint(config)), run / "2"
     )
     with pytest.raises(FileError, match="changed since it was written"):
         rollback(first)

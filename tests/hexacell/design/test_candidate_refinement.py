@@ -8,13 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hexacell.design.candidate_refinement import (
-    QUICK,
-    THOROUGH,
-    CandidateSpace,
-    RatedRecords,
-    Rounds,
-)
+from hexacell.design.candidate_refinement import QUICK, THOROUGH, CandidateSpace, RatedRecords, Rounds
 from hexacell.design.candidates import Amplitudes, orientations, rows_apart
 from hexacell.design.criteria import D_OPTIMAL
 from hexacell.design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE, gauge_zero_at

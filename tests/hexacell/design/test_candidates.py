@@ -86,13 +86,7 @@ def test_some_poses_of_the_estimated_robot_have_no_command(know, much):
 
 
 @pytest.mark.parametrize(
-    "change",
-    [
-        {"tilt": 0.1},
-        {"joint_min": -480.0},
-        {"joint_max": 480.0},
-        {"singularity_margin": 0.12},
-    ],
+    "change", [{"tilt": 0.1}, {"joint_min": -480.0}, {"joint_max": 480.0}, {"singularity_margin": 0.12}]
 )
 def test_every_limit_reduces_the_candidates(know, much, limits, found, change):
     tighter = know(much, limits=replace(limits, **change))

@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.drift.drift_watch import (
-    DriftWatch,
-    StepAlarm,
-    watch_runs,
-)
+from hexacell.drift.drift_watch import DriftWatch, StepAlarm, watch_runs
 from hexacell.drift.single_cause import possible_legs
 from tests.hexacell.drift.synthetic_runs import CAUSES, LEGS, LinearRobot
 

@@ -9,12 +9,7 @@ import pytest
 
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import Pose
-from hexacell.noise.gauge_trial import (
-    GaugeMistake,
-    TrialFinding,
-    judge_response,
-    response_of,
-)
+from hexacell.noise.gauge_trial import GaugeMistake, TrialFinding, judge_response, response_of
 from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 

@@ -13,13 +13,7 @@ import pytest
 from hexacell.cell.loader import Cell
 from hexacell.config import write_record
 from hexacell.config.write_back import commit
-from hexacell.config.write_record import (
-    RECORDS,
-    THE_RUN,
-    WriteCause,
-    WriteKind,
-    recorded_write,
-)
+from hexacell.config.write_record import RECORDS, THE_RUN, WriteCause, WriteKind, recorded_write
 from hexacell.errors import UsageError
 from hexacell.robot.model import config_layout
 from hexacell.runs.cell_lock import user_name

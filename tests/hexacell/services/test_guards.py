@@ -50,12 +50,7 @@ def striking(site: Any, key: str, kind: FaultKind, device: str) -> Callable[...,
     def listener(event: events.Event, _: object) -> None:
         if isinstance(event, events.StepBegun) and event.step.key == key:
             schedule = site.simulated.schedule
-            fault = {
-                "kind": kind,
-                "device": device,
-                "at_move": schedule.move_count + 1,
-                "after_s": 5.0,
-            }
+            fault = {"kind": kind, "device": device, "at_move": schedule.move_count + 1, "after_s": 5.0}
             schedule.schedule(SimulatedFault.model_validate(fault))
 
     return listener

@@ -10,14 +10,7 @@ from hexacell.config.write_back import commit
 from hexacell.errors import UsageError
 from hexacell.services.history.past_runs import compare_runs, parameter_trends, past_runs
 from hexacell.services.write_back.config_rollback import roll_back_config
-from hexacell.text.history import (
-    NO_DRIFT,
-    NO_RUNS,
-    comparison_text,
-    drift_text,
-    history_text,
-    standing,
-)
+from hexacell.text.history import NO_DRIFT, NO_RUNS, comparison_text, drift_text, history_text, standing
 from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import Journal, read_journal
 from procedures.steps import events

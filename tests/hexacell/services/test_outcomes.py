@@ -207,9 +207,7 @@ async def test_two_gauges_that_fail_at_once_are_both_named(make_site) -> None:
     assert interrupted.exit_code == ExitCode.HARDWARE
 
 
-async def test_an_emergency_stop_during_a_move_stops_the_run_and_is_not_reset(
-    make_site,
-) -> None:
+async def test_an_emergency_stop_during_a_move_stops_the_run_and_is_not_reset(make_site) -> None:
     site = make_site()
 
     def stop_in_the_next_move() -> None:

@@ -9,14 +9,7 @@ import pytest
 from pydantic import SecretStr
 
 from hexacell.campaign import feasibility
-from hexacell.errors import (
-    AnswerNeeded,
-    CellBusy,
-    DeviceError,
-    ExitCode,
-    ReachError,
-    SeveralErrors,
-)
+from hexacell.errors import AnswerNeeded, CellBusy, DeviceError, ExitCode, ReachError, SeveralErrors
 from hexacell.runs.cell_lock import cell_lock
 from hexacell.services.run.calibration_run import preflight
 from procedures.calibration.calibration import Mode

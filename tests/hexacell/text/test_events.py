@@ -8,11 +8,7 @@ import pytest
 
 from hexacell.campaign.decisions import Forecast
 from hexacell.cell.recovery import Action, FailureKind
-from hexacell.text.line_face import (
-    EventFormatter,
-    activity,
-    event_text,
-)
+from hexacell.text.line_face import EventFormatter, activity, event_text
 from procedures.run.keys import Phase, SetKey
 from procedures.run.readings import Reading
 from procedures.run.state import RunState, fold

@@ -7,11 +7,7 @@ from typing import Any
 import pytest
 
 from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource
-from hexacell.noise.measured_noise import (
-    AveragingForecast,
-    InstrumentNoise,
-    MeasuredNoise,
-)
+from hexacell.noise.measured_noise import AveragingForecast, InstrumentNoise, MeasuredNoise
 from hexacell.text.measured_noise import measured_noise_text
 
 

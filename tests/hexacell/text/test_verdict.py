@@ -53,11 +53,7 @@ def result(verdict: Verdict, **changes: object) -> CheckResult:
 
 def test_a_verdict_fits_six_lines_with_what_must_be_taught_anew() -> None:
     verified = Verification(
-        verdict=Verdict.PASS,
-        tests=outcomes(True, True),
-        accuracy=accuracy(),
-        before_mm=4.9,
-        after_mm=0.03,
+        verdict=Verdict.PASS, tests=outcomes(True, True), accuracy=accuracy(), before_mm=4.9, after_mm=0.03
     )
     lines = verification_text(verified).splitlines()
     assert lines == [
@@ -107,11 +103,7 @@ def test_a_check_names_the_parameter_that_changed_most(
 @pytest.mark.parametrize(
     ("verdict", "changes", "end"),
     [
-        (
-            Verdict.PASS,
-            {},
-            "points; position error at the task poses 0.036 +- 0.040 mm (limit 0.15): pass",
-        ),
+        (Verdict.PASS, {}, "points; position error at the task poses 0.036 +- 0.040 mm (limit 0.15): pass"),
         (Verdict.NOT_EVALUATED, {"further_records": 12}, "(about 12 more records would decide)"),
         (Verdict.NOT_EVALUATED, {}, "(further records would not decide)"),
         (

@@ -45,12 +45,7 @@ def near(visit, make_problem, paper):
     return identify(make_problem(exact, controller=paper.actual), find_outliers=False)
 
 
-EFFECTS = (
-    encoder_scales(10.0),
-    rail_waves(5.0, 600.0),
-    stop_repeatability(2.0),
-    ball_roundness(2.0),
-)
+EFFECTS = (encoder_scales(10.0), rail_waves(5.0, 600.0), stop_repeatability(2.0), ball_roundness(2.0))
 
 
 def test_without_effects_it_is_the_noise_alone(exact, propagation, budget_of) -> None:

@@ -250,12 +250,7 @@ def test_the_ball_stays_inside_the_travel_on_every_path(recording, make_rig) -> 
         way = interpolate_line(here.get(event.at, there), there)
         joints = inverse_kinematics(robot.mechanism, robot.controller, robot.branch, way)
         really = continue_solution(
-            robot.mechanism,
-            truth,
-            joints,
-            start=way,
-            start_geometry=robot.controller,
-            start_joints=joints,
+            robot.mechanism, truth, joints, start=way, start_geometry=robot.controller, start_joints=joints
         )
         assert really.found.all()
         balls = really.poses.positions

@@ -37,12 +37,7 @@ COMMITTED = events.Committed(approved_by="a tester")
 ENDED = events.Ended(exit_code=0, line="over")
 PASS, WORSE, OUT, UNKNOWN = (
     events.ResultValidated(verdict=verdict, line="so it is")
-    for verdict in (
-        Verdict.PASS,
-        Verdict.FAIL,
-        Verdict.FAIL,
-        Verdict.NOT_EVALUATED,
-    )
+    for verdict in (Verdict.PASS, Verdict.FAIL, Verdict.FAIL, Verdict.NOT_EVALUATED)
 )
 OFFERED = events.ResultValidated(
     verdict=Verdict.CONDITIONAL_FAIL,
@@ -102,11 +97,7 @@ TABLE: Table = {
     "all sampled": (s().whole(ORIENTATIONS)[:-2], "P1/o01/move"),
     "back at the reference": (s().whole(ORIENTATIONS)[:-1], "P1/close"),
     "back after too many refusals": (
-        [
-            *s().whole(2)[:-2],
-            *[s().arrived(3), s().refused(3)] * (REFUSALS + 1),
-            s().arrived(1),
-        ],
+        [*s().whole(2)[:-2], *[s().arrived(3), s().refused(3)] * (REFUSALS + 1), s().arrived(1)],
         "P1/close",
     ),
     "first point closed": (s().whole(ORIENTATIONS), "P2/o01/move"),
@@ -154,12 +145,7 @@ TABLE: Table = {
         "judge",
     ),
     "refused again on the way back": (
-        [
-            *WRITTEN,
-            *refused_at_a_pose(s(Phase.AFTER)),
-            s(Phase.AFTER).refused(1),
-            LOCATED,
-        ],
+        [*WRITTEN, *refused_at_a_pose(s(Phase.AFTER)), s(Phase.AFTER).refused(1), LOCATED],
         "judge",
     ),
     "verified": (AFTER, "judge"),

@@ -10,14 +10,7 @@ import pytest
 
 from drivers.errors import GaugeAtEnd, GaugeSilent
 from drivers.interfaces import DeviceIdentity, TemperatureReading
-from hexacell.errors import (
-    CellBusy,
-    DeviceError,
-    ExitCode,
-    HexacellError,
-    SeveralErrors,
-    consists_only_of,
-)
+from hexacell.errors import CellBusy, DeviceError, ExitCode, HexacellError, SeveralErrors, consists_only_of
 from procedures.calibration.calibration import Mode
 from procedures.devices.device_set import Thermometers, gather_errors
 from procedures.journal.journal import read_journal

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from drivers.errors import (
-    GaugeSilent,
-)
+from drivers.errors import GaugeSilent
 from hexacell.cell.recovery import RecoverySettings
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal

@@ -124,7 +124,7 @@ async def test_a_pause_after_the_record_waits_for_the_record(stage: Stage, bench
     await stage.over()
     assert stage.script.begun == [f"P1/o0{n}/{what}" for n in (1, 2, 3) for what in ("move", "sample")]
     assert stage.statuses == [
-        *(Status.RUNNING, Status.PAUSING, Status.PAUSED, Status.RUNNING, Status.ENDED),
+        *(Status.RUNNING, Status.PAUSING, Status.PAUSED, Status.RUNNING, Status.ENDED)
     ]
 
 

@@ -8,18 +8,9 @@ from typing import Any
 
 import pytest
 
-from drivers.errors import (
-    BusError,
-    GaugeSilent,
-    ZeroVoid,
-)
+from drivers.errors import BusError, GaugeSilent, ZeroVoid
 from hexacell.cell.recovery import Action, FailureKind
-from hexacell.errors import (
-    DeviceError,
-    ExitCode,
-    HexacellError,
-    Interruption,
-)
+from hexacell.errors import DeviceError, ExitCode, HexacellError, Interruption
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Abort, Answer, Pause, Resume
 from procedures.steps import events

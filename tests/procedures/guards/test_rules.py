@@ -80,10 +80,7 @@ def test_a_snapshot_without_faults_trips_no_guard() -> None:
 
 def test_a_device_without_an_answer_trips_only_by_its_silence() -> None:
     unanswered = PolledDevices(
-        (polled("gauge x"),),
-        polled("encoders"),
-        polled("controller"),
-        polled("stop line"),
+        (polled("gauge x"),), polled("encoders"), polled("controller"), polled("stop line")
     )
     assert first_trip(unanswered, LIMITS) is None
     assert tripped(encoders=polled("encoders", silent_s=0.13)).guard is Guard.STALE

@@ -83,9 +83,7 @@ async def test_the_late_answer_to_a_cancelled_query_is_discarded(play):
 async def test_an_answer_after_its_timeout_is_discarded(play):
     play.patience = play.IMPATIENT
     late = play.Pause()
-    driver = await play.opened(
-        [("get abs_act_pos", late, ARRIVED), ("get abs_act_pos", HALF_WAY)],
-    )
+    driver = await play.opened([("get abs_act_pos", late, ARRIVED), ("get abs_act_pos", HALF_WAY)])
     with pytest.raises(ResponseTimeout, match=r"did not answer 'get abs_act_pos' within 0\.4 s"):
         await driver.pose()
     late.set()
@@ -104,8 +102,7 @@ async def test_a_missing_answer_makes_the_driver_reconnect(play):
 
 async def test_a_server_that_was_started_anew_is_connected_to_again(play):
     driver = await play.opened(
-        [("get abs_act_pos", ARRIVED, play.HANG_UP)],
-        [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)],
+        [("get abs_act_pos", ARRIVED, play.HANG_UP)], [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)]
     )
     assert (await driver.pose()).x == 10.0
     await until(driver._session._channel.commands.connection._reader.at_eof)

@@ -7,13 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.errors import (
-    CommandRefused,
-    ConnectionLost,
-    MotionInterrupted,
-    MoveRefused,
-    PoseRefused,
-)
+from drivers.errors import CommandRefused, ConnectionLost, MotionInterrupted, MoveRefused, PoseRefused
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 from tests.drivers.controllers.linuxcnc.dialogue import (

@@ -40,12 +40,7 @@ def test_no_single_wrong_bit_of_a_value_is_accepted(value: float, place: int, bi
 
 
 def test_a_line_of_seven_bits_is_opened_with_eight() -> None:
-    settings: dict[str, object] = {
-        "parity_check": "software",
-        "bytesize": 7,
-        "parity": "E",
-        "stopbits": 2,
-    }
+    settings: dict[str, object] = {"parity_check": "software", "bytesize": 7, "parity": "E", "stopbits": 2}
     assert in_software(settings) is not None
     assert settings == {"bytesize": 8, "parity": "N", "stopbits": 2}
     plain: dict[str, object] = {"bytesize": 7, "parity": "E"}

@@ -9,11 +9,7 @@ import pytest
 
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.protocol import Timeouts
-from drivers.errors import (
-    MotionInterrupted,
-    MoveRefused,
-    PoseRefused,
-)
+from drivers.errors import MotionInterrupted, MoveRefused, PoseRefused
 from drivers.interfaces import StartupAction
 from drivers.simulated.linuxcnc.mdi import ModalState
 from drivers.simulated.linuxcnc.server import SimulatedController

@@ -125,10 +125,7 @@ def test_the_estimate_is_the_maximum_of_the_restricted_likelihood(modelled):
         return dense.minus_twice_log_likelihood(np.exp(logarithms))
 
     best = minimize(
-        cost,
-        np.log([1e-4, 1e-4]),
-        method="Nelder-Mead",
-        options={"xatol": 1e-6, "fatol": 1e-9},
+        cost, np.log([1e-4, 1e-4]), method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9}
     )
     encoder, gauge = np.exp(0.5 * best.x)
     assert found.encoder.estimated == pytest.approx(encoder, rel=1e-4)

@@ -56,10 +56,7 @@ def dense_cost(found, rows, precision):
     values, vectors = np.linalg.eigh(precision)
     root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
     design = np.vstack(
-        [
-            whitening @ np.hstack([jacobian, zeros]),
-            np.hstack([root, np.zeros((len(root), zeros.shape[1]))]),
-        ]
+        [whitening @ np.hstack([jacobian, zeros]), np.hstack([root, np.zeros((len(root), zeros.shape[1]))])]
     )
     residuals = whitening @ found.prediction.residuals[rows].ravel()
     both = np.concatenate([residuals, root @ (found.free - problem.prior.free)])

@@ -11,10 +11,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.mechanisms.rotary_cranks import (
-    ROTARY_CRANKS_PARAMETERS,
-    RotaryCranks,
-)
+from hexacell.kinematics.mechanisms.rotary_cranks import ROTARY_CRANKS_PARAMETERS, RotaryCranks
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import turns_of

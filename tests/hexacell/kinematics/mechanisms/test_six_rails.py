@@ -8,9 +8,7 @@ from hypothesis import strategies as st
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.mechanisms.six_rails import (
-    SixRails,
-)
+from hexacell.kinematics.mechanisms.six_rails import SixRails
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import TurnedAxes, turns_of
 from tests.geometries import six_rails_geometry

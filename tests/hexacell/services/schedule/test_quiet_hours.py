@@ -25,8 +25,7 @@ def quiet(*spans: str, **changes: object) -> UnattendedSettings:
 
 
 @pytest.mark.parametrize(
-    ("now", "until"),
-    [("05:29", None), ("05:30", at("22:00")), ("21:59", at("22:00")), ("22:00", None)],
+    ("now", "until"), [("05:29", None), ("05:30", at("22:00")), ("21:59", at("22:00")), ("22:00", None)]
 )
 def test_the_day_shift_is_quiet(now, until) -> None:
     assert quiet_until(quiet("05:30-22:00"), at(now)) == until

@@ -50,10 +50,7 @@ REQUEST = {
     "example": "GN01,+0016.2345\r\n",
     "at_end": "ERROR",
 }
-STREAM = {
-    "answer": r"(?P<channel>\d\d):(?P<number>[+-]\d{3}\.\d{3})",
-    "example": "01:+012.345\r\n",
-}
+STREAM = {"answer": r"(?P<channel>\d\d):(?P<number>[+-]\d{3}\.\d{3})", "example": "01:+012.345\r\n"}
 
 
 def described(protocol, number):

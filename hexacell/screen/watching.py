@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
-from hexacell.errors import HexacellError, UsageError
+from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.run_process.client import RunConnection
 from hexacell.run_process.messages import HostFailed, HostMessage, LiveSnapshot, StatusChanged
 from hexacell.text.screens.run_picture import RunPicture, picture_after
@@ -17,6 +17,7 @@ from procedures.run.cancellation import cancel_and_wait
 GONE = HostFailed(
     problem="the process of the run is gone without a word; the robot may still move",
     action="Look at the robot. What was measured is kept: r in 2 Preflight resumes the run",
+    exit_code=int(ExitCode.FAULT),
 )
 
 FEW_MESSAGES = 50

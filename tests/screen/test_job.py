@@ -228,7 +228,7 @@ async def test_a_fault_that_the_run_has_left_behind_is_not_shown_on_attaching(
             ("The run ended early", "aborted", RESUMABLE),
             "ended early: aborted",
         ),
-        ((), ("That was refused", GONE.problem, GONE.action), f"ended early: {GONE.problem}"),
+        ((), ("The run could not go on", GONE.problem, GONE.action), f"ended early: {GONE.problem}"),
     ],
     ids=["it could not begin", "it was aborted", "its process died"],
 )

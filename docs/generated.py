@@ -192,7 +192,7 @@ class Message:
     action: str
 
 
-EXIT_CODES = {
+HEADINGS = {
     "HexacellError": "The command, a file or the plan",
     "LimitError": "Limits and data",
     "ConvergenceError": "Limits and data",
@@ -220,7 +220,7 @@ def messages(page: str) -> str:
         problem = escaped(message.problem)
         action = escaped(message.action) or advice.get(problem, "")
         found.setdefault(message.kind, set()).add((problem, action))
-    order = list(dict.fromkeys(EXIT_CODES.values()))
+    order = list(dict.fromkeys(HEADINGS.values()))
     sections = []
     for heading in sorted(found, key=order.index):
         rows = sorted(found[heading], key=lambda row: row[0].lstrip(f"{GAP} '\"").lower())
@@ -293,8 +293,8 @@ def _heading(name: str, bases: dict[str, list[str]]) -> str | None:
     waiting = [name]
     while waiting:
         seen.append(one := waiting.pop(0))
-        if one in EXIT_CODES:
-            return EXIT_CODES[one]
+        if one in HEADINGS:
+            return HEADINGS[one]
         waiting += [base for base in bases.get(one, []) if base not in seen]
     return None
 

@@ -38,14 +38,8 @@ test-full: venv
 # figures go into build/figures.json. FULL=1 takes the samples of the targets, for hours (tests/benchmarks/samples.py).
 bench:
 	@.ci/venv "$(PYTHON)" bench
-	@.ci/venv "$(PYTHON)" peers
 	HEXACELL_FIGURES="$(CURDIR)/build/figures.json" \
 		$(RUN) pytest tests/benchmarks -s --timeout=$(if $(FULL),0,600) --durations=10 $(ARGS)
-
-# Other methods and libraries on the same robots: a table, and build/peers.json. ARGS="--robots 100" for more.
-bench-peers:
-	@.ci/venv "$(PYTHON)" peers
-	$(RUN) tests.benchmarks.peers $(ARGS)
 
 # One LinuxCNC a machine, in real time; ARGS="-m linuxcnc" for all faults, an hour. docs/linuxcnc.md says how
 # it is installed.

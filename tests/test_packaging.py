@@ -216,7 +216,7 @@ def pins() -> dict[str, str]:
 def test_every_requirement_is_pinned_as_installed_and_nothing_else_is() -> None:
     project = tomllib.loads((CHECKOUT / "pyproject.toml").read_text())
     extras = project["project"]["optional-dependencies"]
-    compared_with = {Requirement(text).name for text in (*extras["bench"], *extras["peers"])}
+    compared_with = {Requirement(text).name for text in extras["bench"]}
     installed = {name: exact for name, exact in pins().items() if name not in compared_with}
     assert installed == {name: version(name) for name in everything_installed()}
     assert compared_with <= set(pins())

@@ -99,14 +99,11 @@ def settled(newcomer: Newcomer) -> Newcomer:
     return newcomer
 
 
-@pytest.mark.parametrize(("target", "extras"), [("bench", ["bench", "peers"]), ("bench-peers", ["peers"])])
-def test_a_bench_target_installs_its_requirements_once(
-    settled: Newcomer, target: str, extras: list[str]
-) -> None:
-    settled.make(target)
+def test_the_benchmarks_install_their_requirements_once(settled: Newcomer) -> None:
+    settled.make("bench")
     added = "-m pip install --quiet --constraint constraints.txt --no-build-isolation --editable"
-    assert settled.installations() == [f"{added} .[{extra}]" for extra in extras]
-    settled.make(target)
+    assert settled.installations() == [f"{added} .[bench]"]
+    settled.make("bench")
     assert settled.installations() == []
 
 

@@ -11,7 +11,8 @@ from typing import Any
 import casadi
 import numpy as np
 
-from tests.benchmarks.peers.interface import Array, Records
+from hexacell.kinematics.rotations import Array
+from tests.benchmarks.peers.robots import Records
 
 OPTIONS: dict[str, Any] = {
     "ipopt.print_level": 0,
@@ -33,8 +34,8 @@ def solve(records: Records) -> Array:
         position, turn, joints = (
             casadi.SX.sym(f"{name}{row}", size) for name, size in (("P", 3), ("w", 3), ("q", 6))
         )
-        rotation = rotation_of(turn) @ casadi.DM(records.rotations[row])
-        legs.append(closed_legs(geometry, position, rotation, joints))
+        rotation = _rotation_of(turn) @ casadi.DM(records.rotations[row])
+        legs.append(_closed_legs(geometry, position, rotation, joints))
         gauge = position - zeros[:, int(point)] - casadi.DM(records.deviations[row])
         encoder = joints - casadi.DM(records.joints[row])
         cost += casadi.sumsqr(gauge) / records.gauge_mm**2 + casadi.sumsqr(encoder) / records.encoder_mm**2
@@ -49,7 +50,7 @@ def solve(records: Records) -> Array:
     return result
 
 
-def closed_legs(geometry: Any, position: Any, rotation: Any, joints: Any) -> Any:
+def _closed_legs(geometry: Any, position: Any, rotation: Any, joints: Any) -> Any:
     S, B = (casadi.reshape(geometry[part], 3, 6) for part in (slice(0, 18), slice(18, 36)))
     legs = S - casadi.repmat(position, 1, 6) - rotation @ B
     legs[0, :] += joints.T
@@ -57,7 +58,7 @@ def closed_legs(geometry: Any, position: Any, rotation: Any, joints: Any) -> Any
     return (casadi.sum1(legs**2).T - lengths**2) / (2.0 * lengths)
 
 
-def rotation_of(turn: Any) -> Any:
+def _rotation_of(turn: Any) -> Any:
     square = casadi.sumsqr(turn) + 1e-30
     angle, k = casadi.sqrt(square), casadi.skew(turn)
     return casadi.SX.eye(3) + casadi.sin(angle) / angle * k + (1 - casadi.cos(angle)) / square * (k @ k)

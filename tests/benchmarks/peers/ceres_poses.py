@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pyceres
 
-from tests.benchmarks.peers.interface import Array, Records
-from tests.benchmarks.peers.turns import exponential, left_jacobian, skew
+from hexacell.kinematics.rotations import Array, from_vector, skew
+from tests.benchmarks.peers.robots import Records
 
 MOST_ITERATIONS = 300
 
@@ -31,7 +31,7 @@ class _Record(pyceres.CostFunction):  # type: ignore[misc]
         free, zero, position, turn = (np.asarray(block) for block in parameters)
         geometry = records.basis @ free
         S, B, lengths = geometry[:18].reshape(6, 3), geometry[18:36].reshape(6, 3), geometry[36:]
-        rotation = exponential(turn) @ records.rotations[row]
+        rotation = from_vector(turn) @ records.rotations[row]
         arms = B @ rotation.T
         legs = S - position - arms
         square = lengths**2 - legs[:, 1] ** 2 - legs[:, 2] ** 2
@@ -56,7 +56,7 @@ class _Record(pyceres.CostFunction):  # type: ignore[misc]
             by_geometry[leg, 3 * leg : 3 * leg + 3] = -n[leg]
             by_geometry[leg, 18 + 3 * leg : 21 + 3 * leg] = n[leg] @ rotation
             by_geometry[leg, 36 + leg] = by_length[leg]
-        by_turn = np.stack([-n[leg] @ skew(arms[leg]) for leg in legs]) @ left_jacobian(turn)
+        by_turn = np.stack([-n[leg] @ skew(arms[leg]) for leg in legs]) @ _left_jacobian(turn)
         gauge, nothing = np.eye(3) / records.gauge_mm, np.zeros((3, 3))
         blocks = (
             np.vstack(
@@ -69,6 +69,18 @@ class _Record(pyceres.CostFunction):  # type: ignore[misc]
         for wanted, block in zip(jacobians, blocks, strict=True):
             if wanted is not None:
                 wanted[:] = block.ravel()
+
+
+def _left_jacobian(vector: Array) -> Array:
+    """(3, 3) from a change of a rotation vector (3,) to the turn in the base frame that it makes."""
+    angle = float(np.linalg.norm(vector))
+    k = skew(vector)
+    if angle < 1e-6:
+        return np.eye(3) + 0.5 * k
+    linear = (1.0 - np.cos(angle)) / angle**2
+    square = (angle - np.sin(angle)) / angle**3
+    result: Array = np.eye(3) + linear * k + square * (k @ k)
+    return result
 
 
 def solve(records: Records) -> Array:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import least_squares
 
-from tests.benchmarks.peers.interface import Array, Records
+from hexacell.kinematics.rotations import Array
+from tests.benchmarks.peers.robots import Records
 
 
 def solve(records: Records) -> Array:

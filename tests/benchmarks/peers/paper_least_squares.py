@@ -11,11 +11,13 @@ from itertools import combinations
 import numpy as np
 from scipy.optimize import least_squares
 
-from tests.benchmarks.peers.interface import Array, Records
-from tests.benchmarks.peers.turns import exponential
+from hexacell.kinematics.rotations import Array, from_vector
+from tests.benchmarks.peers.robots import Records
 
 NEWTON_STEPS = 20
 CLOSED_MM = 1e-9
+STEP = np.array(1e-6)
+"""Of finite differences, relative: with scipy's own one it does not always converge."""
 MOST_ITERATIONS = 97
 """MATLAB's own limit of 100 evaluations for each unknown, 36 of them for an iteration."""
 
@@ -35,7 +37,9 @@ def solve(records: Records) -> Array:
         return differing.ravel()
 
     try:
-        found = least_squares(differences, records.free, method="trf", max_nfev=MOST_ITERATIONS)
+        found = least_squares(
+            differences, records.free, method="trf", diff_step=STEP, max_nfev=MOST_ITERATIONS
+        )
     except (ValueError, np.linalg.LinAlgError) as error:
         raise ArithmeticError(str(error)) from error
     if not found.success:
@@ -58,5 +62,5 @@ def _ball(records: Records, geometry: Array) -> Array:
         jacobian = np.concatenate([-legs, -np.cross(arms, legs)], axis=2)
         step = -np.linalg.solve(jacobian, error[..., None])[..., 0]
         positions = positions + step[:, :3]
-        rotations = exponential(step[:, 3:]) @ rotations
+        rotations = from_vector(step[:, 3:]) @ rotations
     return positions

@@ -7,6 +7,7 @@ show them with the true geometry, which nobody has before.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,19 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.campaign.task_accuracy import Task
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.loader import Cell
 from hexacell.errors import LimitError
 from hexacell.identification.diagnostics.frame_alignment import FrameFit, pose_errors
 from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import has_singularity_margin
-from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import Robot, robot_of
 from hexacell.study.data_sets import DataSet, unlimited_travel
-from tests.benchmarks.peers.interface import Array, Records
+from tests.benchmarks.machines import bundled
 from tests.benchmarks.virtual_calibration import robot_that_reaches
 from tests.records_within_travel import within_travel
 from tests.simulated_campaign import SimulatedCampaign
@@ -36,14 +37,56 @@ HELD_OUT = 100
 HELD_OUT_TILT_DEG = 30.0
 RANDOM_DEG, DRAWN = 5.0, 200
 """Each of three angles of random orientations, and how many are drawn at a point."""
+ORIENTATIONS = 11
+"""At each point, in whatever way poses are chosen."""
 
 
-def cell_and_robot() -> tuple[Cell, Robot]:
-    """The bundled cell; its controller keeps the drawing while measuring, from which peers start."""
-    cell = load_cell(bundled_config("simulated-hexaglide"))
-    identification = cell.settings.identification.model_copy(update={"provisional": False})
-    cell = replace(cell, settings=cell.settings.model_copy(update={"identification": identification}))
-    return cell, robot_of(cell)
+@dataclass(frozen=True)
+class Records:
+    """Measurements of one Hexaglide, mm and rad, in the frames of the paper's convention.
+
+    Attributes:
+        drawing: S (6, 3), B (6, 3) and l (6) in a row (42,), where every method starts.
+        basis: (42, 35), from the free parameters of the convention to all.
+        branch: (6,) of each leg, along its rail, -1 or 1.
+        points: (n,) at which point a record was taken, from 0, ascending.
+        joints: (n, 6) by the encoders.
+        deviations: (n, 3) by the gauges.
+        positions: (n, 3) of the ball as commanded, which close the drawing at the joints up to noise.
+        rotations: (n, 3, 3) of the platform as commanded.
+        full_positions: (n, 3) by an instrument that measures whole poses in the frames of the convention.
+        full_rotations: (n, 3, 3) likewise.
+        encoder_mm: noise of a joint, one standard deviation.
+        gauge_mm: of a deviation.
+    """
+
+    drawing: Array
+    basis: Array
+    branch: Array
+    points: NDArray[np.intp]
+    joints: Array
+    deviations: Array
+    positions: Array
+    rotations: Array
+    full_positions: Array
+    full_rotations: Array
+    encoder_mm: float
+    gauge_mm: float
+
+    @property
+    def free(self) -> Array:
+        """The drawing's free parameters (35,)."""
+        found: Array = np.linalg.lstsq(self.basis, self.drawing)[0]
+        return found
+
+    @property
+    def first_positions(self) -> Array:
+        """(m, 3) where the first record of each point was commanded."""
+        return self.positions[np.unique(self.points, return_index=True)[1]]
+
+
+Solve = Callable[[Records], Array]
+"""A peer: the geometry (42,) that it identifies. It raises ``ArithmeticError`` where it finds none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +100,16 @@ class StudiedRobot:
 
     @classmethod
     def drawn(cls, number: int) -> StudiedRobot:
-        """It can stand at all points as its controller sends it there."""
-        cell, robot = cell_and_robot()
-        return cls(
-            cell, robot, robot_that_reaches(cell, robot, np.random.default_rng([SEED, number])), number
-        )
+        """One that can stand at all points as its controller sends it there.
+
+        Its controller keeps the drawing while measuring, from which peers start.
+        """
+        cell = bundled()
+        identification = cell.settings.identification.model_copy(update={"provisional": False})
+        cell = replace(cell, settings=cell.settings.model_copy(update={"identification": identification}))
+        robot = robot_of(cell)
+        truth = robot_that_reaches(cell, robot, np.random.default_rng([SEED, number]))
+        return cls(cell, robot, truth, number)
 
     def chosen(self) -> MeasurementSet:
         """Records of a whole campaign.
@@ -74,8 +122,8 @@ class StudiedRobot:
         campaign.carry_out()
         return campaign.measurements
 
-    def random(self, orientations: int) -> MeasurementSet:
-        """Records in random orientations that stay within the travel, so many at each point.
+    def random(self) -> MeasurementSet:
+        """Records in random orientations that stay within the travel.
 
         Raises:
             HexacellError: too few poses can be reached.
@@ -87,21 +135,23 @@ class StudiedRobot:
         moved = np.abs(drawn.positions - drawn.positions[first]).max(axis=1)
         shown = np.flatnonzero(moved <= self.robot.limits.gauge_travel_mm)
         rows = [
-            shown[drawn.labels[shown, 0] == point][:orientations] for point in np.unique(drawn.labels[:, 0])
+            shown[drawn.labels[shown, 0] == point][:ORIENTATIONS] for point in np.unique(drawn.labels[:, 0])
         ]
-        if min(map(len, rows)) < orientations:
-            raise LimitError(f"fewer than {orientations} of {DRAWN} orientations stay within the travel")
-        return _some(drawn, np.concatenate(rows)).measured(self.robot.noise.gauge_mm, random)
+        if min(map(len, rows)) < ORIENTATIONS:
+            raise LimitError(f"fewer than {ORIENTATIONS} of {DRAWN} orientations stay within the travel")
+        chosen = np.concatenate(rows)
+        some = (drawn.labels[chosen], drawn.commands[chosen], drawn.joints[chosen], drawn.positions[chosen])
+        return DataSet(*some).measured(self.robot.noise.gauge_mm, random)
 
-    def aimed(self, orientations: int) -> MeasurementSet:
-        """Records in random orientations over all tilts, aimed with the truth, so many at each point.
+    def aimed(self) -> MeasurementSet:
+        """Records in random orientations over all tilts, aimed with the truth.
 
         Raises:
             HexacellError: too few poses can be reached.
         """
         random = np.random.default_rng([SEED, self.number, 5])
         tilt = self.robot.limits.tilt
-        drawn = within_travel(self.robot, self.truth, self._points, orientations, tilt, random)
+        drawn = within_travel(self.robot, self.truth, self._points, ORIENTATIONS, tilt, random)
         return drawn.measured(self.robot.noise.gauge_mm, random)
 
     @property
@@ -133,17 +183,15 @@ class StudiedRobot:
             full_rotations=rotations.from_vector(turns) @ actual.rotations,
             encoder_mm=robot.noise.encoder,
             gauge_mm=mm,
-            rows=np.array([_row(record) for record in ordered]),
         )
 
-    def errors_mm(self, geometry: tuple[float, ...]) -> Array:
-        """Position errors (h,) at held-out poses that are commanded with a geometry; infinite without one.
+    def errors_mm(self, geometry: Array) -> Array:
+        """Position errors (h,) at held-out poses that are commanded with a geometry (42,).
 
-        The frames of both geometries are made to agree first, since they are conventions.
+        The frames of both geometries are made to agree first, since they are conventions. Errors are
+        infinite where a pose cannot be taken.
         """
-        if not geometry:
-            return np.full(HELD_OUT, np.inf)
-        found = Geometry(self.robot.mechanism.parameters, np.array(geometry))
+        found = Geometry(self.robot.mechanism.parameters, geometry)
         workspace, held_out = self._reached(found, self._workspace), self._reached(found, self._held_out)
         if workspace is None or held_out is None:
             return np.full(HELD_OUT, np.inf)
@@ -181,12 +229,3 @@ class StudiedRobot:
         poses, joints = poses[rows], joints[rows]
         margin = self.robot.limits.singularity_margin
         return poses[np.flatnonzero(has_singularity_margin(mechanism, self.truth, poses, joints, margin))]
-
-
-def _row(record: Record) -> tuple[float, ...]:
-    pose = record.pose
-    return (*record.id, pose.x, pose.y, pose.z, pose.a, pose.b, pose.c, *record.joints, *record.deviation)
-
-
-def _some(drawn: DataSet, rows: NDArray[np.intp]) -> DataSet:
-    return DataSet(drawn.labels[rows], drawn.commands[rows], drawn.joints[rows], drawn.positions[rows])

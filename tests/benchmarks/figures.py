@@ -15,6 +15,8 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
 
+from scipy.stats import binom
+
 from tests.benchmarks.samples import samples
 
 CHECKOUT = Path(__file__).parents[2]
@@ -67,6 +69,19 @@ def between(least: float, most: float) -> Target:
 
 NEVER = Target(0.0, 0.0)
 """Of what must not happen at all."""
+
+SURELY = 1e-3
+"""Probability with which a figure that is exactly on its target is found beyond it by chance."""
+
+
+def most_by_chance(share: float, count: int) -> int:
+    """The largest number out of ``count`` that agrees with a share."""
+    return int(binom.isf(SURELY, count, share))
+
+
+def least_by_chance(share: float, count: int) -> int:
+    """The smallest number out of ``count`` that agrees with a share."""
+    return int(binom.ppf(SURELY, count, share))
 
 
 @dataclass(frozen=True)

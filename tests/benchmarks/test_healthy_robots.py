@@ -15,7 +15,7 @@ import numpy as np
 
 from hexacell.robot.model import robot_of
 from hexacell.verdict.decision import Verdict
-from tests.benchmarks.figures import NEVER, at_least, at_most
+from tests.benchmarks.figures import NEVER, at_least, at_most, least_by_chance, most_by_chance
 from tests.benchmarks.machines import bundled, on_all_cores
 from tests.benchmarks.samples import sample
 from tests.benchmarks.virtual_calibration import (
@@ -25,7 +25,6 @@ from tests.benchmarks.virtual_calibration import (
     robot_that_reaches,
     stands_at,
 )
-from tests.benchmarks.worlds.table import least_by_chance, most_by_chance
 
 ROBOTS = sample(__name__, "ROBOTS")
 """A tenth of what the target is for."""

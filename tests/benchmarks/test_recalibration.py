@@ -17,12 +17,11 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import Robot, robot_of
 from hexacell.verdict.decision import Verdict
-from tests.benchmarks.figures import NEVER, at_least, at_most
+from tests.benchmarks.figures import NEVER, at_least, at_most, least_by_chance
 from tests.benchmarks.machines import bundled, on_all_cores
 from tests.benchmarks.samples import sample
 from tests.benchmarks.virtual_calibration import Judged, by_leg_equations, judged, robot_that_stands
 from tests.benchmarks.worlds.closure import Bodies, CannotCloseError, follow, slider_places
-from tests.benchmarks.worlds.table import least_by_chance
 
 MACHINES = sample(__name__, "MACHINES")
 TIMES = 5

@@ -10,9 +10,8 @@ import pytest
 
 from hexacell.study.design_study import DesignOutcome, DesignTrial, run_design_trial
 from hexacell.study.tasks import Study, processes, run_study
-from tests.benchmarks.figures import at_most
+from tests.benchmarks.figures import at_most, most_by_chance
 from tests.benchmarks.samples import sample
-from tests.benchmarks.worlds.table import most_by_chance
 
 ROBOTS = sample(__name__, "ROBOTS")
 FULL = 1000

@@ -12,10 +12,9 @@ from hexacell.services.history.cell_status import CellStatus, cell_status
 from hexacell.services.history.drift_history import DriftHistory, drift_history
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Mode
-from tests.benchmarks.figures import NEVER, at_least, at_most, between
+from tests.benchmarks.figures import NEVER, at_least, at_most, between, most_by_chance
 from tests.benchmarks.samples import sample
 from tests.benchmarks.simulated_year import DEAD_GAUGE, FULL_DISK, LIMIT_MM, Year
-from tests.benchmarks.worlds.table import most_by_chance
 
 NIGHTS = sample(__name__, "NIGHTS")
 DRIFT_MM, CRASH_MM = 0.001, 0.31

@@ -7,13 +7,12 @@ from functools import cache
 
 import numpy as np
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import Grade, UncertaintySettings
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.stated import stated_effects
 from hexacell.uncertainty.effects import Effect as StatedEffect
+from tests.benchmarks.machines import bundled
 from tests.benchmarks.worlds import encoders, gauges, legs, rails
 from tests.benchmarks.worlds.effects import Effect, at_once
 from tests.benchmarks.worlds.legs import Course
@@ -35,7 +34,7 @@ UM, PPM, MRAD = 1e-3, 1e-6, 1e-3
 @cache
 def settings_of(grade: Grade) -> CellSettings:
     """The bundled cell, with gauges as they are and a machine of some grade."""
-    settings = load_cell(bundled_config("simulated-hexaglide")).settings
+    settings = bundled().settings
     noise = settings.noise.model_copy(update={"gauge_scale": GAUGE_SCALE})
     stated = UncertaintySettings.model_validate({"grade": grade})
     return settings.model_copy(update={"noise": noise, "uncertainty": stated})

@@ -9,16 +9,14 @@ import numpy as np
 
 from hexacell.campaign.forecast import select_sets
 from hexacell.campaign.task_accuracy import Task
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.loader import Cell
 from hexacell.design.candidates import orientations, reachable
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot.model import Robot, robot_of
-from hexacell.robot.virtual_robot import random_robot
+from tests.benchmarks.machines import bundled, truth_of
 from tests.benchmarks.worlds.world import Commands
-from tests.geometries import hexaglide_geometry
 
 TILT_DEG = 45.0
 RECORDS = 11
@@ -68,14 +66,14 @@ def setting(number: int) -> Setting:
     Raises:
         UnreachableError: it cannot take the poses; try the next number.
     """
-    cell = load_cell(bundled_config("simulated-hexaglide"))
+    cell = bundled()
     robot = robot_of(cell)
     robot = replace(
         robot,
         limits=replace(robot.limits, tilt=float(np.radians(TILT_DEG))),
         noise=replace(robot.noise, alignment=float(np.radians(ALIGNMENT_DEG)), gauge_scale=GAUGE_SCALE),
     )
-    truth = _truth(cell, robot, number)
+    truth = truth_of(cell, robot, number)
     limits = replace(robot.limits, singularity_margin=MARGIN)
     free = robot.mechanism.convention.free_parameters(truth)
     belief = replace(robot.belief(), free=free, limits=limits)
@@ -101,17 +99,6 @@ def setting(number: int) -> Setting:
         _held_out(cell, belief, robot, HELD_OUT_SEED + number),
         _held_out(cell, belief, robot, CONFIRMING_SEED + number),
     )
-
-
-def _truth(cell: Cell, robot: Robot, number: int) -> Geometry:
-    if number:
-        return random_robot(
-            robot.mechanism, robot.drawing, robot.tolerances, np.random.default_rng([4, number])
-        )
-    assert cell.settings.simulation is not None
-    built = cell.settings.simulation.geometry.model_dump()
-    geometry = hexaglide_geometry(built["S"], built["B"], built["l"])
-    return robot.mechanism.normalize_frames(geometry)[0]
 
 
 def _held_out(cell: Cell, belief, robot: Robot, seed: int) -> Commands:

@@ -8,7 +8,6 @@ from hexacell.kinematics.rotations import Array
 from tests.benchmarks.worlds.effects import Effect, Shift, Stops, in_steps
 
 TURN = 2.0 * np.pi
-WARM_UP_HOURS = 0.2
 
 
 def linear(matrices: Array) -> Effect:
@@ -71,16 +70,11 @@ def outliers(size_mm: float, share: float = 0.01) -> Effect:
     return Effect(gauge_error=error)
 
 
-def drifting(speeds: Array, *, warming_up: bool = False) -> Effect:
-    """Stands drift (points, 3) mm an hour from when they were placed; quickly at first if warming up."""
-
-    def error(stops: Stops, _: Array) -> Array:
-        hours = _since_placed(stops)
-        if warming_up:
-            hours = WARM_UP_HOURS * (1.0 - np.exp(-hours / WARM_UP_HOURS))
-        return hours[:, None] * speeds[stops.points % len(speeds)]
-
-    return Effect(gauge_error=error)
+def drifting(speeds: Array) -> Effect:
+    """Stands drift (points, 3) mm an hour from when they were placed."""
+    return Effect(
+        gauge_error=lambda stops, _: _since_placed(stops)[:, None] * speeds[stops.points % len(speeds)]
+    )
 
 
 def turning(speeds: Array, arm: Array) -> Effect:

@@ -12,45 +12,55 @@ from hexacell.identification.diagnostics.frame_alignment import FrameFit, pose_e
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rotations import Array, skew
 from hexacell.kinematics.sensitivity import pose_sensitivity
+from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot
-from tests.benchmarks.worlds import frames, legs, rails
+from tests.benchmarks.worlds import encoders, frames, gauges, legs, rails
 from tests.benchmarks.worlds.campaigns import Setting, setting
 from tests.benchmarks.worlds.closure import Bodies, close, leg_forces, slider_places
-from tests.benchmarks.worlds.effects import Effect, Posture, Shift, Stops
-from tests.benchmarks.worlds.encoders import offset, scale
-from tests.benchmarks.worlds.kinds import CENTRE, DOWN, KINDS, NONE
+from tests.benchmarks.worlds.effects import RECORD_HOURS, Effect, Shift, Stops, at_once
+from tests.benchmarks.worlds.kinds import CENTRE, DOWN, EVERY, KINDS, NONE, STATED_MM
 from tests.benchmarks.worlds.world import World
 
-NUMBER = 1
+MOVED = np.random.default_rng(1).uniform(-3.0, 3.0, (40, 3))
+X = np.array([1.0, 0.0, 0.0])
 
 
 @pytest.fixture(scope="module")
 def own() -> Setting:
-    return setting(NUMBER)
+    return setting(1)
 
 
-def world(own: Setting, effect: Effect, *, noisy: bool = False, truth: Geometry | None = None) -> World:
-    return World(own.robot, truth or own.truth, effect, 5, is_noisy=noisy)
+def world(own: Setting, effect: Effect, truth: Geometry | None = None) -> World:
+    return World(own.robot, truth or own.truth, effect, 5, is_noisy=False)
 
 
 def reached(own: Setting, effect: Effect, truth: Geometry | None = None) -> PoseBatch:
-    return world(own, effect, truth=truth).reached(own.commands.poses, own.robot.commanding)
+    return world(own, effect, truth).reached(own.commands.poses, own.robot.commanding)
+
+
+def records(own: Setting, effect: Effect) -> MeasurementSet:
+    return world(own, effect).records(own.commands, own.robot.commanding)
 
 
 def commanded_joints(own: Setting) -> Array:
     return slider_places(own.robot.commanding, own.robot.branch, own.commands.poses)
 
 
-def product_poses(own: Setting, joints: Array, ideal: PoseBatch) -> PoseBatch:
-    found = continue_solution(own.robot.mechanism, own.truth, joints, start=ideal, start_geometry=own.truth)
-    assert found.found.all()
-    return found.poses
+def with_sliders(own: Setting, S: Array) -> Geometry:
+    """The geometry without effects, but for its slider joints."""
+    return Geometry.of(own.truth.parameters, {"S": S, "B": own.truth["B"], "l": own.truth["l"]})
 
 
 def difference(one: PoseBatch, other: PoseBatch) -> float:
     return float(np.abs(pose_errors(one, other)).max())
+
+
+def stops(points: int = 2, count: int = 40) -> Stops:
+    """At random places."""
+    joints = np.random.default_rng(1).uniform(-400.0, 400.0, (count, 6))
+    return Stops.of(np.repeat(np.arange(points), count // points), joints, 0.0, (1,))
 
 
 def test_without_effects_the_machine_goes_where_the_product_says(own):
@@ -63,8 +73,7 @@ def test_without_effects_the_machine_goes_where_the_product_says(own):
 def test_without_effects_and_noise_records_are_those_of_a_virtual_robot(own):
     noise = replace(own.robot.noise, encoder=0.0, gauge_mm=0.0)
     robot = VirtualRobot(replace(own.robot, noise=noise), own.truth)
-    records = world(own, Effect()).records(own.commands, own.robot.commanding).records
-    for record in records:
+    for record in records(own, Effect()).records:
         if record.orientation == 1:
             robot.zero_gauges()
         robot.place(record.pose)
@@ -73,60 +82,41 @@ def test_without_effects_and_noise_records_are_those_of_a_virtual_robot(own):
         assert np.allclose(record.deviation, expected.deviation, atol=1e-7)
 
 
-@pytest.mark.parametrize("name", KINDS)
-def test_a_kind_of_size_zero_changes_nothing(own, name):
-    effect = KINDS[name].world(0.0, np.random.default_rng(3))
-    found, expected = (
-        world(own, one).records(own.commands, own.robot.commanding) for one in (effect, Effect())
-    )
-    assert np.array_equal(found.joints, expected.joints)
-    assert np.allclose(found.deviations, expected.deviations, atol=1e-9)
-
-
-@pytest.mark.parametrize("name", KINDS)
-def test_every_kind_changes_something_and_ten_times_as_much_changes_more(own, name):
-    before = world(own, Effect()).records(own.commands, own.robot.commanding)
+@pytest.mark.parametrize("name", [name for name in KINDS if name != NONE])
+def test_a_kind_changes_nothing_at_size_zero_and_more_the_larger_it_is(own, name):
+    expected = records(own, Effect())
 
     def change(factor: float) -> float:
-        effect = KINDS[name].world(factor, np.random.default_rng(4))
-        after = world(own, effect).records(own.commands, own.robot.commanding)
-        return float(
-            max(
-                np.abs(after.deviations - before.deviations).max(),
-                np.abs(after.joints - before.joints).max(),
-            )
-        )
+        found = records(own, KINDS[name].world(factor, np.random.default_rng(4)))
+        shown = np.abs(found.deviations - expected.deviations).max()
+        return float(max(shown, np.abs(found.joints - expected.joints).max()))
 
-    if name != NONE and "outliers" not in name and "at work" not in name:  # there may be no outlier
+    assert change(0.0) < 1e-9
+    if "at work" in name:
+        assert change(1.0) == 0.0
+        working = world(own, KINDS[name].world(1.0, np.random.default_rng(4)))
+        assert working.errors(own.truth, own.task.poses, own.task.workspace).largest_mm > 1e-4
+    elif "outliers" not in name:  # there may be no outlier
         assert 0.0 < change(1.0) < change(10.0)
 
 
-@pytest.mark.parametrize("name", [name for name in KINDS if "at work" in name])
-def test_what_is_only_there_at_work_is_in_no_record_but_in_the_error(own, name):
-    changed = world(own, KINDS[name].world(1.0, np.random.default_rng(4)))
-    found, expected = (
-        one.records(own.commands, own.robot.commanding) for one in (changed, world(own, Effect()))
-    )
-    assert np.array_equal(found.deviations, expected.deviations)
-    assert changed.errors(own.truth, own.task.poses, own.task.workspace).largest_mm > 1e-4
-
-
-def test_there_are_at_least_sixty_kinds():
-    assert len(KINDS) >= 60
-
-
 def test_encoders_that_show_too_much_bring_sliders_short(own):
-    ideal, joints = reached(own, Effect()), commanded_joints(own)
     shares = 1e-4 * np.arange(-2.0, 4.0)
-    expected = product_poses(own, joints * (1.0 - shares), ideal)
-    assert difference(reached(own, scale(shares)), expected) < 1e-8
+    found = continue_solution(
+        own.robot.mechanism,
+        own.truth,
+        commanded_joints(own) * (1.0 - shares),
+        start=reached(own, Effect()),
+        start_geometry=own.truth,
+    )
+    assert found.found.all()
+    assert difference(reached(own, encoders.scale(shares)), found.poses) < 1e-8
 
 
 def test_zeros_of_encoders_are_a_shift_of_slider_joints(own):
     offsets = 0.1 * np.arange(6.0)
-    S = own.truth["S"] - offsets[:, None] * np.array([1.0, 0.0, 0.0])
-    moved = Geometry.of(own.truth.parameters, {"S": S, "B": own.truth["B"], "l": own.truth["l"]})
-    assert difference(reached(own, offset(offsets)), reached(own, Effect(), moved)) < 1e-8
+    moved = with_sliders(own, own.truth["S"] - offsets[:, None] * X)
+    assert difference(reached(own, encoders.offset(offsets)), reached(own, Effect(), moved)) < 1e-8
 
 
 def test_small_shifts_move_the_platform_as_the_derivatives_of_the_product_say(own):
@@ -154,45 +144,13 @@ def test_rails_that_all_lead_aside_are_a_turned_machine(own):
     found = reached(own, rails.not_parallel(yaw * np.ones(6), np.zeros(6)))
     turn = Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix()
     # Turned back, slider joints are where they were but for x, which then depends on y.
-    S = own.truth["S"].copy()
-    S[:, 0] += yaw * S[:, 1]
-    moved = Geometry.of(own.truth.parameters, {"S": S, "B": own.truth["B"], "l": own.truth["l"]})
+    moved = with_sliders(own, own.truth["S"] + yaw * own.truth["S"][:, 1:2] * X)
     expected = reached(own, Effect(), moved)
     turned = PoseBatch(expected.positions @ turn.T, turn @ expected.rotations)
     assert difference(found, turned) < 1e-4  # of second order
 
 
-def test_a_sag_is_deepest_in_the_middle_and_nothing_at_the_ends(own):
-    places = np.array([[-800.0, 0.0, 800.0, 400.0, 0.0, -400.0]])
-    posture = _standing(own, places)
-    down = rails.sagging(0.05 * np.ones(6)).shift(_stops(places), posture).sliders
-    assert isinstance(down, np.ndarray)
-    assert np.allclose(down[0, :, 2], [0.0, -0.05, 0.0, -0.0375, -0.05, -0.0375])
-    assert not down[..., :2].any()
-
-
-def test_a_wave_repeats_after_its_length_and_has_its_amplitude(own):
-    places = np.linspace(-300.0, 300.0, 601)[:, None] * np.ones(6)
-    wave = rails.wavy(0.01, 150.0, np.array([0.0, 1.0, 0.0]), np.zeros((6, 3)))
-    shift = wave.shift(_stops(places), _standing(own, places)).sliders
-    assert isinstance(shift, np.ndarray)
-    assert np.allclose(shift[:451], shift[150:], atol=1e-12)
-    assert np.abs(shift[..., 1]).max() == pytest.approx(0.01, rel=1e-3)
-    assert not shift[..., [0, 2]].any()
-
-
-def _stops(places: Array) -> Stops:
-    return Stops.of(np.zeros(len(places), dtype=np.intp), places, 0.0, (1,))
-
-
-def _standing(own: Setting, places: Array) -> Posture:
-    """With slider joints at some places along their rails."""
-    bodies = Bodies.of(own.truth, places - own.truth["S"][:, 0])
-    level = PoseBatch(np.zeros((len(places), 3)), np.broadcast_to(np.eye(3), (len(places), 3, 3)))
-    return Posture(places, bodies, level)
-
-
-def test_forces_in_legs_balance_the_weight(own):
+def test_forces_in_legs_balance_the_weight_and_do_its_work(own):
     poses, bodies = reached(own, Effect()), Bodies.of(own.truth, commanded_joints(own))
     forces = leg_forces(bodies, poses, 20.0 * DOWN, CENTRE)
     toward, _ = bodies.directions(poses)
@@ -200,36 +158,16 @@ def test_forces_in_legs_balance_the_weight(own):
     moments = np.cross(bodies.arms(poses), toward)
     load = np.cross(poses.rotations @ CENTRE, 20.0 * DOWN)
     assert np.allclose(np.einsum("nl,nli->ni", forces, moments), -load, atol=1e-7)
-
-
-def test_forces_in_legs_follow_from_virtual_work(own):
-    poses, bodies = reached(own, Effect()), Bodies.of(own.truth, commanded_joints(own))
-    forces = leg_forces(bodies, poses, 20.0 * DOWN, CENTRE)
     for leg in range(6):
-        step = 1e-5 * (np.arange(6) == leg)
-        longer = close(replace(bodies, lengths=bodies.lengths + step), poses)
-        lifted = (longer.positions + longer.rotations @ CENTRE) - (
-            poses.positions + poses.rotations @ CENTRE
-        )
+        longer = close(replace(bodies, lengths=bodies.lengths + 1e-5 * (np.arange(6) == leg)), poses)
+        lifted = longer.positions - poses.positions + (longer.rotations - poses.rotations) @ CENTRE
         # What the weight gains is what the leg, growing against its tension, takes.
         assert np.allclose(lifted @ (20.0 * DOWN), 1e-5 * forces[:, leg], rtol=1e-3, atol=1e-7)
 
 
-def test_elastic_legs_are_longer_by_their_pull(own):
-    poses, joints = reached(own, Effect()), commanded_joints(own)
-    bodies = Bodies.of(own.truth, joints)
-    pull = leg_forces(bodies, poses, 20.0 * DOWN, CENTRE)
-    shift = legs.elastic(1e-5 * np.ones(6), 20.0 * DOWN, CENTRE).shift(
-        _stops(joints), Posture(joints, bodies, poses)
-    )
-    assert np.allclose(shift.lengths, 1e-5 * pull)
-
-
 def test_sliders_that_do_not_repeat_scatter_the_platform_as_the_derivatives_say(own):
-    sigma = 0.002
-    visits = world(own, rails.stopping(sigma, np.array([1.0, 0.0, 0.0])))
-    task, workspace = own.task.poses, own.task.workspace
-    errors = visits.errors(own.truth, task, workspace)
+    sigma, task = 0.002, own.task.poses
+    errors = world(own, rails.stopping(sigma, X)).errors(own.truth, task, own.task.workspace)
     joints = slider_places(own.truth, own.robot.branch, task)
     by_joints = pose_sensitivity(own.robot.mechanism, own.truth, task, joints).joints[:, :3]
     expected = sigma * np.sqrt(np.sum(by_joints**2, axis=(1, 2)))
@@ -239,11 +177,9 @@ def test_sliders_that_do_not_repeat_scatter_the_platform_as_the_derivatives_say(
 
 def test_a_known_geometry_without_effects_has_no_error_in_whatever_frames(own):
     turn = Rotation.from_rotvec([1e-3, -2e-3, 3e-3]).as_matrix()
-    B = own.truth["B"] @ turn.T
-    S = own.truth["S"] + np.array([1.0, -2.0, 3.0])
-    written = Geometry.of(own.truth.parameters, {"S": S, "B": B, "l": own.truth["l"]})
+    values = {"S": own.truth["S"] + [1.0, -2.0, 3.0], "B": own.truth["B"] @ turn.T, "l": own.truth["l"]}
+    written = Geometry.of(own.truth.parameters, values)
     errors = world(own, Effect()).errors(written, own.task.poses, own.task.workspace)
-    # Other frames mean other joint variables, but of a machine that is known exactly.
     assert errors.largest_mm < 1e-6
 
 
@@ -259,3 +195,62 @@ def test_best_frames_are_those_of_the_product(own):
     expected = FrameFit(workspace, length).aligned(off, off)
     assert difference(found, expected) < 1e-4
     assert np.abs(pose_errors(off, workspace)).max() > 0.1
+
+
+def test_a_turned_triad_shows_the_displacement_in_its_own_axes():
+    vector = np.array([1e-3, -2e-3, 5e-4])
+    seen = MOVED @ Rotation.from_rotvec(vector).as_matrix()  # R^T d for each row
+    error = gauges.linear(-skew(vector)[None]).gauge_error(stops(), MOVED)
+    assert np.allclose(MOVED + error, seen, atol=3 * 4e-6)
+
+
+def test_a_ball_out_of_round_is_an_ellipsoid_to_first_order():
+    size, axis, radius = 0.002, np.array([0.6, 0.0, 0.8]), 10.0
+    rotations = Rotation.random(40, rng=np.random.default_rng(3)).as_matrix()
+    cosine = rotations @ axis
+    support = np.sqrt(((radius + size) * cosine) ** 2 + (radius - size / 2) ** 2 * (1 - cosine**2))
+    found = gauges.out_of_round(size, axis, 2).ball(stops(), rotations)
+    assert np.allclose(found, support - radius, atol=2e-6)
+
+
+def test_stands_drift_and_are_pushed_until_they_are_placed_anew():
+    drift = gauges.drifting(np.array([[0.01, 0.0, 0.0], [0.0, 0.02, 0.0]])).gauge_error(stops(), MOVED)
+    hours = RECORD_HOURS * np.arange(20)
+    assert np.allclose(drift[:20, 0], 0.01 * hours)
+    assert np.allclose(drift[20:, 1], 0.02 * hours)
+    pushed = gauges.jump(np.array([0.1, 0.2, 0.3]), 7.5 * RECORD_HOURS).gauge_error(stops(), MOVED)
+    assert np.allclose(pushed[7:20], [0.1, 0.2, 0.3])
+    assert not pushed[:7].any()
+    assert not pushed[20:].any()
+
+
+def test_backlash_is_on_the_side_that_a_slider_came_from():
+    own = stops()
+    error = encoders.hysteresis(0.002).encoder_error(own, own.joints)
+    assert np.array_equal(error[1:] > 0, np.diff(own.joints, axis=0) > 0)
+    assert np.allclose(np.abs(error), 0.002)
+
+
+@pytest.mark.parametrize("name", ["gauges noisier", "gauges, long tails"])
+def test_noise_is_as_many_times_the_stated_one(name):
+    effect = KINDS[name].world(5.0, np.random.default_rng(1))  # 1 + 5 * 0.2 times the stated noise
+    more = effect.gauge_error(stops(1, 40_000), np.zeros((40_000, 3)))
+    assert np.hypot(np.std(more), STATED_MM) == pytest.approx(2.0 * STATED_MM, rel=0.05)
+
+
+def test_a_hundredth_of_the_readings_are_outliers():
+    many = stops(1, 40_000)
+    of_gauges = gauges.outliers(1.0).gauge_error(many, np.zeros((40_000, 3))) != 0
+    assert np.mean(of_gauges) == pytest.approx(0.01, rel=0.1)
+    hit = encoders.outliers(1.0).encoder_noise(many) != 0
+    assert hit.any(axis=1).mean() == pytest.approx(0.01, rel=0.2)
+    assert hit.sum(axis=1).max() == 1
+
+
+def test_what_is_random_is_the_same_when_asked_twice_and_another_for_each_effect():
+    noise = gauges.more_noise(EVERY)
+    both = at_once(noise, noise).gauge_error(stops(), MOVED)
+    assert np.array_equal(noise.gauge_error(stops(), MOVED), noise.gauge_error(stops(), MOVED))
+    parts = [noise.gauge_error(stops().of_effect(number), MOVED) for number in (0, 1)]
+    assert np.array_equal(both, parts[0] + parts[1])
+    assert not np.array_equal(parts[0], parts[1])

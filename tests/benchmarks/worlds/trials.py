@@ -12,7 +12,6 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import Grade
 from hexacell.errors import HexacellError
-from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import GaugeFaultError, Identification
 from hexacell.measurements.records import MeasurementSet
@@ -54,15 +53,11 @@ class Outcome:
     """What came of a trial.
 
     Attributes:
-        verdict: none if there is no geometry that could be judged, for some ``reason``.
+        verdict: none if there is no geometry that could be judged.
         true_mm: the largest expected error at a task pose of the identified geometry.
         once_mm: the largest error of one visit of each.
         value_mm: what is stated of it, and its ``u_mm``.
-        sigma_mm: of that by the noise of the records, one sigma.
-        ratio: residuals over the stated noise.
-        named: what data faults were said to be in the records.
-        is_wrongly_named: whether one of them is not in this world.
-        failed_tests: which tests of the model failed.
+        is_wrongly_named: whether a data fault was said to be in the records that is not in this world.
     """
 
     trial: Trial
@@ -71,12 +66,7 @@ class Outcome:
     once_mm: float = np.nan
     value_mm: float = np.nan
     u_mm: float = np.nan
-    sigma_mm: float = np.nan
-    ratio: float = np.nan
-    named: tuple[str, ...] = ()
     is_wrongly_named: bool = False
-    failed_tests: tuple[str, ...] = ()
-    reason: str = ""
 
     @property
     def is_covered(self) -> bool:
@@ -88,12 +78,6 @@ class Outcome:
         """Whether the verdict is a pass although the expected error is above the limit."""
         return self.verdict is Verdict.PASS and self.true_mm > self.trial.limit_mm
 
-    @property
-    def is_false_pass_with_u(self) -> bool:
-        """Whether it would be one with a guard band of U alone."""
-        is_within = self.value_mm + self.u_mm <= self.trial.limit_mm
-        return is_within and self.true_mm > self.trial.limit_mm and not self.failed_tests
-
 
 def carry_out(trial: Trial) -> Outcome:
     """Measure, identify, state and compare."""
@@ -103,10 +87,9 @@ def carry_out(trial: Trial) -> Outcome:
         found = identify(robot.problem(world.records(own.commands, robot.commanding)))
         return _judged(trial, replace(world, robot=robot), found)
     except GaugeFaultError as refused:
-        wrong = refused.fault.kind not in KINDS[trial.kind].faults
-        return Outcome(trial, named=(str(refused.fault.kind),), is_wrongly_named=wrong, reason=str(refused))
-    except (HexacellError, CannotCloseError) as failed:
-        return Outcome(trial, reason=str(failed))
+        return Outcome(trial, is_wrongly_named=refused.fault.kind not in KINDS[trial.kind].faults)
+    except (HexacellError, CannotCloseError):
+        return Outcome(trial)
 
 
 def world_of(trial: Trial) -> tuple[World, Setting]:
@@ -130,28 +113,22 @@ def settings() -> tuple[Setting, ...]:
 
 
 def _judged(trial: Trial, world: World, found: Identification) -> Outcome:
-    own = settings()[trial.number % ROBOTS]
-    stated = settings_with_limit(trial)
+    own, stated = settings()[trial.number % ROBOTS], _settings_with_limit(trial)
     written = world.robot.with_controller(world.robot.for_controller(found.geometry))
     hour = world.hours(own.commands, world.robot.commanding)
     says = _verified(stated, replace(world, robot=written), found, own, hour)
     belief = written.belief(found)
     task = Task.of(stated, written, belief).reachable(belief)
     errors = world.errors(found.geometry, task.poses, task.workspace, hour)
-    faults = KINDS[trial.kind].faults
-    accuracy = says.accuracy
+    faults, accuracy = KINDS[trial.kind].faults, says.accuracy
     return Outcome(
-        trial=trial,
-        verdict=says.verdict,
-        true_mm=errors.largest_mm,
-        once_mm=errors.largest_once_mm,
-        value_mm=np.nan if accuracy is None else accuracy.position.value,
-        u_mm=np.nan if accuracy is None else accuracy.position.expanded,
-        sigma_mm=task_sigma_mm(found, belief, task),
-        ratio=found.goodness.ratio,
-        named=tuple(str(fault.kind) for fault in found.data_faults),
+        trial,
+        says.verdict,
+        errors.largest_mm,
+        errors.largest_once_mm,
+        np.nan if accuracy is None else accuracy.position.value,
+        np.nan if accuracy is None else accuracy.position.expanded,
         is_wrongly_named=any(fault.kind not in faults for fault in found.data_faults),
-        failed_tests=tuple(test.name for test in says.tests if not test.passed),
     )
 
 
@@ -159,7 +136,9 @@ def _verified(
     settings: CellSettings, world: World, found: Identification, own: Setting, hour: float
 ) -> Verification:
     """By held-out records, and where a test of the model fails narrowly by confirming ones after them."""
-    held_out = _held_out(world, found, own.held_out, hour)
+    records = _records(world, found, own.held_out, hour, HELD_OUT_FROM)
+    deviations = [record.deviation for record in records.records if record.orientation > 1]
+    held_out = HeldOut(records, deviations, deviations)
     says = verify(settings, world.robot, found, held_out)
     if not says.needs_confirmation:
         return says
@@ -168,24 +147,11 @@ def _verified(
     return verify(settings, world.robot, found, replace(held_out, confirming=records))
 
 
-def settings_with_limit(trial: Trial) -> CellSettings:
+def _settings_with_limit(trial: Trial) -> CellSettings:
     """The cell of a machine of some grade, with a limit on the position alone."""
     stated = budgets.settings_of(trial.grade)
     limits = {"position_mm": trial.limit_mm, "orientation_deg": NO_LIMIT_DEG}
     return stated.model_copy(update={"acceptance": stated.acceptance.model_copy(update=limits)})
-
-
-def task_sigma_mm(found: Identification, belief: RobotBelief, task: Task) -> float:
-    """One standard deviation at the worst task pose, by the noise of the records."""
-    budget = task.budget(found, belief, ())
-    return np.nan if budget is None else budget.noise_mm
-
-
-def _held_out(world: World, found: Identification, commands: Commands, hour: float) -> HeldOut:
-    """What the held-out poses give that are commanded with the identified geometry."""
-    records = _records(world, found, commands, hour, HELD_OUT_FROM)
-    deviations = [record.deviation for record in records.records if record.orientation > 1]
-    return HeldOut(records, deviations, deviations)
 
 
 def _records(

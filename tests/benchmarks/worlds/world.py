@@ -98,7 +98,8 @@ class World:
             CannotCloseError: a command leads through a singularity.
         """
         stops = self._stops(commands, commanding, start)
-        stopped, touched = self._touched(stops, commanding, commands.poses)
+        stopped, poses = self._reached(stops, commanding, commands.poses)
+        touched = poses.positions + self.effect.ball(stops, poses.rotations)
         random = np.random.default_rng([self.seed, 1, int(1e3 * start)])
         noise = self.robot.noise
         shown = self._gauges(stops, touched)
@@ -119,14 +120,6 @@ class World:
                 for row in range(len(stops))
             )
         )
-
-    def touched(self, poses: PoseBatch, commanding: Geometry) -> tuple[Array, Array]:
-        """What the encoders show (n, 6), and where the ball's surface is (n, 3), mm, at some commands."""
-        return self._touched(self._stops(_one_point(poses), commanding, 0.0), commanding, poses)
-
-    def _touched(self, stops: Stops, commanding: Geometry, commands: PoseBatch) -> tuple[Array, Array]:
-        stopped, poses = self._reached(stops, commanding, commands)
-        return stopped, poses.positions + self.effect.ball(stops, poses.rotations)
 
     def hours(self, commands: Commands, commanding: Geometry, start: float = 0.0) -> float:
         """The hour at which the last of some commands is measured."""

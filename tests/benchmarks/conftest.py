@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from pathlib import Path
@@ -74,12 +74,3 @@ def pytest_runtest_makereport(
 def _tracker_of_processes() -> None:
     """A process that Python keeps beside all that it spawns, with a pipe to it."""
     resource_tracker.ensure_running()
-
-
-@pytest.fixture
-def on_one_processor() -> Iterator[None]:
-    """For figures that count the processor time of threads: waking another processor counts, too."""
-    usual = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(usual)})
-    yield
-    os.sched_setaffinity(0, usual)

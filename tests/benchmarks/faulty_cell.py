@@ -10,15 +10,11 @@ from functools import partial
 import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
-from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import instrument_class
-from drivers.simulated.gauges.instruments import Indicator
 from drivers.simulated.gauges.server import LineFault
 from drivers.wire_trace import WireTrace
 from hexacell.cell.devices import GaugeSettings, LinearEncoderSettings
-from hexacell.plugins import Group, load
-from procedures.devices.device_set import Devices, MountedGauge
-from tests.benchmarks.line_in_process import Damage, InstrumentLine, LineTime, have_lines
+from procedures.devices.device_set import Devices
+from tests.benchmarks.line_in_process import TRACE_BYTES, Damage, GaugesOnLines, InstrumentLine, LineTime
 from tests.benchmarks.paced_can_bus import NODES, PacedBus
 
 PROTOCOLS = {"x": "sylvac", "y": "cdi", "z": "mux10"}
@@ -28,9 +24,6 @@ IDLE_S = 0.1
 PATIENCE_S = 0.002
 UM = 1e-3
 JUMP_COUNTS = 400_000
-TRACE_BYTES = 50_000
-"""Of each line: so little that it is full soon, and grows no more."""
-
 SEEN_BY_ALL = {"silent", "unplugged", "late", "at its end", "in inches"}
 SEEN_BY_SETTINGS = {"on hold", "in peak mode", "reversed"}
 SEEN = {
@@ -67,31 +60,23 @@ class FaultyCell:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.plungers_mm, self.joints_mm = [1.0] * 3, [0.0] * 6
-        self.ports = SharedSerialPorts(trace=WireTrace(TRACE_BYTES))
         self.elapsed_s = 0.0
         self._jumped = dict.fromkeys(NODES, 0)
-        self.indicators, self.lines, mounted = {}, {}, []
-        for place, (axis, protocol) in enumerate(PROTOCOLS.items()):
-            settings = GaugeSettings(name=axis, axis=axis, protocol=protocol, port=axis, timeout_s=0.5)
-            indicator = Indicator(partial(self.plungers_mm.__getitem__, place), settings.travel_mm)
-            self.indicators[axis] = indicator
-            self.lines[axis] = InstrumentLine(instrument_class(protocol)({1: indicator}), Damage())
-            gauge = load(Group.GAUGES, protocol)(settings, self.ports)
-            mounted.append(MountedGauge(gauge, settings.mounting))
-        have_lines(monkeypatch, self.lines, LineTime(elsewhere_s=lambda: self.elapsed_s))
+        gauges = [
+            GaugeSettings(name=axis, axis=axis, protocol=protocol, port=axis, timeout_s=0.5)
+            for axis, protocol in PROTOCOLS.items()
+        ]
+        time = LineTime(lambda: self.elapsed_s)
+        self._gauges = GaugesOnLines(monkeypatch, gauges, self.plungers_mm, Damage(), time)
         self.bus = PacedBus(BITRATE, HEARTBEAT_S, idle_s=IDLE_S, patience_s=PATIENCE_S)
         self.bus.install(monkeypatch)
-        encoders = Cia406Bank(
-            LinearEncoderSettings.model_validate(
-                {
-                    "bus": {"interface": "paced"},
-                    "heartbeat_ms": round(1000 * HEARTBEAT_S),
-                    "largest_speed_mm_s": 100.0,
-                }
-            ),
-            WireTrace(TRACE_BYTES),
-        )
-        self.devices = Devices(tuple(mounted), encoders, None)  # type: ignore[arg-type]
+        encoders = {
+            "bus": {"interface": "paced"},
+            "heartbeat_ms": round(1000 * HEARTBEAT_S),
+            "largest_speed_mm_s": 100.0,
+        }
+        bank = Cia406Bank(LinearEncoderSettings.model_validate(encoders), WireTrace(TRACE_BYTES))
+        self.devices = Devices(self._gauges.mounted, bank, None)  # type: ignore[arg-type]
 
     def pass_by(self, seconds: float) -> None:
         """Leave all devices alone for so long."""
@@ -106,48 +91,41 @@ class FaultyCell:
 
     async def open(self) -> None:
         """All gauges and the encoders, again."""
-        for mounted in self.devices.gauges:
-            await mounted.gauge.close()
-            await mounted.gauge.open()
+        await self._gauges.open()
         await self.devices.encoders.open()
 
     async def close(self) -> None:
-        for mounted in self.devices.gauges:
-            await mounted.gauge.close()
+        await self._gauges.close()
         await self.devices.encoders.close()
-        await self.ports.close()
 
     def faults(self) -> list[Fault]:
         """Those of all devices."""
-        found = [fault for axis in PROTOCOLS for fault in self._of_gauge(axis)]
+        found = [fault for place, axis in enumerate(PROTOCOLS) for fault in self._of_gauge(place, axis)]
         return found + [fault for node in NODES for fault in self._of_encoder(node)]
 
-    def _of_gauge(self, axis: str) -> list[Fault]:
-        line, indicator, protocol = self.lines[axis], self.indicators[axis], PROTOCOLS[axis]
+    def _of_gauge(self, place: int, axis: str) -> list[Fault]:
+        line, indicator = self._gauges.lines[axis], self._gauges.indicators[place]
         switches: dict[str, Callable[[bool], object]] = {
             "silent": partial(setattr, line, "silent"),
             "unplugged": partial(setattr, line, "unplugged"),
-            "at its end": lambda on: setattr(indicator, "is_at_end", on),
-            "in inches": lambda on: setattr(indicator, "inch", on),
-            "low battery": lambda on: setattr(indicator, "battery_low", on),
+            "at its end": partial(setattr, indicator, "is_at_end"),
+            "in inches": partial(setattr, indicator, "inch"),
+            "low battery": partial(setattr, indicator, "battery_low"),
+            "on hold": lambda on: indicator.set_hold(on=on),
+            "in peak mode": lambda on: indicator.set_peak(on=on),
+            "reversed": partial(setattr, indicator, "reversed"),
+            "switched on again": lambda on: line.introduce() if on else None,
             **{kind.value: partial(_switch, line, kind) for kind in LineFault},
         }
-        if "reversed" in SEEN[axis]:
-            switches |= {
-                "on hold": lambda on: indicator.set_hold(on=on),
-                "in peak mode": lambda on: indicator.set_peak(on=on),
-                "reversed": lambda on: setattr(indicator, "reversed", on),
-            }
-        if "switched on again" in SEEN[axis]:
-            switches["switched on again"] = partial(self._switch_on, axis)
+        # These are faults of instruments that can do such things only, whose drivers see them.
+        left_out = {*SEEN_BY_SETTINGS, "switched on again"} - SEEN[axis]
         return [
-            Fault(f"{name}, {protocol}", switch, name in SEEN[axis], ends_when_told=name == "reversed")
+            Fault(
+                f"{name}, {PROTOCOLS[axis]}", switch, name in SEEN[axis], ends_when_told=name == "reversed"
+            )
             for name, switch in switches.items()
+            if name not in left_out
         ]
-
-    def _switch_on(self, axis: str, on: bool) -> None:
-        if on:
-            self.lines[axis].introduce()
 
     def _of_encoder(self, node: int) -> list[Fault]:
         bus, raw = self.bus, self.bus.nodes[node]

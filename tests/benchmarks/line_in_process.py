@@ -1,31 +1,40 @@
-"""Serial lines inside this process, in simulated time, in the place of pyserial's ports.
+"""Gauges on serial lines inside this process, in simulated time, in the place of pyserial's ports.
 
-An answer comes byte by byte, after a latency and at a baud rate; a line may damage bytes. A line with a
-parity has a terminal behind it that checks it, as the kernel does with INPCK and PARMRK.
+A line may damage bytes. One with a parity has a terminal behind it that checks it, as the kernel does with
+INPCK and PARMRK.
 """
 
 from __future__ import annotations
 
 import errno
 import threading
-import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from random import Random
 
 import pytest
 import serial
 
 from drivers.serial import port
-from drivers.simulated.gauges.instruments import Instrument
+from drivers.serial.shared_port import SharedSerialPorts
+from drivers.simulated.gauges.bank import instrument_class
+from drivers.simulated.gauges.instruments import Indicator, Instrument
 from drivers.simulated.gauges.server import LineFaults
+from drivers.wire_trace import WireTrace
+from hexacell.cell.devices import GaugeSettings
+from hexacell.plugins import Group, load
+from procedures.devices.device_set import MountedGauge
 
 MARK = b"\xff\0"
 """What a terminal puts before a byte of wrong parity."""
 
 LATE_S = 0.75
 """A late answer comes so long after the others: later than a driver waits by default."""
+
+TRACE_BYTES = 50_000
+"""Of each line: so little that it is full soon, and grows no more."""
 
 ODD_BITS = {"E": 0, "O": 1}
 ONE_BIT, BURST, LOST = 0.7, 0.85, 0.95
@@ -70,19 +79,15 @@ class Damage:
 class LineTime(threading.local):
     """The time of each line, which has a thread of its own: it passes while the line waits for bytes.
 
-    ``with_processor_time``: it also passes while the thread works, which it may do between two bytes.
     ``elsewhere_s`` gives how long all lines were left alone.
     """
 
-    def __init__(
-        self, *, with_processor_time: bool = False, elsewhere_s: Callable[[], float] = float
-    ) -> None:
+    def __init__(self, elsewhere_s: Callable[[], float] = float) -> None:
         self.waited_s = 0.0
         self._elsewhere_s = elsewhere_s
-        self._works = time.thread_time if with_processor_time else lambda: 0.0
 
     def monotonic(self) -> float:
-        return self.waited_s + self._works() + self._elsewhere_s()
+        return self.waited_s + self._elsewhere_s()
 
     time = monotonic
 
@@ -94,27 +99,19 @@ class InstrumentLine:
     """What the driver takes for a port of pyserial.
 
     Attributes:
-        elapsed_s: simulated seconds up to the latest byte.
-        asked: how many requests came.
         faults: of the line, by name.
         unplugged: whether it is.
         silent: whether all answers are lost.
     """
 
-    def __init__(
-        self, instrument: Instrument, damage: Damage, *, latency_s: float = 0.0, byte_s: float = 0.0
-    ) -> None:
+    def __init__(self, instrument: Instrument, damage: Damage) -> None:
         self.is_open = False
         self.dtr = self.rts = True
         self.timeout = self.write_timeout = 0.0
-        self.elapsed_s = 0.0
-        self.asked = 0
         self.faults = LineFaults(LATE_S)
         self.unplugged = self.silent = False
-        self.instrument = instrument
+        self._instrument = instrument
         self._damage = damage
-        self._latency_s = latency_s
-        self._byte_s = byte_s
         self._time = LineTime()
         self._odd: int | None = None
         self._coming: deque[tuple[float, int]] = deque()
@@ -143,26 +140,22 @@ class InstrumentLine:
         time, coming = self._time, self._coming
         until_s = time.monotonic() + self.timeout
         time.wait_until(min(until_s, coming[0][0]) if coming else until_s)
-        self.elapsed_s = time.monotonic()
-        data = bytearray()
-        while len(data) < size and coming and coming[0][0] <= self.elapsed_s:
+        now_s, data = time.monotonic(), bytearray()
+        while len(data) < size and coming and coming[0][0] <= now_s:
             data.append(coming.popleft()[1])
         return bytes(data)
 
     def write(self, request: bytes) -> None:
         self._require_plugged()
-        self.asked += 1
         command = request.rstrip(b"\r\n")
-        late_s = self.faults.delay_s()
-        answer = self.faults.sent(command, self.instrument.answer(command))
-        due_s = self._time.monotonic() + len(request) * self._byte_s + self._latency_s + late_s
+        due_s = self._time.monotonic() + self.faults.delay_s()
+        answer = self.faults.sent(command, self._instrument.answer(command))
         for character in self._damage.of(self._with_parity(b"" if self.silent else answer)):
-            due_s += self._byte_s
             self._coming += [(due_s, byte) for byte in self._received(character)]
 
     def introduce(self) -> None:
         """Have the instrument say what it says when it is switched on."""
-        self._coming += [(0.0, byte) for byte in self.instrument.introduction]
+        self._coming += [(0.0, byte) for byte in self._instrument.introduction]
 
     def _require_plugged(self) -> None:
         if self.unplugged:
@@ -183,15 +176,54 @@ class InstrumentLine:
         return (byte.bit_count() + (self._odd or 0)) % 2
 
 
-def have_lines(
-    monkeypatch: pytest.MonkeyPatch, lines: dict[str, InstrumentLine], line_time: LineTime | None = None
-) -> None:
-    """Let pyserial open these lines by their URL."""
-    line_time = line_time or LineTime()
+class GaugesOnLines:
+    """Gauges whose ports pyserial opens here; those with one port are channels of one instrument.
 
-    def opened(url: str, *, do_not_open: bool, parity: str = "N", **_: object) -> InstrumentLine:
-        assert do_not_open
-        return lines[url].opened_with(line_time, parity)
+    Attributes:
+        indicators: what shows the plungers, in the order of the settings.
+        lines: by their ports.
+    """
 
-    monkeypatch.setattr(port, "time", line_time)
-    monkeypatch.setattr(serial, "serial_for_url", opened)
+    def __init__(
+        self,
+        monkeypatch: pytest.MonkeyPatch,
+        settings: Sequence[GaugeSettings],
+        plungers_mm: list[float],
+        damage: Damage,
+        time: LineTime,
+    ) -> None:
+        self.indicators = [
+            Indicator(partial(plungers_mm.__getitem__, place), one.travel_mm)
+            for place, one in enumerate(settings)
+        ]
+        on_port: dict[str, dict[int, Indicator]] = {}
+        for one, indicator in zip(settings, self.indicators, strict=True):
+            on_port.setdefault(str(one.port), {})[one.channel] = indicator
+        self.lines = {}
+        for one in settings:
+            described = () if one.described is None else (one.described,)
+            instrument = instrument_class(one.protocol)(on_port[str(one.port)], *described)
+            self.lines[str(one.port)] = InstrumentLine(instrument, damage)
+
+        def opened(url: str, *, do_not_open: bool, parity: str = "N", **_: object) -> InstrumentLine:
+            assert do_not_open
+            return self.lines[url].opened_with(time, parity)
+
+        monkeypatch.setattr(port, "time", time)
+        monkeypatch.setattr(serial, "serial_for_url", opened)
+        self._ports = SharedSerialPorts(trace=WireTrace(TRACE_BYTES))
+        self.mounted = tuple(
+            MountedGauge(load(Group.GAUGES, one.protocol)(one, self._ports), one.mounting)
+            for one in settings
+        )
+
+    async def open(self) -> None:
+        """All of them, again."""
+        for mounted in self.mounted:
+            await mounted.gauge.close()
+            await mounted.gauge.open()
+
+    async def close(self) -> None:
+        for mounted in self.mounted:
+            await mounted.gauge.close()
+        await self._ports.close()

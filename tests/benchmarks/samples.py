@@ -21,7 +21,7 @@ SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
     "guards": {"TIMES": (1, 3)},
     "healthy_robots": {"ROBOTS": (30, 1000)},
     "long_polling": {"HOURS": (1, 24)},
-    "mechanisms": {"ROBOTS": (6, 100)},
+    "mechanisms": {"FAULTY": (16, 100), "ROBOTS": (6, 100)},
     "motion_limits": {"CAMPAIGNS": (6, 1000), "COMPARED": (4, 6)},
     "mutations": {"MUTATIONS": (60, 10_000)},
     "named_faults": {"RUNS": (1, 5)},

@@ -27,7 +27,6 @@ from tests.benchmarks.virtual_calibration import (
 )
 
 ROBOTS = sample(__name__, "ROBOTS")
-"""A tenth of what the target is for."""
 
 
 @dataclass(frozen=True, slots=True)

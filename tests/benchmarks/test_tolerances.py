@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
 from hexacell.identification.problem.prior import Tolerances
 from hexacell.identification.solver.result import GeometryEstimate, Termination
@@ -16,10 +14,11 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import random_robot
 from tests.benchmarks.figures import NEVER, at_least
+from tests.benchmarks.machines import bundled
 from tests.benchmarks.samples import sample
 
 BUILT = sample(__name__, "BUILT")
-ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))
+ROBOT = robot_of(bundled())
 MECHANISM, DRAWING = ROBOT.mechanism, ROBOT.drawing
 THREE_MM = Tolerances({"S": 3.0, "B": 3.0, "l": 3.0})
 

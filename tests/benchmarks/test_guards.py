@@ -208,22 +208,3 @@ async def test_the_robot_stops_within_the_limit_after_each_fault(
         figure(
             f"{protocol}: stands still after {kind} {device}", 1e3 * max(taken), "ms", at_most(1e3 * MUST_S)
         )
-
-
-async def test_readings_after_a_watched_move_are_not_slower(tmp_path: Path, figure: Figures) -> None:
-    """Readings after a watched move take as long as without it."""
-    async with watched(tmp_path, "mux10") as cell:
-        for gauge in cell.devices.gauges:
-            await gauge.gauge.read()
-        before = await seconds_of_reading(cell)
-        await cell.slow_move(2)
-        after = await seconds_of_reading(cell)
-    figure("mux10: three readings before a watched move", before, "s")
-    figure("  after it", after, "s", at_most(before + 0.15))
-
-
-async def seconds_of_reading(cell: Watched) -> float:
-    now = asyncio.get_running_loop().time
-    begun = now()
-    await asyncio.gather(*(gauge.gauge.read() for gauge in cell.devices.gauges))
-    return now() - begun

@@ -88,9 +88,6 @@ class Night:
     exit_code: int | None = None
     verdict: Verdict | None = None
     is_written: bool = False
-    said: str = ""
-    expanded_mm: float = np.nan
-    """Of the error that was stated."""
 
 
 @dataclass
@@ -101,7 +98,6 @@ class Year:
         drift_mm: of the length of leg 2, a night.
         crash_night: in the day before which leg 4 becomes ``crash_mm`` longer.
         faults: of nights, as changes of the cell file.
-        is_corrected: whether a quick level follows a check that failed.
     """
 
     folder: Path
@@ -110,7 +106,6 @@ class Year:
     crash_mm: float
     faults: dict[int, dict[str, Any]]
     power_cuts: frozenset[int] = frozenset()
-    is_corrected: bool = True
     nights: list[Night] = field(default_factory=list)
 
     @cached_property
@@ -124,7 +119,7 @@ class Year:
         with few_candidates():
             self._virtual_night(0, Mode.OPTIMISE)
             for number in range(1, nights):
-                mode = Mode.QUICK if self.is_corrected and self._has_failed() else Mode.CHECK
+                mode = Mode.QUICK if self._has_failed() else Mode.CHECK
                 if number in self.faults or number in self.power_cuts:
                     self._night_of_the_program(number, mode)
                 else:
@@ -186,8 +181,6 @@ class Year:
                 self.true_error_mm(number),
                 verdict=judged.verdict,
                 is_written=is_written,
-                said=judged.line,
-                expanded_mm=_expanded_mm(judged),
             )
         )
 
@@ -207,20 +200,13 @@ class Year:
             for later in runs_folder(self.cell).glob(f"{self.at(number):%Y-%m-%d}T*"):
                 if later != self._place(number):
                     shutil.rmtree(later)  # what would have been done after it
-        self.nights.append(
-            Night(number, mode, before, self.true_error_mm(number), code, said=words.getvalue())
-        )
+        self.nights.append(Night(number, mode, before, self.true_error_mm(number), code))
 
     def _tonight(self, number: int) -> dict[str, Any]:
         values = self.cell.settings.mechanism.parameters.document(self.truth(number).vector)
         assert self.cell.settings.simulation is not None
         geometry = type(self.cell.settings.simulation.geometry).model_validate(values)
         return {"simulation.geometry": geometry} | self.faults.get(number, {})
-
-
-def _expanded_mm(judged: events.ResultValidated) -> float:
-    check = judged.check
-    return np.nan if check is None or check.accuracy is None else check.accuracy.position.expanded
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,7 +294,8 @@ class VirtualNight:
         receipt = commit(change, folder.path)
         committed = events.Committed(approved_by="the cell file: within its limits")
         yield committed
-        state = fold_on(state, identified, proposed, committed)
+        for event in (identified, proposed, committed):
+            state = apply(state, event)
         after = calibration.known(state).written_robot(state)
         held_out = measured_held_out(settings, found, after, VirtualRobot(after, self.truth, random))
         verified = verify(settings, after, found, held_out)
@@ -317,12 +304,6 @@ class VirtualNight:
         if verified.verdict is not Verdict.PASS:
             rollback(receipt)
             yield events.RolledBack()
-
-
-def fold_on(state: RunState, *further: events.Event) -> RunState:
-    for event in further:
-        state = apply(state, event)
-    return state
 
 
 def taken(record: Record) -> events.RecordTaken:

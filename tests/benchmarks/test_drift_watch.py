@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -24,8 +23,6 @@ from tests.benchmarks.figures import at_least, at_most
 from tests.benchmarks.machines import calibrated, on_all_cores
 from tests.benchmarks.samples import sample
 
-Job = TypeVar("Job")
-Outcome = TypeVar("Outcome")
 CELLS = sample(__name__, "CELLS")
 STEPS = sample(__name__, "STEPS")
 YEARS, NIGHTS = 10, 3650

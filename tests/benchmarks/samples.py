@@ -24,7 +24,6 @@ SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
     "mechanisms": {"FAULTY": (16, 100), "ROBOTS": (6, 100)},
     "motion_limits": {"CAMPAIGNS": (6, 1000), "COMPARED": (4, 6)},
     "mutations": {"MUTATIONS": (60, 10_000)},
-    "named_faults": {"RUNS": (1, 5)},
     "orientations": {"ROBOTS": (20, 1000)},
     "paper_study": {"DRAWS": (20, 20)},
     "peers": {"ROBOTS": (2, 6)},

@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +36,7 @@ RUNS = sample(__name__, "RUNS")
 ROUNDS = 8
 TABS = {"1": rb">1 Cell", "2": rb">2 Pre", "3": rb">3 Mea", "4": rb">4 Rev", "5": rb">5 His"}
 """What each screen has marked in its second line."""
+READING = rb"\d\.\d{4}.{0,20}mm"
 
 
 @pytest.fixture
@@ -115,89 +116,48 @@ def opened(cell: Path) -> Iterator[Screen]:
         os.waitpid(process, 0)
 
 
-@dataclass(frozen=True)
-class Speed:
-    first_s: float
-    live_s: float
-    key_s: float
-    quit_s: float
-
-
-def measure(cell: Path) -> Speed:
-    """The first screen, live readings, the first visit to each other screen, and quitting."""
-    with opened(cell) as screen:
-        first = screen.seen_at(rb"Cell")
-        live = screen.seen_at(rb"\d\.\d{4}.{0,20}mm")
-        visits = [screen.answered_s(key) for key in "23451"]
-        return Speed(first - screen.begun, live - screen.begun, max(visits), screen.quit_s("q"))
-
-
-def test_live_readings_keys_and_quitting(served: Path, figure: Figures) -> None:
-    found = [measure(served) for _ in range(RUNS)]
-    best = Speed(*(min(getattr(one, name) for one in found) for name in Speed.__dataclass_fields__))
-    figure("screen: first drawn", best.first_s, "s")
-    figure("screen: live readings", best.live_s, "s", at_most(LIVE_S))
-    figure("screen: first visit to a screen, slowest of five", 1e3 * best.key_s, "ms", at_most(1e3 * KEY_S))
-    figure("screen: quitting", best.quit_s, "s", at_most(QUIT_S))
-
-
-def keys_answered(screen: Screen, goes_on: Callable[[], bool] | None = None) -> list[float]:
-    """Times of keys, one screen after the other, for some rounds and as long as something goes on."""
-    found: list[float] = []
-    while len(found) < 5 * ROUNDS or (goes_on is not None and goes_on()):
-        found += [screen.answered_s(key) for key in "21435"]
-    return found
-
-
-def judge(figure: Figures, what: str, keys: list[float], quit_s: float) -> None:
-    """Say the median and the slowest of some keys; the limit holds for the median, and 95 % of them."""
-    usual, slow = median(keys), sorted(keys)[int(0.95 * len(keys))]
-    figure(f"screen: a key answered {what}, median", 1e3 * usual, "ms", at_most(1e3 * KEY_S))
-    figure(f"screen: 95 % of keys {what} within", 1e3 * slow, "ms", at_most(1e3 * KEY_S))
-    figure(f"screen: slowest of the keys {what}", 1e3 * max(keys), f"ms, {len(keys)} keys")
-    figure(f"screen: quitting {what}", quit_s, "s", at_most(QUIT_S))
-
-
-def begin_run(screen: Screen) -> None:
-    """Begin a calibration and wait for its first record."""
-    screen.seen_at(rb"\d\.\d{4}.{0,20}mm")
-    screen.answered_s("2")
-    screen.press("s")
-    screen.seen_at(rb"1/2 ")
-
-
-def test_while_a_run_measures(served: Path, figure: Figures) -> None:
-    with opened(served) as screen:
-        begin_run(screen)
-        judge(figure, "while measuring", keys_answered(screen), screen.quit_s("q", "s"))
-
-
-def test_while_the_run_identifies_and_a_plan_is_tried(served: Path, figure: Figures) -> None:
-    """Its long computations: beside measuring, the plan on simulated robots, then the identification."""
-    with opened(served) as screen:
-        begin_run(screen)
-        screen.answered_s("2")
-        screen.press("v")
-        screen.answered_s("1")
-        [run] = (served.parent / "runs" / NAME).glob("2*")
-
-        def computes() -> bool:
-            return not any(
-                isinstance(event, events.Identified) for event in read_journal(run / "journal.jsonl")
-            )
-
-        keys = keys_answered(screen, computes)
-        judge(figure, "while a plan is tried, and identifying", keys, screen.quit_s("q", "s"))
-
-
-def test_with_a_gauge_that_does_not_answer(served: Path, figure: Figures) -> None:
-    silent, port = pty.openpty()
-    text = served.read_text()
-    served.write_text(re.sub(r'port = ".*?"', f'port = "{os.ttyname(port)}"', text, count=1))
-    try:
+def test_start_first_visits_and_quitting(served: Path, figure: Figures) -> None:
+    found = []
+    for _ in range(RUNS):
         with opened(served) as screen:
-            screen.seen_at(rb"NO READING")
-            judge(figure, "with a silent gauge", keys_answered(screen), screen.quit_s("q"))
-    finally:
-        os.close(silent)
-        os.close(port)
+            first = screen.seen_at(rb"Cell") - screen.begun
+            live = screen.seen_at(READING) - screen.begun
+            found.append((first, live, max(screen.answered_s(key) for key in "23451"), screen.quit_s("q")))
+    first, live, key, quitting = map(min, zip(*found, strict=True))
+    figure("screen: first drawn", first, "s")
+    figure("screen: live readings", live, "s", at_most(LIVE_S))
+    figure("screen: first visit to a screen, slowest of five", 1e3 * key, "ms", at_most(1e3 * KEY_S))
+    figure("screen: quitting", quitting, "s", at_most(QUIT_S))
+
+
+def identifies(run: Path) -> bool:
+    """Whether it measures, or computes what the records give."""
+    return not any(isinstance(event, events.Identified) for event in read_journal(run / "journal.jsonl"))
+
+
+@pytest.mark.parametrize("what", ["measuring", "a plan is tried, and identifying"])
+def test_while_a_run_goes_on(served: Path, figure: Figures, what: str) -> None:
+    """Its first records; or its long computations: the plan on simulated robots, then the identification.
+
+    The limit holds for the median, and 95 % of the keys.
+    """
+    with opened(served) as screen:
+        screen.seen_at(READING)
+        screen.answered_s("2")
+        screen.press("s")
+        screen.seen_at(rb"1/2 ")
+        [run] = (served.parent / "runs" / NAME).glob("2*")
+        is_long = what != "measuring"
+        if is_long:
+            screen.answered_s("2")
+            screen.press("v")
+            screen.answered_s("1")
+        keys: list[float] = []
+        while len(keys) < 5 * ROUNDS or (is_long and identifies(run)):
+            keys += [screen.answered_s(key) for key in "21435"]
+        quitting = screen.quit_s("q", "s")
+    usual, slow = median(keys), sorted(keys)[int(0.95 * len(keys))]
+    figure(f"screen: a key answered while {what}, median", 1e3 * usual, "ms", at_most(1e3 * KEY_S))
+    figure(f"screen: 95 % of keys while {what} within", 1e3 * slow, "ms", at_most(1e3 * KEY_S))
+    figure(f"screen: slowest of the keys while {what}", 1e3 * max(keys), f"ms, {len(keys)} keys")
+    figure(f"screen: quitting while {what}", quitting, "s", at_most(QUIT_S))

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pytest
 
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.forward import continue_solution, forward_kinematics
@@ -37,8 +36,7 @@ class Outcome:
     records: int
 
 
-@pytest.fixture(scope="module")
-def outcome(table_one) -> Outcome:
+def outcome_of(table_one) -> Outcome:
     robot, truth = table_one.robot, table_one.truth
     random = np.random.default_rng(1)
     campaign = data_sets.unlimited_travel(robot, truth, table_one.points, 11, np.radians(30), random)
@@ -105,20 +103,15 @@ def _by_joints(positions, joints: Array) -> Array:
     return np.stack(columns, axis=-1)
 
 
-def test_errors_are_at_the_cramer_rao_bound(outcome: Outcome, figure) -> None:
+def test_errors_and_intervals_are_those_of_the_cramer_rao_bound(table_one, figure) -> None:
+    outcome = outcome_of(table_one)
     ratio = np.sqrt(np.mean(outcome.errors**2, axis=0)) / outcome.bound
     figure("rms error / Cramer-Rao bound, median of 35", np.median(ratio), "", between(0.98, 1.03))
     figure("  smallest", ratio.min(), "", at_least(0.92))
     figure("  largest", ratio.max(), "", at_most(1.08))
-
-
-def test_confidence_intervals_have_their_nominal_coverage(outcome: Outcome, figure) -> None:
     each = 100 * outcome.covered.mean(axis=0)
     figure("95 % intervals cover, pooled", each.mean(), "%", between(94.0, 96.0))
     figure("  least covered parameter", each.min(), "%", at_least(92.5))
     figure("  most covered parameter", each.max(), "%", at_most(97.5))
-
-
-def test_clean_records_are_kept(outcome: Outcome, figure) -> None:
     share = 100 * outcome.removed / outcome.records
     figure("clean records taken for gross errors", share, "%", at_most(0.1))

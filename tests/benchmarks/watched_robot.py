@@ -22,7 +22,7 @@ class Seen:
     """The worst at all ends of moves: of commands, and of the real robot. Angles in deg.
 
     ``way_is_kept`` is whether a stop on a way between two ends that keep tilt, turn, axes and joints would
-    keep them too; ``largest`` is the largest command of each axis.
+    keep them too.
     """
 
     moves: int = 0
@@ -31,7 +31,6 @@ class Seen:
     axis_is_kept: bool = True
     joint_is_kept: bool = True
     way_is_kept: bool = True
-    largest: tuple[float, ...] = (0.0,) * 6
     spare: float = np.inf
     distance_mm: float = np.inf
 
@@ -68,7 +67,6 @@ class WatchedRobot(VirtualRobot):
         assert limits.legs is not None
         legs = model.mechanism.legs(self.truth, self._actual_pose, joints)
         seen.moves += 1
-        seen.largest = tuple(np.maximum(seen.largest, np.abs(command.numbers()[0])).tolist())
         seen.tilt = max(seen.tilt, float(np.degrees(command.tilts()[0])))
         seen.turn = max(seen.turn, float(np.degrees(np.abs(command.turns()[0]))))
         seen.axis_is_kept &= bool(limits.axes.allow(command)[0])

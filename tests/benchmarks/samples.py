@@ -34,7 +34,7 @@ SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
     "study_speed": {"ROBOTS": (24, 200)},
     "tolerances": {"BUILT": (300, 1500)},
     "worlds": {"RUNS": (1, 34)},
-    "year": {"NIGHTS": (90, 365)},
+    "year": {"NIGHTS": (45, 365)},
 }
 
 

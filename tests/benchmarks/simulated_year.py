@@ -1,18 +1,18 @@
 """A year of a cell that is checked each night: what the program keeps of it, in its real files.
 
 A robot drifts slowly and crashes once; a gauge is dead for a week, the disk is full one night, the power
-fails in another. Usual nights are carried out without devices: everything is computed, decided, written
-and archived by the program, only motion and instruments are virtual. Nights with a fault run the whole
-program, with drivers and simulated devices, at a clock of their own. A night after a check that failed is a
-quick level.
+fails in another. Usual nights run the real procedure on devices without wires. Nights with a fault run the
+whole program, with drivers and simulated devices. All have a clock of their own. A night after a check that
+failed is a quick level.
 """
 
 from __future__ import annotations
 
+import asyncio
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from functools import cached_property
 from io import StringIO
@@ -22,40 +22,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.cell.loader import Cell, dump
+from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.simulation import SimulatedFault
-from hexacell.checks.check_result import check_line, check_result
 from hexacell.cli.app import main
-from hexacell.config.change import propose
-from hexacell.config.interface import ControllerLimits
-from hexacell.config.layout import fingerprint
-from hexacell.config.write_back import commit, rollback
-from hexacell.dry_run.campaign import VirtualCampaign
-from hexacell.identification.estimator import identify
 from hexacell.kinematics.geometry import Geometry
-from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.results.result import IdentificationResult
-from hexacell.results.written_geometry import as_written
-from hexacell.robot.model import config_layout, robot_of
-from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.robot.model import robot_of
 from hexacell.runs import run_folder
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.history.drift_history import drift_history
 from hexacell.services.history.past_runs import past_runs
 from hexacell.services.run.calibration_run import new_calibration
 from hexacell.services.schedule import unattended_runs
-from hexacell.verdict.acceptance_gates import gates
 from hexacell.verdict.decision import Verdict
-from hexacell.verdict.outcome import outcome_line
-from hexacell.verdict.verification import verify
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.journal import journal as line_format
-from procedures.journal.journal import Entry, encode
-from procedures.run.keys import Phase, SetKey
-from procedures.run.readings import Reading
-from procedures.run.state import RunState, apply, fold
-from procedures.steps import events
-from tests.benchmarks.virtual_calibration import measured_held_out
+from procedures.journal.journal import read_journal
+from procedures.run.state import fold
+from tests.procedures.rig import Rig
 from tests.small_cell import FEW_CHOICES, SMALL, changed, few_candidates, write_small_cell
 
 FIRST_NIGHT = datetime(2026, 3, 1, 2, 30, tzinfo=UTC)
@@ -117,13 +100,13 @@ class Year:
     def carry_out(self, nights: int) -> None:
         """A calibration, and so many nights less one after it."""
         with few_candidates():
-            self._virtual_night(0, Mode.OPTIMISE)
+            self._usual_night(0, Mode.OPTIMISE)
             for number in range(1, nights):
                 mode = Mode.QUICK if self._has_failed() else Mode.CHECK
                 if number in self.faults or number in self.power_cuts:
                     self._night_of_the_program(number, mode)
                 else:
-                    self._virtual_night(number, mode)
+                    self._usual_night(number, mode)
 
     def truth(self, number: int) -> Geometry:
         """The robot in a night, in the mechanism's frame convention."""
@@ -169,19 +152,18 @@ class Year:
             (one.verdict is Verdict.FAIL for one in reversed(self.nights) if one.verdict is not None), False
         )
 
-    def _virtual_night(self, number: int, mode: Mode) -> None:
-        before = self.true_error_mm(number)
-        run = VirtualNight(self.cell, new_calibration(self.cell, mode), self.truth(number), number)
-        judged, is_written = run.carry_out(RunFolder(self._place(number)), self.at(number))
+    def _usual_night(self, number: int, mode: Mode) -> None:
+        before, folder = self.true_error_mm(number), RunFolder(self._place(number))
+        with clock_at(self.at(number)):
+            tonight = load_cell(self._tonight(number))
+            folder.create(tonight)
+            rig = Rig(tonight, folder, mode, accepted=new_calibration(self.cell, mode).accepted)
+            asyncio.run(rig.run())
+        state, after = fold(read_journal(folder.journal)), self.true_error_mm(number)
+        assert state.judged is not None
+        is_written = state.committed is not None and not state.rolled_back
         self.nights.append(
-            Night(
-                number,
-                mode,
-                before,
-                self.true_error_mm(number),
-                verdict=judged.verdict,
-                is_written=is_written,
-            )
+            Night(number, mode, before, after, verdict=state.judged.verdict, is_written=is_written)
         )
 
     def _place(self, number: int) -> Path:
@@ -190,10 +172,9 @@ class Year:
     def _night_of_the_program(self, number: int, mode: Mode) -> None:
         """Everything, with simulated devices; after a power cut half of the night's journal is left."""
         before, words = self.true_error_mm(number), StringIO()
-        path = self.folder / "tonight.toml"
-        path.write_text(dump(changed(self.cell.settings, self._tonight(number))))
+        tonight = str(self._tonight(number))
         with clock_at(self.at(number)), redirect_stdout(words), redirect_stderr(words):
-            code = main(["run", str(path), "--unattended", "--mode", mode.value])
+            code = main(["run", tonight, "--unattended", "--mode", mode.value])
         if number in self.power_cuts:
             assert self._place(number).joinpath("journal.jsonl").is_file(), words.getvalue()
             cut_off(RunFolder(self._place(number)))
@@ -202,127 +183,16 @@ class Year:
                     shutil.rmtree(later)  # what would have been done after it
         self.nights.append(Night(number, mode, before, self.true_error_mm(number), code))
 
-    def _tonight(self, number: int) -> dict[str, Any]:
+    def _tonight(self, number: int) -> Path:
+        """The cell file with the robot, the noise and the faults of a night."""
+        simulation = self.cell.settings.simulation
+        assert simulation is not None
         values = self.cell.settings.mechanism.parameters.document(self.truth(number).vector)
-        assert self.cell.settings.simulation is not None
-        geometry = type(self.cell.settings.simulation.geometry).model_validate(values)
-        return {"simulation.geometry": geometry} | self.faults.get(number, {})
-
-
-@dataclass(frozen=True, eq=False)
-class VirtualNight:
-    """A run on a virtual robot, kept as a run is."""
-
-    cell: Cell
-    calibration: Calibration
-    truth: Geometry
-    number: int
-
-    def carry_out(self, folder: RunFolder, at: datetime) -> tuple[events.ResultValidated, bool]:
-        """Measure, judge, and write where every gate is passed; what was judged, and whether it stays."""
-        plan = replace(self.calibration.plan, with_forecast=False)
-        random = np.random.default_rng([365, self.number])
-        campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, self.truth, random))
-        campaign.carry_out()
-        folder.create(self.cell)
-        measured = campaign.measurements
-        history: list[events.Event] = [self._started(), *map(taken, measured.records)]
-        if self.calibration.mode is Mode.CHECK:
-            history.append(self._checked(measured))
-        else:
-            history += self._calibrated(folder, fold(history), random)
-        state = fold(history)
-        assert state.judged is not None
-        code = 0 if state.judged.verdict is Verdict.PASS else 1
-        history.append(events.Ended(exit_code=code, line=state.judged.line))
-        lines = [encode(Entry(n, at, 0.0, event)) for n, event in enumerate(history, start=1)]
-        folder.journal.write_bytes(b"".join(lines))
-        return state.judged, state.committed is not None and not state.rolled_back
-
-    def _started(self) -> events.RunStarted:
-        robot = self.calibration.robot
-        return events.RunStarted(
-            software="hexacell 0",
-            cell=self.cell.settings.name,
-            cell_text=self.cell.text_without_secrets,
-            mode=self.calibration.mode.value,
-            config=str(self.cell.config_path),
-            config_sha256=fingerprint(*self.cell.config_paths),
-            controller=robot.controller.document(),
-            branch=robot.branch,
-            devices=(),
-            taught=robot.taught.document(),
-            joint_ranges=robot.limits.joint_ranges,
-            limits=ControllerLimits(),
-            accepted=self.calibration.accepted,
-        )
-
-    def _checked(self, measured: MeasurementSet) -> events.ResultValidated:
-        calibration = self.calibration
-        effects = calibration.robot.effects
-        found = check_result(calibration.at_start.check, measured, calibration.accepted, effects)
-        return events.ResultValidated(verdict=found.verdict, line=check_line(found), check=found)
-
-    def _calibrated(
-        self, folder: RunFolder, state: RunState, random: np.random.Generator
-    ) -> Iterator[events.Event]:
-        """As the computations and the config transactions of a run do it."""
-        calibration, settings = self.calibration, self.cell.settings
-        robot = calibration.known(state).robot_of(state)
-        found = identify(robot.problem(state.measurements()))
-        result = IdentificationResult.of(found)
-        identified = events.Identified(result=result, held_out=())
-        yield identified
-        written = as_written(calibration.settings, calibration.robot, found.geometry)
-        conditions = gates(
-            found.estimate,
-            robot.tolerance_violations(found.estimate),
-            residuals=result.residuals,
-            largest_change_mm=settings.acceptance.largest_change_mm,
-            before=calibration.robot.commanding,
-        )
-        proposed = events.Proposed(gates=conditions, written=written.geometry.document())
-        yield proposed
-        assert all(gate.passed for gate in conditions), conditions
-        change = propose(
-            self.cell.config_paths,
-            config_layout(settings),
-            written.geometry,
-            fingerprint_at_start=fingerprint(*self.cell.config_paths),
-        )
-        change.save(folder.proposal)
-        receipt = commit(change, folder.path)
-        committed = events.Committed(approved_by="the cell file: within its limits")
-        yield committed
-        for event in (identified, proposed, committed):
-            state = apply(state, event)
-        after = calibration.known(state).written_robot(state)
-        held_out = measured_held_out(settings, found, after, VirtualRobot(after, self.truth, random))
-        verified = verify(settings, after, found, held_out)
-        line = outcome_line(result, len(found.free), verified)
-        yield events.ResultValidated(verdict=verified.verdict, line=line, verification=verified)
-        if verified.verdict is not Verdict.PASS:
-            rollback(receipt)
-            yield events.RolledBack()
-
-
-def taken(record: Record) -> events.RecordTaken:
-    reading = Reading(
-        gauges_mm=record.deviation,
-        spread_mm=(0.0, 0.0, 0.0),
-        joints=record.joints,
-        answers=(),
-        counts=((0,) * 6,),
-        skews_s=(),
-        temperatures=(),
-    )
-    return events.RecordTaken(
-        at=SetKey(phase=Phase.IDENTIFY, point=record.point),
-        orientation=record.orientation,
-        pose=record.pose.as_tuple(),
-        reading=reading,
-        deviation_mm=record.deviation,
-    )
+        geometry = type(simulation.geometry).model_validate(values)
+        own = {"simulation.geometry": geometry, "simulation.seed": number} | self.faults.get(number, {})
+        path = self.folder / "tonight.toml"
+        path.write_text(dump(changed(self.cell.settings, own)))
+        return path
 
 
 def cut_off(folder: RunFolder) -> None:

@@ -232,19 +232,3 @@ def _deviations(records: Sequence[Record]) -> list[tuple[float, float, float]]:
 
 def _keeps_travel(robot: Robot, records: Sequence[Record]) -> bool:
     return bool(robot.limits.room.holds(np.array([record.deviation for record in records])).all())
-
-
-def measured_held_out(
-    settings: CellSettings, found: Identification, robot: Robot, virtual: VirtualRobot
-) -> HeldOut:
-    """What the held-out poses give, chosen as a run does after the identification.
-
-    A point at which the robot would leave its limits is left, if there is none near it.
-
-    Raises:
-        LimitError: all of them are.
-    """
-    poses = HeldOutPoses(settings, robot, CANDIDATES).before(found)
-    records = _visited(virtual, poses, HELD_OUT_FROM)
-    deviations = _deviations(records)
-    return HeldOut(MeasurementSet(tuple(records)), deviations, deviations)

@@ -27,7 +27,6 @@ from hexacell.design.criteria import D_OPTIMAL, add_information, covariance_upda
 from hexacell.design.pose_selection import SelectedPose
 from hexacell.design.predicted_records import position_derivatives
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -213,7 +212,7 @@ class PlannedInformation:
         rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
         jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses[rows], joints[rows]))
         ends = np.cumsum([len(poses) for poses in sets])
-        return cls(jacobian, record_weights(by_joints, belief.noise), np.searchsorted(rows, [0, *ends]))
+        return cls(jacobian, belief.noise.record_weights(by_joints), np.searchsorted(rows, [0, *ends]))
 
     def information(self, point: int, records: int) -> Array:
         """The information (p, p), 1/mm^2, of the first ``records`` of a point, counted from 1."""
@@ -266,7 +265,7 @@ def _select(drawn: RobotBelief, poses: PoseBatch, records: int) -> PoseBatch:
     selected = [0]
     jacobian, by_joints = position_derivatives(drawn, targets)
     change = jacobian - jacobian[0]
-    noise = record_covariance(by_joints, drawn.noise)
+    noise = drawn.noise.record_covariance(by_joints)
     noise = noise + noise[0]
     covariance = drawn.covariance
     for _ in range(min(records, len(targets)) - 1):

@@ -14,7 +14,6 @@ from hexacell.design.candidates import ReachableTargets, commands_for
 from hexacell.design.criteria import innovation_covariance
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import modes_of
 from hexacell.kinematics.pose import Batch, PoseBatch
@@ -76,7 +75,7 @@ def estimate_gauge_zero(
         LimitError: all poses are at a singularity, where the records have no information.
     """
     jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses, joints))
-    weights = record_weights(by_joints, belief.noise)
+    weights = belief.noise.record_weights(by_joints)
     try:
         covariance = np.linalg.inv(weights.sum(axis=0))
     except np.linalg.LinAlgError:
@@ -150,7 +149,7 @@ def _predicted(
     belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets, by_parameters: Array, by_joints: Array
 ) -> PredictedRecords:
     """The records by the derivatives of the ball's position, see :func:`position_derivatives`."""
-    covariance = record_covariance(by_joints, belief.noise) + zero.covariance
+    covariance = belief.noise.record_covariance(by_joints) + zero.covariance
     jacobian = by_parameters - zero.jacobian
     total = innovation_covariance(belief.covariance, jacobian, covariance)
     sigma = belief.limits.sigma_along_gauges(total)

@@ -125,7 +125,7 @@ class PoseBatch(Batch):
         positions[rows], orientations[rows] = poses.positions, poses.rotations
         return PoseBatch(positions, orientations)
 
-    def reshape(self, *shape: int) -> PoseBatch:
+    def in_shape(self, *shape: int) -> PoseBatch:
         """The poses in their order, in another shape: ``-1`` for one axis, ``-1, n`` for n lines."""
         return PoseBatch(self.positions.reshape(*shape, 3), self.rotations.reshape(*shape, 3, 3))
 

@@ -62,7 +62,7 @@ class CheckedLines:
 
     def traced(self, row: int) -> tuple[PoseBatch, Array]:
         """The actual poses on one line after its start, and their joint variables (m, 6), mm."""
-        return self.actual[1:, [row]].reshape(-1), self.joints[1:, row]
+        return self.actual[1:, [row]].in_shape(-1), self.joints[1:, row]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +89,14 @@ class LinesFrom:
         belief = self._belief
         limits = belief.limits
         fine = interpolate_lines((self.start, *waypoints, ends), JOINT_REFINEMENT, limits.frames)
-        fine_joints = belief.commanded.joints(fine.reshape(-1)).reshape(-1, len(ends), 6)
-        allowed = limits.allow_commands(fine.reshape(-1)).reshape(-1, len(ends))
+        fine_joints = belief.commanded.joints(fine.in_shape(-1)).reshape(-1, len(ends), 6)
+        allowed = limits.allow_commands(fine.in_shape(-1)).reshape(-1, len(ends))
         rows = np.flatnonzero((allowed & limits.allow_joints(fine_joints)).all(axis=0))
         commands, joints = fine[::JOINT_REFINEMENT], fine_joints[::JOINT_REFINEMENT]
         rows = rows[self._keeps_margin(belief.controller, commands, joints, rows)]
         actual, rows = self._trace(commands, joints, rows, thorough=thorough)
         rows = rows[self._keeps_margin(belief.estimate, actual, joints, rows)]
-        at = actual[:, rows].reshape(-1), joints[:, rows].reshape(-1, 6)
+        at = actual[:, rows].in_shape(-1), joints[:, rows].reshape(-1, 6)
         kept = belief.keeps_limits(*at, self._wanted_margins).reshape(len(joints), len(rows))
         rows = rows[kept.all(axis=0)]
         is_open = np.zeros(len(ends), dtype=bool)
@@ -114,7 +114,7 @@ class LinesFrom:
         arguments = (
             self.belief.mechanism,
             geometry,
-            poses[:, rows].reshape(-1),
+            poses[:, rows].in_shape(-1),
             joints[:, rows].reshape(-1, 6),
         )
         shape = (len(joints), len(rows))

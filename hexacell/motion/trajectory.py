@@ -76,7 +76,7 @@ def interpolate_lines(
     """
     pieces = refinement * (PIECES if len(waypoints) == 2 else PIECES_BETWEEN_WAYPOINTS)
     parts = [
-        interpolate_line(start, end, pieces, frames).reshape(-1, len(waypoints[-1]))
+        interpolate_line(start, end, pieces, frames).in_shape(-1, len(waypoints[-1]))
         for start, end in pairwise(waypoints)
     ]
     return PoseBatch.joined([parts[0][:1], *(part[1:] for part in parts)])
@@ -102,7 +102,7 @@ def trace_path(
         on the others the poses are undefined.
     """
     robot = _Robot(mechanism, geometry, modes_of(mechanism, geometry, start, joints[0, :1]))
-    actual, converged = robot.correct(joints, _predict(commands[:1], commands, start.reshape(1, 1)))
+    actual, converged = robot.correct(joints, _predict(commands[:1], commands, start.in_shape(1, 1)))
     confirmed: Mask = np.all(converged, axis=0)
     suspect = np.flatnonzero(confirmed & _may_have_jumped(commands, actual))
     if len(suspect):
@@ -129,11 +129,11 @@ class _Robot:
             self.mechanism,
             self.geometry,
             joints.reshape(-1, 6),
-            predicted.reshape(-1),
+            predicted.in_shape(-1),
             mode=self.mode.repeat(shape[0] * shape[1]),
             tolerance_mm=TOLERANCE_MM,
         )
-        return result.poses.reshape(*shape), result.found.reshape(shape)
+        return result.poses.in_shape(*shape), result.found.reshape(shape)
 
     def confirm(self, joints: Array, commands: PoseBatch, actual: PoseBatch) -> Mask:
         """On which lines (n,) each pose is found again from the pose before it."""
@@ -165,14 +165,14 @@ def _track(robot: _Robot, commands: PoseBatch, joints: Array, start: PoseBatch) 
     """The path point by point, each point predicted from the one before, and the lines (n,) found."""
     tracked, lines = commands, joints.shape[1]
     rows = np.arange(lines)
-    predicted = start[np.zeros(lines, dtype=int)].reshape(1, lines)
+    predicted = start[np.zeros(lines, dtype=int)].in_shape(1, lines)
     for piece in range(len(joints)):
         actual, converged = robot.correct(joints[[piece]][:, rows], predicted)
         # Lines that fail are dropped: continuing them would cost more than all the others.
         rows, actual = rows[converged[0]], actual[:, converged[0]]
         if not len(rows):
             break
-        tracked = tracked.with_rows((piece, rows), actual.reshape(-1))
+        tracked = tracked.with_rows((piece, rows), actual.in_shape(-1))
         if piece + 1 < len(joints):
             before, after = commands[piece : piece + 1, rows], commands[piece + 1 : piece + 2, rows]
             predicted = _predict(before, after, actual)

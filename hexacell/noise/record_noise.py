@@ -27,7 +27,6 @@ import numpy as np
 
 from hexacell.distributions import chi_square_limit
 from hexacell.identification.solver.linear_model import LinearizedModel
-from hexacell.identification.solver.measurement_model import record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
@@ -172,7 +171,7 @@ class _Equations:
         by_joints = found.prediction.by_joints
         encoder_noise, gauge_noise = np.sqrt(variances).tolist()
         noise = replace(found.problem.noise, encoder=encoder_noise, gauge_mm=gauge_noise)
-        reweighted = replace(found.prediction, weights=record_weights(by_joints, noise))
+        reweighted = replace(found.prediction, weights=noise.record_weights(by_joints))
         model = LinearizedModel.around(found.problem, reweighted, found.active_prior)
         unit = replace(found.problem.noise, encoder=1.0, gauge_mm=1.0)
         encoder = unit.encoder_covariance(by_joints)

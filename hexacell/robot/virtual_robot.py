@@ -97,11 +97,11 @@ class VirtualRobot:
         end = self.model.from_commands([command])
         line = interpolate_line(self._commanded, end, PIECES, self.model.frames)
         joints = self._joints(line)
-        arguments = (line.reshape(-1, 1), joints[:, None], self._actual_pose)
+        arguments = (line.in_shape(-1, 1), joints[:, None], self._actual_pose)
         traced, found = trace_path(self.model.mechanism, self.truth, *arguments)
         if not found[0]:
             raise LimitError("a singularity is on the line")
-        poses = traced.reshape(-1)
+        poses = traced.in_shape(-1)
         self._see_margin(poses, joints)
         self._command, self._actual = command, poses[[-1]]
 

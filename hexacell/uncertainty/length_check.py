@@ -22,7 +22,6 @@ import numpy as np
 
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
 from hexacell.uncertainty.effect_kinds import COMMON_SCALE, common_encoder_scale
@@ -97,7 +96,7 @@ class LengthCheck:
         )
         scaled = judged.with_scale(mechanism, geometry)
         by_scale = shared_errors(records, jacobian, scaled, common_encoder_scale(1.0))
-        noises = record_covariance(by_joints, noise)
+        noises = noise.record_covariance(by_joints)
         return cls(records, standard, jacobian, noises, errors, shared, by_scale)
 
     @property

@@ -16,7 +16,6 @@ from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicte
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.identified_zeros import IdentifiedZeros
 from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareVerdict
-from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.identification.solver.result import CorrelatedPair, Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
@@ -131,7 +130,7 @@ def assess(
     pairs, goodness = found.strongly_correlated(), found.goodness
     separating = decorrelating_poses(robot.belief(found), found, pairs[:SEPARATED_PAIRS])
     commands = [pose and replace(pose, command=robot.to_command(pose.command)) for pose in separating]
-    record_noise = record_covariance(found.prediction.by_joints, found.problem.noise)
+    record_noise = found.problem.noise.record_covariance(found.prediction.by_joints)
     # Residuals that are too large, and small enough to be explained to first order.
     is_doubtful = goodness.agreement is ChiSquareVerdict.TOO_LARGE and goodness.ratio <= CONTRADICTED_RATIO
     return Assessment(

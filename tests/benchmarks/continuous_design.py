@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 from hexacell.design.candidates import ReachableTargets, reachable_targets, rows_apart
 from hexacell.design.predicted_records import GaugeZero, gauge_zero_at, position_derivatives
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.solver.measurement_model import record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import PoseBatch
@@ -233,7 +232,7 @@ class PoseDomain:
     def records(self, targets: ReachableTargets) -> Array:
         """Whitened records (n, 3, 3 + p)."""
         jacobian, by_joints = position_derivatives(self.belief, targets)
-        return whitened(jacobian, record_weights(by_joints, self.belief.noise))
+        return whitened(jacobian, self.belief.noise.record_weights(by_joints))
 
     def climbed(
         self, at: Slopes, point: int, targets: ReachableTargets, random: np.random.Generator

@@ -93,6 +93,14 @@ class Noise:
         scaled = np.array(self.gauge_axes) * self.gauges_mm
         return np.asarray(scaled @ scaled.T)
 
+    def record_covariance(self, position_by_joints: Array) -> Array:
+        """Covariance (n, 3, 3), mm^2, of records by ``dP/dq`` (n, 3, 6), from encoder and gauge noise."""
+        return np.asarray(self.encoder_covariance(position_by_joints) + self.gauge_covariance)
+
+    def record_weights(self, position_by_joints: Array) -> Array:
+        """Weights (n, 3, 3), 1/mm^2, of records by ``dP/dq`` (n, 3, 6): the inverse of their covariance."""
+        return np.linalg.inv(self.record_covariance(position_by_joints))
+
 
 @dataclass(frozen=True, slots=True)
 class Tolerances:

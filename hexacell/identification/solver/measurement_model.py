@@ -18,11 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.identification.problem.prior import Noise
 from hexacell.identification.problem.problem import Problem
 from hexacell.kinematics.forward import ForwardResult, apply_twist, forward_kinematics
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array, Mask, skew
+from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import free_sensitivity
 
 LARGEST_AMPLIFICATION = 100.0
@@ -71,7 +70,7 @@ def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
         free=free,
         poses=poses,
         residuals=poses.positions - problem.deviations,
-        weights=record_weights(by_joints, problem.noise),
+        weights=problem.noise.record_weights(by_joints),
         pose_jacobian=sensitivity.free,
         by_joints=by_joints,
         mode=sensitivity.mode,
@@ -95,16 +94,6 @@ def evaluate_step(problem: Problem, present: Prediction, step: Array) -> Forward
 def is_singular(position_by_joints: Array) -> Mask:
     """Whether each record is next to a singularity, by ``dP/dq`` (n, 3, 6)."""
     return np.asarray(np.linalg.norm(position_by_joints, axis=(-2, -1)) > LARGEST_AMPLIFICATION)
-
-
-def record_covariance(position_by_joints: Array, noise: Noise) -> Array:
-    """Covariance (n, 3, 3), mm^2, of records by ``dP/dq`` (n, 3, 6), from encoder and gauge noise."""
-    return np.asarray(noise.encoder_covariance(position_by_joints) + noise.gauge_covariance)
-
-
-def record_weights(position_by_joints: Array, noise: Noise) -> Array:
-    """Weights (n, 3, 3), 1/mm^2, of records by ``dP/dq`` (n, 3, 6): the inverse of their covariance."""
-    return np.linalg.inv(record_covariance(position_by_joints, noise))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,7 +127,8 @@ class NuisanceElimination:
         self._turns = noise.alignment > 0.0
         self._design: Array = np.broadcast_to(np.eye(3), (problem.records, 3, 3))  # by c, and by w
         if self._turns:
-            self._design = np.concatenate([self._design, -skew(problem.deviations)], axis=-1)
+            by_turn = np.cross(np.eye(3), problem.deviations[:, None])  # in rows
+            self._design = np.concatenate([self._design, np.swapaxes(by_turn, -1, -2)], axis=-1)
             normal = problem.group_sums(np.swapaxes(self._design, -1, -2) @ weights @ self._design)
             normal[:, range(3, 6), range(3, 6)] += noise.alignment**-2
         else:

@@ -66,7 +66,7 @@ def test_lines_are_checked_where_the_controller_moves(exactly):
     start, end = at(0, 0, 550, -20, 15, 30), at(10, -20, 540, 15, -20, 10)
     belief = exactly(frames=TURNED)
     checked = LinesFrom(belief, TURNED.poses(start)).check(TURNED.poses(end))
-    moved = TURNED.inverse().poses(checked.commands.reshape(-1))
+    moved = TURNED.inverse().poses(checked.commands.in_shape(-1))
     np.testing.assert_allclose(moved.numbers(), interpolate_line(start, end).numbers(), atol=1e-9)
 
 

@@ -20,7 +20,7 @@ def commanded(hexaglide, paper):
     """Lines from the first point to many orientations that the controller can reach, and their joints."""
     ends = PoseBatch.at([10.0, -20.0, 540.0], TURNS)
     ways = interpolate_lines((START, ends))
-    joints = hexaglide.inverse(paper.nominal, paper.branch, ways.reshape(-1)).reshape(-1, len(ends), 6)
+    joints = hexaglide.inverse(paper.nominal, paper.branch, ways.in_shape(-1)).reshape(-1, len(ends), 6)
     rows = np.flatnonzero(np.isfinite(joints).all(axis=(0, 2)))
     return ways[:, rows], joints[:, rows]
 

@@ -22,7 +22,6 @@ from hexacell.identification.problem.prior import (
     drift_sigma,
 )
 from hexacell.identification.problem.problem import Assumptions
-from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
@@ -82,7 +81,7 @@ def test_the_marginal_likelihood_is_that_of_a_normal_distribution(
         jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses, records.joints))
         errors = poses.positions - frames.deviations(records.deviations)
         own = np.zeros((12, 3, 12, 3))
-        for row, value in enumerate(record_covariance(by_joints, noise)):
+        for row, value in enumerate(noise.record_covariance(by_joints)):
             own[row, :, row] = value
         flat = jacobian.reshape(36, -1)
         total = own.reshape(36, 36) + scale**2 * flat @ covariance @ flat.T

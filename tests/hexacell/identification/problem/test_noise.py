@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from hexacell.identification.problem.prior import Noise
-from hexacell.identification.solver.measurement_model import record_covariance
 
 ENCODERS = (0.01, 0.02, 0.005, 0.01, 0.03, 0.01)
 GAUGES = (0.004, 0.05, 0.01)
@@ -26,5 +25,5 @@ def test_the_covariance_of_a_record_is_that_of_drawn_records() -> None:
     encoders = ENCODERS * random.standard_normal((200_000, 6))
     drawn = encoders @ by_joints.T + GAUGES * random.standard_normal((200_000, 3))
     noise = Noise(1.0, 1.0).with_devices(ENCODERS, GAUGES)
-    covariance = record_covariance(by_joints[None], noise)[0]
+    covariance = noise.record_covariance(by_joints[None])[0]
     assert covariance == pytest.approx(np.cov(drawn.T), rel=0.02, abs=2e-5)

@@ -8,10 +8,8 @@ from __future__ import annotations
 import os
 
 SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
-    "against_the_paper": {"SETS": (100, 100)},
     "change_alarm": {"RUNS": (60, 200)},
     "check": {"RUNS": (8, 100)},
-    "convergence": {"ROBOTS": (300, 1000)},
     "damaged_lines": {"FRAMES": (5_000, 1_000_000)},
     "design_efficiency": {"ROBOTS": (10, 24)},
     "drift_watch": {"CELLS": (6, 100), "STEPS": (60, 300)},
@@ -22,15 +20,14 @@ SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
     "healthy_robots": {"ROBOTS": (30, 1000)},
     "long_polling": {"HOURS": (1, 24)},
     "mechanisms": {"FAULTY": (16, 100), "ROBOTS": (6, 100)},
-    "motion_limits": {"CAMPAIGNS": (6, 1000), "COMPARED": (4, 6)},
+    "motion_limits": {"CAMPAIGNS": (8, 1000), "COMPARED": (4, 6)},
     "mutations": {"MUTATIONS": (60, 10_000)},
-    "orientations": {"ROBOTS": (20, 1000)},
     "paper_study": {"DRAWS": (20, 20)},
     "peers": {"ROBOTS": (2, 6)},
     "quick_level": {"ROBOTS": (12, 100)},
     "recalibration": {"MACHINES": (4, 100)},
     "screen_speed": {"RUNS": (3, 5)},
-    "statistics": {"SETS": (1000, 1000)},
+    "statistics": {"PAIRED": (100, 100), "ROBOTS": (300, 1000), "SETS": (1000, 1000)},
     "study_speed": {"ROBOTS": (24, 200)},
     "tolerances": {"BUILT": (300, 1500)},
     "worlds": {"RUNS": (1, 34)},

@@ -1,7 +1,6 @@
 """How long it takes to choose the next pose: with refit and forecast, at 44 to 54 records.
 
-Times are of the processor, the quickest of some repeats. What must hold on any machine is the ratio to
-numpy's time for many small solves.
+Times are of the processor, the quickest of some repeats.
 """
 
 from __future__ import annotations
@@ -29,8 +28,6 @@ from tests.benchmarks.virtual_calibration import robot_that_reaches
 LATE = range(44, 55)
 REPEATS = 5
 MOST_MS = 15.0
-SMALL_SOLVES = 1000
-MOST_REFERENCES = 1.9
 
 Moment = tuple[Plan, CampaignState, MeasurePose]
 """A plan, a state, and what was decided."""
@@ -72,20 +69,8 @@ def seconds_of(moment: Moment) -> float:
     return min(taken)
 
 
-def reference_seconds() -> float:
-    """numpy's time for many solves of a few 6 x 6 systems."""
-    matrices, values = np.eye(6) + 0.01 * np.ones((12, 6, 6)), np.ones((12, 6, 1))
-    begun = time.process_time()
-    for _ in range(SMALL_SOLVES):
-        np.linalg.solve(matrices, values)
-    return time.process_time() - begun
-
-
 def test_a_late_decision(campaign, figure) -> None:
     moments, seconds = campaign
-    reference = min(reference_seconds() for _ in range(REPEATS))
     late = float(np.median([seconds_of(moment) for moment in moments]))
-    reference = min(reference, *(reference_seconds() for _ in range(REPEATS)))
     figure("a decision at 44 to 54 records", 1e3 * late, "ms", at_most(MOST_MS))
-    figure("  as a multiple of 1,000 small solves", late / reference, "", at_most(MOST_REFERENCES))
     figure("a campaign of 55 records, deciding and measuring virtually", seconds, "s")

@@ -1,4 +1,4 @@
-"""The errors of the estimator against the Cramer-Rao bound, and the coverage of its intervals.
+"""The errors of the estimator: against the Cramer-Rao bound, beside the paper's, and from any drawing.
 
 1,000 data sets of the Table 1 robot, 5 points x 11 orientations within +-30 deg, 0.01 mm noise on
 joint variables and deviations: errors against the Cramer-Rao bound, which is computed here from
@@ -11,16 +11,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexacell.errors import ConvergenceError, LimitError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.forward import continue_solution, forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.rotations import Array
+from hexacell.robot.virtual_robot import random_robot
 from hexacell.study import data_sets
-from tests.benchmarks.figures import at_least, at_most, between
+from hexacell.study.reference_solvers import gauss_newton
+from tests.benchmarks.figures import NEVER, at_least, at_most, between
 from tests.benchmarks.samples import sample
+from tests.records_within_travel import within_travel
 
-SETS = sample(__name__, "SETS")
+SETS, PAIRED, ROBOTS = (sample(__name__, name) for name in ("SETS", "PAIRED", "ROBOTS"))
+SIGMAS = 6.0
 NOISE_MM = 0.01
 STEP_MM = 1e-4
 
@@ -115,3 +120,51 @@ def test_errors_and_intervals_are_those_of_the_cramer_rao_bound(table_one, figur
     figure("  most covered parameter", each.max(), "%", at_most(97.5))
     share = 100 * outcome.removed / outcome.records
     figure("clean records taken for gross errors", share, "%", at_most(0.1))
+
+
+def test_error_is_at_least_halved(table_one, figure) -> None:
+    """Records as the paper simulates them: kept if they can be reached, however near a singularity."""
+    robot, truth = table_one.robot, table_one.truth
+    ours, paper, diverged = [], [], 0
+    for seed in range(PAIRED):
+        random = np.random.default_rng(seed)
+        campaign = data_sets.unlimited_travel(
+            robot, truth, table_one.points, 11, np.radians(30), random, margin=0.0
+        )
+        problem = robot.problem(campaign.measured(0.01, random))
+        found = identify(problem)
+        ours.append(found.geometry.largest_difference(truth))
+        try:
+            paper.append(gauss_newton(problem).largest_difference(truth))
+        except ConvergenceError:
+            # From the drawing it does not always arrive; its minimum is then looked for from ours.
+            diverged += 1
+            paper.append(gauss_newton(found.problem, start=found).largest_difference(truth))
+    before, after = np.median(paper), np.median(ours)
+    figure("largest parameter error, median: paper's least squares", before, "mm")
+    figure("  ours on the same records", after, "mm")
+    figure("  ours over the paper's", after / before, "", at_most(0.5))
+    figure(f"  data sets of {PAIRED} on which eq. 13 diverges from the drawing", diverged)
+
+
+def test_every_robot_is_found(table_one, figure) -> None:
+    """From the drawing, whatever its errors within +-7 mm are."""
+    robot = table_one.robot
+    unreachable, failed, wrong, short = 0, 0, 0, 0
+    for seed in range(ROBOTS):
+        random = np.random.default_rng(seed)
+        truth = random_robot(robot.mechanism, robot.drawing, robot.tolerances, random)
+        try:
+            campaign = within_travel(robot, truth, table_one.points, 11, np.radians(30), random)
+        except LimitError:
+            unreachable += 1
+            continue
+        found = identify(robot.problem(campaign.measured(0.01, random)))
+        error = np.abs(found.free - robot.mechanism.convention.free_parameters(truth))
+        failed += not found.converged
+        wrong += bool((error > SIGMAS * np.sqrt(np.diag(found.free_covariance))).any())
+        short += found.records < len(campaign.joints)
+    figure(f"of {ROBOTS} robots with +-7 mm errors: points out of reach, left out", unreachable)
+    figure("  of the others did not converge from the drawing", failed, "", NEVER)
+    figure("  farther than 6 sigma from the truth (a wrong mode)", wrong, "", NEVER)
+    figure("  identified without one or two records next to a singularity", short)

@@ -58,15 +58,9 @@ class TaskErrors:
     once: Array
 
     @property
-    def distances(self) -> Array:
-        """Expected errors (n,), mm."""
-        distances: Array = np.linalg.norm(self.vectors, axis=-1)
-        return distances
-
-    @property
     def largest_mm(self) -> float:
         """At the worst task pose."""
-        return float(self.distances.max())
+        return float(np.linalg.norm(self.vectors, axis=-1).max())
 
     @property
     def largest_once_mm(self) -> float:

@@ -61,10 +61,10 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None]:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """A benchmark that ends otherwise is no figure less: the file says so."""
+    """One that ends otherwise, or is skipped, is no figure less: the file says so."""
     report = yield
     figures = item.stash[MISSED]
-    if report.failed and call.excinfo is not None and figures.file is not None and not figures.missed:
+    if not report.passed and call.excinfo is not None and not figures.missed:
         words = " ".join(f"{call.excinfo.typename}: {call.excinfo.value}".split())
         figures(DID_NOT_END, words[:120])
     return report

@@ -10,7 +10,7 @@ import math
 import os
 import platform
 import subprocess
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -107,10 +107,6 @@ class Figure:
     def shown(self) -> str:
         value = f"{self.value:.4g}" if isinstance(self.value, float) else str(self.value)
         return f"{'-' if self.value is None else value} {self.unit}".strip()
-
-
-Say = Callable[..., None]
-"""``figure(name, value, unit="", target=None)``: see :class:`Figures`."""
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,6 @@ AS_BUNDLED = ("identification", "verification", "noise.encoder", "noise.gauge", 
 
 DEAD_GAUGE = {"simulation.faults": (SimulatedFault(kind="silent", device="y"),)}
 FULL_DISK = {"guards.free_disk_mb": 1e12}
-POWER_CUT: dict[str, Any] = {}
 
 
 @dataclass

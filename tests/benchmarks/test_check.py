@@ -158,12 +158,12 @@ def test_verdicts(figure):
         verdicts = Counter(one.verdict.value for one in found)
         figure(f"checks of robots, {name}", ", ".join(f"{n} {word}" for word, n in verdicts.items()))
         for words, kind in (("U", "expanded_mm"), ("true error", "true_mm")):
-            figure(f"  {words}, median", np.median([getattr(one, kind) for one in found]), "mm")
-        figure("  records outside the travel", sum(one.outside for one in found), "", NEVER)
+            figure(f"  {name}: {words}, median", np.median([getattr(one, kind) for one in found]), "mm")
+        figure(f"  {name}: records outside the travel", sum(one.outside for one in found), "", NEVER)
         if name in DRIFTED:
             least, most = DRIFTED[name][1]
             covered = np.mean([one.is_covered for one in found])
-            figure("  U covers", covered, "", between(least - ALLOWANCE, most + ALLOWANCE))
+            figure(f"  {name}: U covers", covered, "", between(least - ALLOWANCE, most + ALLOWANCE))
     unchanged = outcomes[UNCHANGED]
     figure("unchanged robots pass", passes(unchanged), "", at_least(0.98 - ALLOWANCE))
     figure("  records, median", np.median([one.records for one in unchanged]), "", at_most(20))

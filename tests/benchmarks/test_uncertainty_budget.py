@@ -6,15 +6,14 @@ without the first-order propagation that is under test, is measured by ``test_wo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
-from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.cell.uncertainty import Grade, UncertaintySettings
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.parameters import MachinePart
@@ -51,24 +50,12 @@ TABLE: tuple[tuple[str, Effect, float], ...] = (
     ("all 1 K warmer at work, aluminium", temperature_at_work(1.0, ALUMINIUM), 0.006),
     ("20 N at 0.05 um/N a leg", load_at_work(20.0, 0.05), 0.040),
 )
-SUMS = {"ideal": 0.063, "precision": 0.115, "ordinary": 0.161}
+SUMS: dict[Grade, float] = {"ideal": 0.063, "precision": 0.115, "ordinary": 0.161}
 """U by grade."""
 
 
-@dataclass(frozen=True, eq=False)
-class Bench:
-    """Poses of the task at which the robot is judged, and what was found of it."""
-
-    settings: CellSettings
-    propagation: Propagation
-
-    def budget(self, effects: tuple[Effect, ...]) -> UncertaintyBudget:
-        return UncertaintyBudget.of(self.propagation, effects)
-
-
-@pytest.fixture(scope="module")
-def bench(table_one) -> Bench:
-    settings = bundled().settings
+def propagation_of(table_one, settings: CellSettings) -> Propagation:
+    """Of a calibration, to the poses of the task at which the robot is judged."""
     # Passive joints of the independent simulation allow all poses within 45 deg.
     robot = replace(table_one.robot, limits=replace(table_one.robot.limits, legs=None))
     virtual = VirtualRobot(robot, table_one.truth, np.random.default_rng(1))
@@ -78,27 +65,25 @@ def bench(table_one) -> Bench:
     found = identify(robot.problem(campaign.measurements), find_outliers=False)
     belief = robot.belief(found)
     reached = Task.of(settings, robot, belief).reachable(belief)
-    propagation = Propagation.of(found, belief, task=reached.poses, workspace=reached.workspace)
-    return Bench(settings, propagation)
+    return Propagation.of(found, belief, task=reached.poses, workspace=reached.workspace)
 
 
-def test_each_effect_is_as_large_as_an_independent_simulation_says(bench: Bench, figure) -> None:
-    budget = bench.budget(tuple(effect for _, effect, _ in TABLE))
+def test_effects_and_their_sums_are_as_large_as_an_independent_simulation_says(table_one, figure) -> None:
+    settings = bundled().settings
+    propagation = propagation_of(table_one, settings)
+    budget = UncertaintyBudget.of(propagation, tuple(effect for _, effect, _ in TABLE))
     for (name, _, beside), line in zip(TABLE, budget.lines, strict=True):
         near = between(0.5 * beside - 5e-4, 1.5 * beside + 5e-4)
         figure(f"{name}, at the worst task pose, mm: through the result", line.through_mm)
         figure(f"{name}: directly", line.direct_mm)
         figure(f"{name}: both, an independent simulation {beside}", line.combined_mm, "", near)
-    stops = bench.budget((stop_repeatability(5.0),)).lines[0]
+    stops = UncertaintyBudget.of(propagation, (stop_repeatability(5.0),)).lines[0]
     words = "repeatability 5 um a slider, mm:"
     figure(f"{words} through the result", stops.through_mm, "", between(0.75 * 0.018, 1.25 * 0.018))
     figure(f"{words} directly", stops.direct_mm, "", between(0.98 * 0.038, 1.02 * 0.038))
-
-
-@pytest.mark.parametrize("grade", SUMS)
-def test_the_sum_of_a_grade(bench: Bench, grade, figure) -> None:
-    stated = bench.settings.model_copy(update={"uncertainty": UncertaintySettings(grade=grade)})
-    budget = bench.budget(stated_effects(stated))
-    figure(f"systematic u, grade {grade}", budget.systematic_mm, "mm")
-    figure("  u", budget.standard_mm, "mm")
-    figure("  U", budget.expanded_mm, "mm", between(0.8 * SUMS[grade], 1.2 * SUMS[grade]))
+    for grade, expanded in SUMS.items():
+        of_grade = settings.model_copy(update={"uncertainty": UncertaintySettings(grade=grade)})
+        budget = UncertaintyBudget.of(propagation, stated_effects(of_grade))
+        figure(f"systematic u, grade {grade}", budget.systematic_mm, "mm")
+        figure(f"  u, {grade}", budget.standard_mm, "mm")
+        figure(f"  U, {grade}", budget.expanded_mm, "mm", between(0.8 * expanded, 1.2 * expanded))

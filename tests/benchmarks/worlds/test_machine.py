@@ -224,27 +224,11 @@ def test_stands_drift_and_are_pushed_until_they_are_placed_anew():
     assert not pushed[20:].any()
 
 
-def test_backlash_is_on_the_side_that_a_slider_came_from():
-    own = stops()
-    error = encoders.hysteresis(0.002).encoder_error(own, own.joints)
-    assert np.array_equal(error[1:] > 0, np.diff(own.joints, axis=0) > 0)
-    assert np.allclose(np.abs(error), 0.002)
-
-
 @pytest.mark.parametrize("name", ["gauges noisier", "gauges, long tails"])
 def test_noise_is_as_many_times_the_stated_one(name):
     effect = KINDS[name].world(5.0, np.random.default_rng(1))  # 1 + 5 * 0.2 times the stated noise
     more = effect.gauge_error(stops(1, 40_000), np.zeros((40_000, 3)))
     assert np.hypot(np.std(more), STATED_MM) == pytest.approx(2.0 * STATED_MM, rel=0.05)
-
-
-def test_a_hundredth_of_the_readings_are_outliers():
-    many = stops(1, 40_000)
-    of_gauges = gauges.outliers(1.0).gauge_error(many, np.zeros((40_000, 3))) != 0
-    assert np.mean(of_gauges) == pytest.approx(0.01, rel=0.1)
-    hit = encoders.outliers(1.0).encoder_noise(many) != 0
-    assert hit.any(axis=1).mean() == pytest.approx(0.01, rel=0.2)
-    assert hit.sum(axis=1).max() == 1
 
 
 def test_what_is_random_is_the_same_when_asked_twice_and_another_for_each_effect():

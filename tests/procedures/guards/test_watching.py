@@ -13,7 +13,7 @@ from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError, HexacellError, LimitError
 from hexacell.limits.gauge_travel import GaugeRoom
 from procedures.guards.polling import DevicePoller, LineActivity, PolledDevices
-from procedures.guards.rules.base import GuardLimits
+from procedures.guards.rules import GuardLimits
 from procedures.guards.supervision import GuardMonitor
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey

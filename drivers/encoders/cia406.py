@@ -10,12 +10,12 @@ from typing import ClassVar
 from drivers.encoders.bank import BankSession, ThreadedBank, bus_settings
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand
-from drivers.encoders.electronic_data_sheet import read_data_sheet
 from drivers.encoders.node_identity import (
     SECOND_RESPONSE_S,
     check_serial_number,
     check_step,
     detect_nodes,
+    read_data_sheet,
     read_device_type,
     read_identity,
 )

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from drivers.encoders.electronic_data_sheet import read_data_sheet
+from drivers.encoders.node_identity import read_data_sheet
 from drivers.encoders.object_dictionary import DEVICE_TYPE, PRESET, PRODUCT, VENDOR
 from hexacell.errors import DeviceError, FileError
 

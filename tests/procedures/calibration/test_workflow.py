@@ -20,8 +20,8 @@ from procedures.run.state import fold
 from procedures.steps import events
 from procedures.steps.move import Move
 from procedures.steps.place import Place
-from procedures.steps.roll_back import RollBack
 from procedures.steps.sample import Sample
+from procedures.steps.write_back import RollBack
 from procedures.workflow import sets as path_planning
 from procedures.workflow.points import IdentificationSteps
 from tests.procedures.identified import an_identification

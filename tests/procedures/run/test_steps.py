@@ -18,8 +18,8 @@ from procedures.steps.events import EVENTS
 from procedures.steps.move import Move
 from procedures.steps.pilot import Pilot
 from procedures.steps.registry import STEPS, Step
-from procedures.steps.roll_back import RollBack
 from procedures.steps.sample import Sample
+from procedures.steps.write_back import RollBack
 from tests.procedures.identified import an_identification
 
 POSE = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)

@@ -6,10 +6,7 @@ from collections.abc import Callable
 
 from drivers.gauges.cdi import CdiGauge
 from drivers.gauges.described import RequestGauge, StreamGauge
-from drivers.gauges.digimatic_usb import DigimaticUsbGauge
-from drivers.gauges.heidenhain_nd import HeidenhainGauge
-from drivers.gauges.keyence_dl_rs1a import KeyenceGauge
-from drivers.gauges.mitutoyo_id_h import IdHGauge
+from drivers.gauges.displays import DigimaticUsbGauge, HeidenhainGauge, IdHGauge, KeyenceGauge
 from drivers.gauges.modbus import ModbusGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.serial_gauge import SerialGauge

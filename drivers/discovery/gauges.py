@@ -20,7 +20,7 @@ from drivers.errors import (
     ZeroVoid,
 )
 from drivers.gauges.protocol import Probe
-from drivers.gauges.visa import IDENTIFY, VisaGauge, VisaPort
+from drivers.gauges.visa import IDENTIFY, VisaGauge, line_to
 from drivers.interfaces import Gauge
 from drivers.serial.port import SerialPort
 from drivers.serial.request_port import NoAnswer
@@ -121,7 +121,8 @@ async def _identify(resource: str, timeout_s: float) -> PortFindings:
     """The instrument at a VISA resource."""
 
     def name() -> str:
-        with closing(VisaPort(resource, {}, threading.Event())) as port, suppress(NoAnswer):
+        line, address = line_to(resource)
+        with closing(line(address, {}, threading.Event())) as port, suppress(NoAnswer):
             port.open()
             answer = port.exchange(IDENTIFY, VisaGauge.terminator, timeout_s)
             return answer.decode("ascii", "replace").strip()

@@ -1,9 +1,9 @@
 """Identification of the nodes: each must respond, be the only one with its id, and match the cell file.
 
-Every function raises a ``DeviceError`` that names the leg where that is not so. An electronic data sheet (an
-EDS file, CiA 306) says what the maker delivers. A node of another type, vendor or product is not the device
-that the cell was set up with; settings that differ from the file's defaults were changed since, perhaps on
-purpose.
+Every function raises a ``DeviceError`` that names the leg where that is not so. An electronic data sheet
+(an EDS file, CiA 306) says what the maker delivers. A node of another type, vendor or product is not the
+device that the cell was set up with; settings that differ from the file's defaults were changed since,
+perhaps on purpose.
 """
 
 from __future__ import annotations

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import re
 import termios
-import time
 from contextlib import suppress
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 from drivers.errors import PortLost, WrongSetting
@@ -26,8 +25,8 @@ from drivers.gauges.protocol import (
 )
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.libraries import optional
-from drivers.serial.framing import FRAME_LIMIT
-from drivers.serial.opening import SLICE_S, lost_port
+from drivers.serial.opening import lost_port
+from drivers.serial.port import SerialPort
 from drivers.serial.request_port import NoAnswer, RequestPort
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.wire_trace import TrafficDirection
@@ -37,13 +36,8 @@ from hexacell.errors import DeviceError
 EXTRA = "visa"
 PURE_PYTHON = "@py"
 MS = 1000.0
-SURPLUS_S = 0.002
-FRAME_GAP_S = 0.04
-BYTE_STREAMS = ("::SOCKET", "ASRL")
-SERIAL = "ASRL"
-LINE_ATTRIBUTES = {"baudrate": "baud_rate", "bytesize": "data_bits"}
-PARITIES = {"N": "none", "E": "even", "O": "odd", "M": "mark", "S": "space"}
-STOP_BITS = {1: "one", 1.5: "one_and_a_half", 2: "two"}
+SOCKET = re.compile(r"TCPIP\d*::(?P<host>[^:]+)::(?P<port>\d+)::SOCKET", re.IGNORECASE)
+SERIAL = re.compile(r"ASRL(?P<port>.+?)(?:::INSTR)?", re.IGNORECASE)
 IDENTIFY = b"*IDN?\n"
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[Ee][+-]?\d{1,3})?")
 TEXT = re.compile(rb"[ -~]{1,200}")
@@ -51,49 +45,66 @@ INFINITE = 9.9e37
 NO_NUMBER = 9.91e37
 
 
-class VisaPort(RequestPort):
-    """One VISA resource; ``settings`` are ``backend`` and, of a serial one, those of the line.
+def line_to(resource: str) -> tuple[type[RequestPort], str]:
+    """The line to a VISA resource, and its address: pyserial's where it is a stream of bytes.
 
-    Sockets and serial lines are read byte by byte, so that closing never waits long, and are silent for
-    ``worst_latency_s`` after a time-out before the next request. Others (USB, LAN, GPIB) carry whole
-    messages: they are read with the time-out at once, and cleared after one.
+    A serial resource with a number is named as VISA libraries do on Linux: ``ASRL1`` is ``/dev/ttyS0``.
+    """
+    if match := SOCKET.fullmatch(resource):
+        return SerialPort, f"socket://{match['host']}:{match['port']}"
+    if match := SERIAL.fullmatch(resource):
+        port = match["port"]
+        return SerialPort, f"/dev/ttyS{int(port) - 1}" if port.isdecimal() else port
+    return VisaPort, resource
+
+
+class VisaPort(RequestPort):
+    """One VISA resource that carries whole messages (USB, LAN, GPIB); ``settings`` is its ``backend``.
+
+    A message is awaited for the whole time-out at once. The resource is cleared after none came in time.
     """
 
     _resource: Any = None
     _visa: Any = None
-    _gap_s = SURPLUS_S
-
-    @cached_property
-    def _is_stream(self) -> bool:
-        return any(word in self.url.upper() for word in BYTE_STREAMS)
 
     def open(self) -> int:
         """Open the resource unless it is open; how often it has been opened."""
         self.require_not_closed()
         if self._resource is None:
             self._visa = optional("pyvisa", EXTRA, self.subject)
-            self._resource = self._opened()
+            backend = str(self._settings.get("backend", PURE_PYTHON))
+            try:
+                self._resource = self._visa.ResourceManager(backend).open_resource(self.url)
+            except Exception as error:  # its backends raise anything, also Exception itself
+                raise PortLost(
+                    f"port {self.url} cannot be opened: {error}",
+                    subject=self.subject,
+                    action="Check the instrument and port in the cell file",
+                ) from error
             self.open_count += 1
             self._must_clear = False
         return self.open_count
 
     def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
-        """Send ``request``; its answer up to ``terminator``."""
+        """Send ``request``; its answer, which ends with ``terminator``."""
         self.require_not_closed()
         if self._resource is None:
             raise lost_port(self.subject, self.url, "it is not open", "Connect it")
         try:
             if self._must_clear:
-                self._clear()
-            elif self._is_stream:
-                self._drop_surplus()
+                self._resource.clear()
+                self._must_clear = False
             self._record(TrafficDirection.SENT, request)
             self._resource.timeout = MS * timeout_s  # of writing too
             self._resource.write_raw(request)
-            return self._answer(terminator, timeout_s)
+            received = self._message()
         except (OSError, termios.error, self._visa.errors.Error) as error:
             self.close()
             raise lost_port(self.subject, self.url, str(error), "Connect it") from error
+        if not received.endswith(terminator):
+            self._must_clear = True
+            raise NoAnswer(received)
+        return received
 
     def close(self) -> None:
         """Close the resource; closing twice is harmless."""
@@ -102,80 +113,16 @@ class VisaPort(RequestPort):
             with suppress(Exception):  # it may be gone already
                 resource.close()
 
-    def _opened(self) -> Any:  # noqa: ANN401 - of a library that may be missing
+    def _message(self) -> bytes:
+        """A message; nothing if none comes in time."""
         try:
-            backend = str(self._settings.get("backend", PURE_PYTHON))
-            resource = self._visa.ResourceManager(backend).open_resource(self.url)
-            if self.url.upper().startswith(SERIAL):
-                self._set_line(resource)
-        except Exception as error:  # its backends raise anything, also Exception itself
-            raise PortLost(
-                f"port {self.url} cannot be opened: {error}",
-                subject=self.subject,
-                action="Check the instrument and port in the cell file",
-            ) from error
-        return resource
-
-    def _set_line(self, resource: Any) -> None:  # noqa: ANN401
-        constants = self._visa.constants
-        given: dict[str, Any] = {**self._settings}
-        for name, attribute in LINE_ATTRIBUTES.items():
-            if name in given:
-                setattr(resource, attribute, given[name])
-        if "parity" in given:
-            resource.parity = constants.Parity[PARITIES[given["parity"]]]
-        if "stopbits" in given:
-            resource.stop_bits = constants.StopBits[STOP_BITS[given["stopbits"]]]
-        resource.end_input = constants.SerialTermination.none
-
-    def _answer(self, terminator: bytes, timeout_s: float) -> bytes:
-        received = b""
-        deadline_s = time.monotonic() + timeout_s
-        while not received.endswith(terminator):
-            if time.monotonic() > deadline_s or len(received) > FRAME_LIMIT:
-                self._must_clear = True
-                raise NoAnswer(received)
-            received += self._some(timeout_s).lstrip(b"\r\n\0" if not received else b"")
-        return received
-
-    def _some(self, timeout_s: float) -> bytes:
-        """A byte of a stream, or a message; nothing if none comes in time."""
-        self.require_not_closed()
-        self._resource.timeout = MS * (min(SLICE_S, timeout_s) if self._is_stream else timeout_s)
-        try:
-            data: bytes = self._resource.read_bytes(1) if self._is_stream else self._resource.read_raw()
+            data: bytes = self._resource.read_raw()
         except self._visa.errors.VisaIOError as error:
             if error.error_code == self._visa.constants.StatusCode.error_timeout:
                 return b""
             raise
         self._record(TrafficDirection.RECEIVED, data)
-        return data
-
-    def _clear(self) -> None:
-        """Let late answers come and go."""
-        if not self._is_stream:
-            self._resource.clear()
-        quiet_from_s = time.monotonic()
-        give_up_s = quiet_from_s + 5 * self._worst_latency_s
-        while self._is_stream and time.monotonic() < quiet_from_s + self._worst_latency_s:
-            if self._some(SLICE_S):
-                quiet_from_s = time.monotonic()
-                self.surplus_count += 1
-            if quiet_from_s > give_up_s:
-                raise DeviceError(f"the device on {self.url} keeps sending unasked", subject=self.subject)
-        self._must_clear = False
-
-    def _drop_surplus(self) -> None:
-        """Drop what came after the last answer.
-
-        After the first such bytes every question waits until the line is silent.
-        """
-        received = False
-        while self._some(self._gap_s):
-            received = True
-        if received and self._gap_s < FRAME_GAP_S:
-            self.surplus_count += 1
-            self._gap_s = FRAME_GAP_S
+        return data.lstrip(b"\r\n\0")
 
 
 class VisaGauge(SerialGauge):
@@ -184,9 +131,11 @@ class VisaGauge(SerialGauge):
     spec = ProtocolSpec("visa", "instrument with SCPI", LineSettings(9600), "+1.23450000E-03\n")
     probe = None
     terminator = b"\n"
-    port_factory = VisaPort
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
+        if settings.port is not None:
+            self.port_factory, address = line_to(settings.port)
+            settings = settings.model_copy(update={"port": address})
         super().__init__(settings, ports)
         self._visa = self._described(settings.visa, "does not say what is asked", "visa = { ask = ... }")
         self.channel = settings.channel if self._visa.has_channel else None
@@ -194,7 +143,8 @@ class VisaGauge(SerialGauge):
         self._decimals = decimals_of(settings.resolution_mm or 0.001)
 
     def _line_settings(self) -> dict[str, object]:
-        return {**self.settings.serial, "backend": self._visa.backend}
+        is_stream = self.port_factory is SerialPort
+        return super()._line_settings() if is_stream else {"backend": self._visa.backend}
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
         text = frame.strip().decode("latin-1")

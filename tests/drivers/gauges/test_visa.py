@@ -1,4 +1,4 @@
-"""Instruments with SCPI, through PyVISA's pure-Python backend, on sockets and pseudo-terminals."""
+"""Instruments with SCPI, on sockets and pseudo-terminals."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ async def test_three_inputs_of_one_instrument_are_read_at_once(transport):
         made.balls["y"] = -2.125
         readings = await asyncio.gather(*(gauge.read() for gauge in made.gauges.values()))
         assert [reading.value_mm for reading in readings] == pytest.approx([1.0, -2.125, 3.0], abs=1e-6)
-        assert str(made.gauges["x"].settings.port).startswith("TCPIP" if transport == "socket" else "ASRL")
+        assert str(made.rack.gauges[0].port).startswith("TCPIP" if transport == "socket" else "ASRL")
         for gauge in made.gauges.values():
             await gauge.check()
 
@@ -96,15 +96,13 @@ async def test_what_is_no_value_is_told(answer, error, message):
 
 async def test_a_resource_that_is_not_there_is_told():
     settings = GaugeSettings(name="x", axis="x", protocol="visa", visa=SCPI, port="ASRL/dev/nowhere::INSTR")
-    with pytest.raises(PortLost, match="gauge x: port ASRL/dev/nowhere::INSTR cannot be opened"):
+    with pytest.raises(PortLost, match="gauge x: port /dev/nowhere is absent"):
         await VisaGauge(settings, SharedSerialPorts()).open()
 
 
 async def test_without_the_extra_the_command_that_installs_it_is_told(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyvisa", None)
-    settings = GaugeSettings(
-        name="x", axis="x", protocol="visa", visa=SCPI, port="TCPIP::127.0.0.1::1::SOCKET"
-    )
+    settings = GaugeSettings(name="x", axis="x", protocol="visa", visa=SCPI, port="USB::1::2::3::INSTR")
     ports = SharedSerialPorts()
     with pytest.raises(UsageError, match=r"needs pyvisa, .*Type: pip install 'hexacell\[visa\]'"):
         await VisaGauge(settings, ports).open()
@@ -114,3 +112,44 @@ async def test_without_the_extra_the_command_that_installs_it_is_told(monkeypatc
 def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file():
     with pytest.raises(FileError, match="gauge x: does not say what is asked"):
         VisaGauge(GaugeSettings(name="x", axis="x", protocol="visa"), SharedSerialPorts())
+
+
+class Usb:
+    """What PyVISA opens for an instrument on USB: it answers every question with the next message."""
+
+    def __init__(self, library: Any) -> None:
+        self.answers = [b"HEXACELL,USB,0,1\n", b"M\n", b"4\n"]
+        self.library, self.cleared, self.timeout = library, 0, 0.0
+
+    def open_resource(self, _name: str) -> Usb:
+        return self
+
+    def write_raw(self, _request: bytes) -> None:
+        """Nothing is done with it."""
+
+    def read_raw(self) -> bytes:
+        if not self.answers:
+            raise self.library.errors.VisaIOError(self.library.constants.StatusCode.error_timeout)
+        return self.answers.pop(0)
+
+    def clear(self) -> None:
+        self.cleared += 1
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+async def test_an_instrument_with_messages_is_cleared_after_one_did_not_come(monkeypatch):
+    library = pytest.importorskip("pyvisa")
+    instrument = Usb(library)
+    monkeypatch.setattr(library, "ResourceManager", lambda _backend: instrument)
+    settings = GaugeSettings(name="x", axis="x", protocol="visa", visa=SCPI, port="USB::1::2::3::INSTR")
+    gauge = VisaGauge(settings, SharedSerialPorts())
+    assert (await gauge.open()).description == "HEXACELL,USB,0,1"
+    with pytest.raises(GaugeSilent):
+        await gauge.read()
+    assert not instrument.cleared
+    instrument.answers = [b"1.0E-03\n"] * 2
+    assert (await gauge.read()).value_mm == pytest.approx(1.0)
+    assert instrument.cleared == 1
+    await gauge.close()

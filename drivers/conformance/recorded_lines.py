@@ -9,10 +9,9 @@ import time
 import uuid
 from abc import ABC, abstractmethod
 from collections import defaultdict, deque
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Generic, TypeVar
 
 import can
 
@@ -23,6 +22,9 @@ SLICE_S = 0.02
 FRAME = re.compile(r"(?P<id>[0-9A-F]{3})#(?P<data>(?:[0-9A-F]{2})*)")
 UNASKED_DELAY_S = 0.05
 """What came before the first request comes so long after the line was opened."""
+
+Address = TypeVar("Address")
+"""Where a driver finds the line."""
 
 Answers = tuple[tuple[float, bytes], ...]
 """Bytes that came, each with how long after the request before them, s."""
@@ -71,11 +73,13 @@ def traffic(entries: Iterable[TraceEntry], line: str) -> tuple[Answers, list[Rec
     return answers(0, ends[0], said[0].time_s - UNASKED_DELAY_S), exchanges
 
 
-class _Served(ABC):
+class _Served(ABC, Generic[Address]):
     """A thread that answers as long as the context lasts, or until the driver asks something else.
 
     At the end that is raised: it is the cause of whatever was raised before.
     """
+
+    _address: Address
 
     def __init__(self, unasked: Answers) -> None:
         self._failure: Exception | None = None
@@ -84,9 +88,9 @@ class _Served(ABC):
         self._unasked = unasked
         self._thread = threading.Thread(target=self._run, name="recorded line", daemon=True)
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> Address:
         self._thread.start()
-        return self
+        return self._address
 
     def __exit__(self, *_: object) -> None:
         self._stopping.set()
@@ -105,8 +109,8 @@ class _Served(ABC):
     @abstractmethod
     def _close(self) -> None: ...
 
-    def _break(self) -> None:  # noqa: B027 - where it cannot be broken, the driver waits for its time-out
-        """Break the line, so that the driver need not wait for its time-out."""
+    def _break(self) -> None:
+        """Break the line, where that is possible, so that the driver need not wait for its time-out."""
 
     def _run(self) -> None:
         try:
@@ -129,15 +133,24 @@ class _Served(ABC):
         return min(SLICE_S, max(0.0, left_s))
 
 
-class RecordedLine(_Served):
-    """A serial line of a trace, on a pseudo-terminal at ``url``: requests in the order of the trace."""
+class recorded_line(_Served[str]):  # noqa: N801 - named as what a test writes behind ``with``
+    """Serve a serial line of a trace on a pseudo-terminal, and give its URL.
+
+    Requests must come in the order of the trace; what came after each comes again, as late as it did, or
+    before the next request.
+
+    Raises:
+        ValueError: the trace has no such line.
+        DialogueDiffers: at the end, whatever else was raised, if the driver asked something else. The line
+            is broken from there on.
+    """
 
     def __init__(self, entries: Iterable[TraceEntry], line: str) -> None:
         unasked, exchanges = traffic(entries, line)
         super().__init__(unasked)
         self._left = deque(exchanges)
         self._line = PtyLine("recorded")
-        self.url = self._line.url
+        self._address = self._line.url
         self._received = b""
 
     def _serve_once(self) -> None:
@@ -169,11 +182,15 @@ class RecordedLine(_Served):
         self._line.close()
 
 
-class RecordedBus(_Served):
-    """The encoders' bus of a trace, on a virtual bus that ``settings`` open.
+class recorded_bus(_Served[Mapping[str, Any]]):  # noqa: N801
+    """Serve the encoders' bus of a trace on a virtual bus, and give the settings for ``can.Bus``.
 
     Each frame is answered as the same one was, the first time, the second time and so on: the time of day
     decides when alarm entries are read. The last answers are repeated.
+
+    Raises:
+        ValueError: the trace has no such line.
+        DialogueDiffers: at the end, if the driver asked something else.
     """
 
     def __init__(self, entries: Iterable[TraceEntry], line: str) -> None:
@@ -182,8 +199,8 @@ class RecordedBus(_Served):
         self._left: defaultdict[bytes, deque[RecordedExchange]] = defaultdict(deque)
         for exchange in exchanges:
             self._left[exchange.request].append(exchange)
-        self.settings: dict[str, Any] = {"interface": "virtual", "channel": f"recorded-{uuid.uuid4().hex}"}
-        self._bus = can.Bus(**self.settings)
+        self._address = {"interface": "virtual", "channel": f"recorded-{uuid.uuid4().hex}"}
+        self._bus = can.Bus(**self._address)
 
     def _serve_once(self) -> None:
         message = self._bus.recv(self._wait_s())
@@ -206,33 +223,3 @@ class RecordedBus(_Served):
 
     def _close(self) -> None:
         self._bus.shutdown()
-
-
-@contextmanager
-def recorded_line(entries: Iterable[TraceEntry], line: str) -> Iterator[str]:
-    """Serve a serial line of a trace on a pseudo-terminal, and give its URL.
-
-    Requests must come in the order of the trace; what came after each comes again, as late as it did, or
-    before the next request.
-
-    Raises:
-        ValueError: the trace has no such line.
-        DialogueDiffers: at the end, whatever else was raised, if the driver asked something else. The line
-            is broken from there on.
-    """
-    with RecordedLine(entries, line) as served:
-        yield served.url
-
-
-@contextmanager
-def recorded_bus(entries: Iterable[TraceEntry], line: str) -> Iterator[Mapping[str, Any]]:
-    """Serve the encoders' bus of a trace, and give the settings for ``can.Bus``.
-
-    Each frame is answered as the same frame was, whatever the order.
-
-    Raises:
-        ValueError: the trace has no such line.
-        DialogueDiffers: at the end, if the driver asked something else.
-    """
-    with RecordedBus(entries, line) as served:
-        yield served.settings

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
@@ -52,20 +51,8 @@ class _Note(JsonRecord):
         """The paths of the files."""
         return tuple(one.path for one in self.files)
 
-
-@dataclass(frozen=True, slots=True)
-class InterruptedWrite:
-    """What became of an earlier write that did not reach its end.
-
-    Attributes:
-        files: all files of the write, by name.
-        restored: those that got their old content back.
-        is_complete: all had their new content already, which stays.
-    """
-
-    files: tuple[str, ...]
-    restored: tuple[str, ...]
-    is_complete: bool
+    def __str__(self) -> str:
+        return f"a write of {' and '.join(names_of(self.paths))} was interrupted"
 
 
 def note_path(paths: Sequence[Path]) -> Path:
@@ -111,8 +98,8 @@ def is_interrupted(paths: Sequence[Path]) -> bool:
     return os.path.lexists(note_path(paths))
 
 
-def settle_interrupted_write(paths: Sequence[Path]) -> InterruptedWrite | None:
-    """Undo what a process that died left of a write; None if there is nothing.
+def settle_interrupted_write(paths: Sequence[Path]) -> str | None:
+    """Undo what a process that died left of a write; what became of it, None if there is nothing.
 
     The caller must hold the cell: a write that is going on looks the same.
 
@@ -127,8 +114,7 @@ def settle_interrupted_write(paths: Sequence[Path]) -> InterruptedWrite | None:
     noted, own = ({os.path.realpath(one) for one in files} for files in (note.paths, paths))
     if noted != own:
         raise FileError(
-            f"a write of {' and '.join(names_of(note.paths))} was interrupted, which are not the files "
-            "that this cell file names",
+            f"{note}, which are not the files that this cell file names",
             subject=path,
             action="Use the cell file with which the write was made; its next command undoes it",
         )
@@ -138,8 +124,12 @@ def settle_interrupted_write(paths: Sequence[Path]) -> InterruptedWrite | None:
     for one, data in () if is_complete else replaced:
         atomic_files.write_atomically(one.path, one.old, expected=data)
     forget_write(paths)
-    restored = () if is_complete else names_of([one.path for one, _ in replaced])
-    return InterruptedWrite(names_of(note.paths), restored, is_complete=is_complete)
+    if is_complete:
+        return f"{note} when all of them were new: it is complete"
+    if not replaced:
+        return f"{note} before any of them was replaced: all are as before"
+    restored = " and ".join(names_of([one.path for one, _ in replaced]))
+    return f"{note} between them: {restored} got the old content back"
 
 
 def _is_replaced(one: _NotedFile, data: bytes, note: _Note, path: Path) -> bool:
@@ -149,8 +139,7 @@ def _is_replaced(one: _NotedFile, data: bytes, note: _Note, path: Path) -> bool:
     if atomic_files.sha256(data) == one.sha256_after:
         return True
     raise FileError(
-        f"a write of {' and '.join(names_of(note.paths))} was interrupted, and this file was edited since: "
-        "whether they belong together is not known",
+        f"{note}, and this file was edited since: whether they belong together is not known",
         subject=one.path,
         action=f"Make all of them old or all new, from the copies in the run's folder; then delete {path}",
     )
@@ -172,7 +161,7 @@ def held_config(*paths: Path) -> Iterator[None]:
     """
     with cell_lock(*paths):
         if (settled := settle_interrupted_write(paths)) is not None:
-            raise FileError(interrupted_sentence(settled), subject=paths[0], action="Try again")
+            raise FileError(settled, subject=paths[0], action="Try again")
         yield
 
 
@@ -188,18 +177,6 @@ def settle_config(*paths: Path) -> str | None:
         return None
     try:
         with cell_lock(*paths):
-            settled = settle_interrupted_write(paths)
+            return settle_interrupted_write(paths)
     except CellBusy:
         return None
-    return None if settled is None else interrupted_sentence(settled)
-
-
-def interrupted_sentence(settled: InterruptedWrite) -> str:
-    """What became of an interrupted write, as a sentence."""
-    files = " and ".join(settled.files)
-    if settled.is_complete:
-        return f"a write of {files} was interrupted when all of them were new: it is complete"
-    if not settled.restored:
-        return f"a write of {files} was interrupted before any of them was replaced: all are as before"
-    restored = " and ".join(settled.restored)
-    return f"a write of {files} was interrupted between them: {restored} got the old content back"

@@ -33,7 +33,7 @@ from sqlalchemy import (
     select,
 )
 from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.exc import DBAPIError, SQLAlchemyError
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.pool import NullPool
 from sqlalchemy.schema import CreateTable
 
@@ -94,11 +94,7 @@ class Archive:
 
     @cached_property
     def _engine(self) -> Engine:
-        try:
-            return open_engine(self._url)
-        except ModuleNotFoundError as error:
-            action = "Install hexacell[postgresql]. The runs are read from their folders"
-            raise ArchiveUnavailable(str(error), subject="PostgreSQL", action=action) from error
+        return open_engine(self._url, ". The runs are read from their folders")
 
     def documents(self, kind: DocumentKind) -> dict[str, StampedDocument]:
         """All documents of one kind, by the names of their runs.
@@ -161,11 +157,9 @@ class Archive:
         """Do something in one transaction; in a new file where the old one is damaged."""
         try:
             return self._act(act)
-        except DBAPIError as error:
+        except SQLAlchemyError as error:
             if self._file is None or not _is_damaged(error):
                 raise self._unavailable(error) from error
-        except SQLAlchemyError as error:
-            raise self._unavailable(error) from error
         self._is_ready = False
         for path in (self._file, self._file.with_name(f"{INDEX}-journal")):
             path.unlink(missing_ok=True)
@@ -188,27 +182,38 @@ class Archive:
             return act(connection)
 
     def _unavailable(self, error: SQLAlchemyError) -> ArchiveUnavailable:
-        cause = error.orig if isinstance(error, DBAPIError) else error
-        reason = " ".join(str(cause).split())
         where = self._url.render_as_string() if self._file is None else self._file
         return ArchiveUnavailable(
-            f"the archive cannot be used ({reason})",
+            f"the archive cannot be used ({_reason(error)})",
             subject=where,
             action="The runs are read from their folders, which takes longer",
         )
 
 
-def open_engine(url: URL) -> Engine:
-    """An engine for SQLite or PostgreSQL, not connected yet; raises ``ModuleNotFoundError``."""
+def open_engine(url: URL, otherwise: str = "") -> Engine:
+    """An engine for SQLite or PostgreSQL, not connected yet.
+
+    Raises:
+        ArchiveUnavailable: the library for it is not installed; ``otherwise`` is added to what to do.
+    """
     if url.drivername == "sqlite":
         return create_engine(url, poolclass=NullPool, connect_args={"timeout": PATIENCE_S})
     with_driver = url.set(drivername="postgresql+psycopg")
-    return create_engine(with_driver, poolclass=NullPool, connect_args={"connect_timeout": PATIENCE_S})
+    try:
+        return create_engine(with_driver, poolclass=NullPool, connect_args={"connect_timeout": PATIENCE_S})
+    except ModuleNotFoundError as error:
+        action = f"Install hexacell[postgresql]{otherwise}"
+        raise ArchiveUnavailable(str(error), subject="PostgreSQL", action=action) from error
 
 
-def _is_damaged(error: DBAPIError) -> bool:
+def _reason(error: SQLAlchemyError) -> str:
+    """What the database said, in one line."""
+    return " ".join(str(getattr(error, "orig", None) or error).split())
+
+
+def _is_damaged(error: SQLAlchemyError) -> bool:
     """Whether a file is no SQLite database, or has other tables than it should."""
-    code = getattr(error.orig, "sqlite_errorcode", None)
+    code = getattr(getattr(error, "orig", None), "sqlite_errorcode", None)
     return code is not None and code & 0xFF not in _READ_ONLY_OR_BUSY
 
 
@@ -236,18 +241,13 @@ def shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]
     )
     address = make_url(url)
     try:
-        engine = open_engine(address)
-        with engine.connect() as connection:
+        with open_engine(address).connect() as connection:
             if not inspect(connection).has_table(ARCHIVE_TABLE.name):
                 return ()
             return tuple(SharedDocument(*row) for row in connection.execute(query))
-    except ModuleNotFoundError as error:
-        action = "Install hexacell[postgresql]"
-        raise ArchiveUnavailable(str(error), subject="PostgreSQL", action=action) from error
     except SQLAlchemyError as error:
-        reason = " ".join(str(getattr(error, "orig", None) or error).split())
         raise ArchiveUnavailable(
-            f"the archive cannot be read ({reason})",
+            f"the archive cannot be read ({_reason(error)})",
             subject=address.render_as_string(),
             action="Check its address, and that the server runs",
         ) from error

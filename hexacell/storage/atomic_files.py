@@ -14,6 +14,7 @@ import errno
 import hashlib
 import os
 import secrets
+import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
@@ -46,7 +47,6 @@ _REASONS: dict[int, tuple[str, str]] = {
     errno.EBUSY: ("the file is a mount point", "Mount its folder instead of the single file"),
     errno.EIO: ("the disk reports an error", "Check the disk"),
 }
-_NOT_SUPPORTED = (errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL)
 
 
 def sha256(data: bytes) -> str:
@@ -159,8 +159,10 @@ def sync_folder(folder: Path) -> None:
     """
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        with _tolerating(errno.EINVAL):
-            os.fsync(descriptor)
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno != errno.EINVAL:
+            raise
     finally:
         os.close(descriptor)
 
@@ -235,7 +237,7 @@ def _write_like(target: Path, temporary: Path, data: bytes, new_mode: int, *, fo
         stream.write(data)
         stream.flush()
         if status is not None:
-            _keep_attributes(stream.fileno(), target, status)
+            _keep_attributes(temporary, target, status)
         elif for_everybody:
             os.fchmod(stream.fileno(), stat.S_IMODE(os.fstat(stream.fileno()).st_mode) | FOR_EVERYBODY)
         os.fsync(stream.fileno())
@@ -258,11 +260,11 @@ def _require_regular(path: Path, status: os.stat_result) -> None:
         raise FileError("this is not a file", subject=path, action="Check the path")
 
 
-def _keep_attributes(descriptor: int, target: Path, status: os.stat_result) -> None:
-    own = os.fstat(descriptor)
+def _keep_attributes(temporary: Path, target: Path, status: os.stat_result) -> None:
+    own = temporary.stat()
     if (own.st_uid, own.st_gid) != (status.st_uid, status.st_gid):
         try:
-            os.fchown(descriptor, status.st_uid, status.st_gid)
+            os.chown(temporary, status.st_uid, status.st_gid)
         except PermissionError as error:
             raise FileError(
                 f"the file belongs to user {status.st_uid}, group {status.st_gid}, and replacing it would "
@@ -270,24 +272,5 @@ def _keep_attributes(descriptor: int, target: Path, status: os.stat_result) -> N
                 subject=target,
                 action="Run as its owner",
             ) from error
-    if hasattr(os, "listxattr"):
-        _copy_extended_attributes(descriptor, target)
-    os.fchmod(descriptor, stat.S_IMODE(status.st_mode))
-
-
-def _copy_extended_attributes(descriptor: int, target: Path) -> None:
-    names: list[str] = []
-    with _tolerating(*_NOT_SUPPORTED):
-        names = os.listxattr(target)
-    for name in names:
-        with _tolerating(*_NOT_SUPPORTED, errno.EPERM, errno.EACCES, errno.ENODATA):
-            os.setxattr(descriptor, name, os.getxattr(target, name))
-
-
-@contextmanager
-def _tolerating(*codes: int) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        if error.errno not in codes:
-            raise
+    shutil.copystat(target, temporary)  # the mode, and extended attributes where there are any
+    os.utime(temporary)

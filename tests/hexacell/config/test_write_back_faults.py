@@ -58,7 +58,7 @@ def test_a_power_cut_at_any_moment_is_settled(either: Bench, job: str) -> None:
         assert not is_interrupted(either.files), name
         if was_mixed:
             assert settled is not None, name
-            assert (settled.restored, settled.is_complete) == (("hexapod.hal",), False), name
+            assert settled.endswith("between them: hexapod.hal got the old content back"), name
         mixed += was_mixed
         ends.add(either.found)
         doing(run)  # whatever was left, it can be done again

@@ -92,7 +92,7 @@ def test_extended_attributes_stay(path: Path) -> None:
 def test_a_file_system_without_extended_attributes_is_no_failure(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def unsupported(_: Path) -> list[str]:
+    def unsupported(_: Path, **_named: bool) -> list[str]:
         raise OSError(errno.ENOTSUP, "not supported")
 
     monkeypatch.setattr(os, "listxattr", unsupported, raising=False)

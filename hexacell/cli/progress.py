@@ -21,8 +21,8 @@ from hexacell.text.line_face import EventFormatter, activity, gauges_text, recor
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.state import RunState
 from procedures.steps import events
+from procedures.steps.gauges import Place
 from procedures.steps.move import Move
-from procedures.steps.place import Place
 from procedures.steps.write_back import Commit
 
 PLAIN_TERMINALS = {"dumb", "unknown"}

@@ -30,7 +30,7 @@ from procedures.run.state import RunState
 from procedures.run.trips import Guard, GuardTripped, RobotNotStopped, causes_of, may_still_move
 from procedures.steps import events
 from procedures.steps.base import BaseEvent, BaseStep, StepOfSet
-from procedures.steps.place import MountingError
+from procedures.steps.gauges import MountingError
 from procedures.steps.provisional import ProvisionalApplied, TakeBack
 from procedures.steps.registry import Step
 from procedures.steps.write_back import Committed, RollBack

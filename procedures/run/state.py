@@ -17,18 +17,15 @@ from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.readings import Reading
 
 if TYPE_CHECKING:  # a state keeps events whole, and needs their names in its annotations alone
-    from procedures.steps.accept import ResultAccepted
     from procedures.steps.base import BaseEvent, BaseStep
     from procedures.steps.events import Ended, RunStarted
-    from procedures.steps.gauge_trial import GaugesProbed
-    from procedures.steps.identify import Identified
-    from procedures.steps.judge import ConfirmationPlanned, ResultValidated
+    from procedures.steps.gauges import GaugesProbed
+    from procedures.steps.identify import Identified, Proposed
+    from procedures.steps.judge import ConfirmationPlanned, ResultAccepted, ResultValidated
     from procedures.steps.move import PoseExcluded
     from procedures.steps.noise import NoiseMeasured, ReferenceRepeated, StandstillRead
-    from procedures.steps.pilot import PilotTaken
-    from procedures.steps.propose import Proposed
     from procedures.steps.provisional import ProvisionalApplied
-    from procedures.steps.sample import RecordTaken
+    from procedures.steps.sample import PilotTaken, RecordTaken
     from procedures.steps.write_back import Committed
 
 EventT = TypeVar("EventT", bound="BaseEvent")

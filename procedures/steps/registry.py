@@ -6,21 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Union
 
 from pydantic import Field
 
-from procedures.steps.accept import Accept
 from procedures.steps.base import BaseStep
-from procedures.steps.close import CloseSet
-from procedures.steps.gauge_trial import Probe, Try
-from procedures.steps.identify import Identify
-from procedures.steps.judge import Judge
-from procedures.steps.locate import Locate
-from procedures.steps.move import Move
+from procedures.steps.gauges import Place, Probe, Try
+from procedures.steps.identify import Identify, Propose
+from procedures.steps.judge import Accept, Judge
+from procedures.steps.move import Locate, Move
 from procedures.steps.noise import AssessNoise, Repeat, Standstill
-from procedures.steps.pilot import Pilot
-from procedures.steps.place import Place
-from procedures.steps.propose import Propose
 from procedures.steps.provisional import Lend, TakeBack
-from procedures.steps.revisit import Revisit
-from procedures.steps.sample import Sample
+from procedures.steps.reference import CloseSet, Revisit
+from procedures.steps.sample import Pilot, Sample
 from procedures.steps.write_back import Commit, RollBack
 
 STEPS: tuple[type[BaseStep], ...] = (

@@ -18,7 +18,7 @@ import numpy as np
 from hexacell.errors import HexacellError
 from procedures.journal.journal import read_journal
 from procedures.steps import events
-from procedures.steps.place import MountingError
+from procedures.steps.gauges import MountingError
 from tests.benchmarks.figures import NEVER, at_least, at_most
 from tests.benchmarks.samples import sample
 from tests.procedures.rig import new_rig

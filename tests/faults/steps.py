@@ -7,15 +7,12 @@ from collections.abc import Iterable
 from procedures.run.keys import Phase
 from procedures.steps import events
 from procedures.steps.base import StepOfSet, StepWithoutMotion
-from procedures.steps.gauge_trial import Probe, Try
-from procedures.steps.locate import Locate
-from procedures.steps.move import Move
+from procedures.steps.gauges import Place, Probe, Try
+from procedures.steps.move import Locate, Move
 from procedures.steps.noise import Repeat, Standstill
-from procedures.steps.pilot import Pilot
-from procedures.steps.place import Place
+from procedures.steps.reference import Revisit
 from procedures.steps.registry import Step
-from procedures.steps.revisit import Revisit
-from procedures.steps.sample import Sample
+from procedures.steps.sample import Pilot, Sample
 
 STEPS = (
     "beginning",

@@ -18,9 +18,9 @@ from hexacell.errors import ExitCode, HexacellError
 from procedures.run.keys import Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
-from procedures.steps.close import CloseSet
+from procedures.steps.gauges import Place
 from procedures.steps.move import Move
-from procedures.steps.place import Place
+from procedures.steps.reference import CloseSet
 from procedures.steps.sample import Sample
 from procedures.steps.write_back import Commit
 

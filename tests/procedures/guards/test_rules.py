@@ -22,7 +22,7 @@ from procedures.guards.rules import GuardLimits, first_trip, following_error, st
 from procedures.guards.supervision import low_disk_space
 from procedures.run.trips import DriftTripped, Guard, GuardTripped, Trip
 from procedures.steps import events
-from procedures.steps.close import reference_drift
+from procedures.steps.reference import reference_drift
 
 PLATE = GaugeRoom.symmetric(5.5)
 LIMITS = GuardLimits(stale_s=0.12, plate=PLATE)

@@ -19,8 +19,8 @@ from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
-from procedures.steps.close import CloseSet
 from procedures.steps.move import Expectation, Move
+from procedures.steps.reference import CloseSet
 from procedures.steps.sample import Sample
 
 LIMITS = GuardLimits(0.12, GaugeRoom.symmetric(5.5))

@@ -30,7 +30,7 @@ from procedures.run.state import RunState, fold
 from procedures.steps import events
 from procedures.steps.move import Move
 from procedures.steps.noise import AssessNoise, Repeat, Standstill
-from procedures.steps.pilot import Pilot
+from procedures.steps.sample import Pilot
 from tests.procedures.replay.test_replayer import numbered
 from tests.procedures.rig import MakeRig, Rig, new_rig
 from tests.procedures.runs.listening import PowerCut, happened, on, run_until, steps_of

@@ -7,8 +7,7 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from drivers.simulated.encoders.bank import Positions, SimulatedEncoderBank
-from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
+from drivers.simulated.encoders.bank import Positions, SimulatedDbcBank, SimulatedEncoderBank
 from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.fault_schedule import CellFaults, FaultSchedule
 from drivers.simulated.gauges.bank import SimulatedGaugeBank

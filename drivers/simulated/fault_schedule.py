@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from drivers.simulated.encoders.bank import SimulatedEncoderBank
-from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
+from drivers.simulated.encoders.bank import SimulatedDbcBank, SimulatedEncoderBank
 from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController

@@ -5,14 +5,14 @@ No robot moves, so there is nothing to supervise: the guards of a replay only ev
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 import numpy as np
 
 from drivers.errors import GaugeAtEnd
-from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, ReportedPosition
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
 from hexacell.errors import AnswerNeeded, DeviceError
@@ -28,8 +28,6 @@ from procedures.run.readings import Reading, ReadingSeries
 from procedures.run.state import RunState
 from procedures.steps import events
 from procedures.workflow.next_step import StepExecutor
-
-PROTOCOL = "recorded"
 
 TOLERANCE = 1e-9
 """Largest difference that counts as rounding: absolute in the field's unit, above 1 relative."""
@@ -52,47 +50,15 @@ class Recorded:
         return reading
 
 
-@dataclass(frozen=True, slots=True)
-class RecordedEncoders:
-    """Encoders at the recorded positions."""
+class _Absent:
+    """Encoders and controller of a replay: the executor has their readings, and no order does anything."""
 
-    recorded: Recorded
-
-    async def open(self) -> tuple[DeviceIdentity, ...]:
-        """Nothing to connect."""
-        return (DeviceIdentity("encoders", PROTOCOL, "encoders in a journal"),)
-
-    async def read(self) -> EncoderSample:
-        """The last counts of the reading."""
-        reading = self.recorded.reading
-        return EncoderSample(reading.counts[-1], reading.joints)
-
-    async def close(self) -> None:
-        """Nothing to release."""
+    def __getattr__(self, _name: str) -> Callable[..., Awaitable[None]]:
+        return _nothing
 
 
-@dataclass(frozen=True, slots=True)
-class RecordedController:
-    """A controller whose moves all arrive; a move that did not arrive has no arrival in the journal."""
-
-    recorded: Recorded
-
-    async def open(self) -> DeviceIdentity:
-        """Nothing to connect."""
-        return DeviceIdentity("controller", PROTOCOL, "a controller in a journal")
-
-    async def position(self) -> ReportedPosition | None:
-        """Nothing is asked of it: see :meth:`RecordedStepExecutor.locate`."""
-        return None
-
-    async def status(self) -> ControllerStatus:
-        """Enabled."""
-        return ControllerStatus(estop=False, enabled=True)
-
-    async def _nothing(self, *_args: object, **_named: object) -> None:
-        """Nothing to do."""
-
-    prepare = move = stop = reload = close = _nothing
+async def _nothing(*_args: object, **_named: object) -> None:
+    """Nothing to do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,9 +82,6 @@ class RecordedOperator:
 class InactiveGuards(Guards):
     """Guards without supervision."""
 
-    async def _nothing(self, *_args: object, **_named: object) -> None:
-        """Nothing to do."""
-
     prepare = move = while_not_ready = require_reloaded = _nothing
 
     async def at_standstill(self, action: Supervised[Result]) -> Result:
@@ -135,8 +98,8 @@ class RecordedStepExecutor(StepExecutor):
     @classmethod
     def of(cls, cell: Cell, calibration: Calibration, folder: RunFolder) -> Self:
         """For a cell and a temporary folder."""
-        recorded = Recorded()
-        devices = Devices((), RecordedEncoders(recorded), RecordedController(recorded))
+        recorded, absent = Recorded(), cast("Any", _Absent())
+        devices = Devices((), absent, absent)
         operator = RecordedOperator(recorded)
         return cls(cell, calibration, devices, CellClock(), operator, folder, recorded=recorded)
 

@@ -16,7 +16,7 @@ import pytest
 from serial.tools import list_ports
 
 from drivers.discovery import SearchTimeouts
-from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
+from drivers.simulated.encoders.bank import SimulatedDbcBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from hexacell.cell.described_devices import DbcSettings, StreamSettings, VisaSettings
 from hexacell.cell.devices import GaugeSettings, LinearEncoderSettings

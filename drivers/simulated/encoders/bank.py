@@ -1,4 +1,4 @@
-"""The simulated encoder bank: samples positions at every SYNC and sends counts."""
+"""The simulated encoders on a virtual CAN bus: CANopen nodes, and those that a DBC file describes."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from drivers.simulated.encoders.can_bus import SimulatedCanBus
+from drivers.encoders.dbc import PositionSignal, read_database
+from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
 from drivers.simulated.encoders.node import SimulatedEncoder
 from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC, ROTARY, DeviceData, Vendor
 from drivers.simulated.served_device import Closeable, Switch, setting
+from hexacell.cell.described_devices import DbcSettings
 from hexacell.cell.devices import NM, EncoderSettings, RotaryEncoderSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.clock import CellClock
+from hexacell.errors import FileError
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
 
@@ -32,7 +35,20 @@ def shown_positions(settings: EncoderSettings, positions: Positions) -> list[flo
     return [(float(position) - offset) * direction for position, offset, direction in places]
 
 
-class SimulatedEncoderBank(Closeable):
+class _CanBank(Closeable):
+    """Encoders on a virtual CAN bus of their own; ``address`` is where a driver finds them."""
+
+    def __init__(self) -> None:
+        self.channel = f"hexacell-encoders-{uuid.uuid4().hex}"
+        self.bus_settings: dict[str, Any] = {"interface": "virtual", "channel": self.channel}
+        self.address: dict[str, Any] = {"bus": self.bus_settings}
+        self.bus = SimulatedCanBus(self.channel)
+
+    def close(self) -> None:
+        self.bus.close()
+
+
+class SimulatedEncoderBank(_CanBank):
     """Six encoders on a virtual CAN bus of their own.
 
     ``positions`` gives the six joint variables now, mm, with noise; it is called at the start, and at
@@ -48,10 +64,7 @@ class SimulatedEncoderBank(Closeable):
         latency_s: float = 0.0,
         vendors: Sequence[Vendor] | None = None,
     ) -> None:
-        self.channel = f"hexacell-encoders-{uuid.uuid4().hex}"
-        self.bus_settings: dict[str, Any] = {"interface": "virtual", "channel": self.channel}
-        self.address: dict[str, Any] = {"bus": self.bus_settings}
-        self.bus = SimulatedCanBus(self.channel)
+        super().__init__()
         self._settings = settings
         self._positions = positions
         self._clock = clock
@@ -75,9 +88,6 @@ class SimulatedEncoderBank(Closeable):
             for encoder in self._encoders:
                 encoder.set_unplugged(on=False)
         self.bus.start()
-
-    def close(self) -> None:
-        self.bus.close()
 
     def faults(self, leg: int) -> dict[FaultKind, Switch]:
         encoder = self._encoders[leg - 1]
@@ -120,3 +130,76 @@ class SimulatedEncoderBank(Closeable):
             counts = round(shown / settings.step) % _ALL_BITS
             is_negative = settings.signed and counts >= _ALL_BITS // 2
             encoder.sample(counts - _ALL_BITS if is_negative else counts)
+
+
+PERIOD_S = 0.005
+"""Period of what they send by themselves, s of real time."""
+
+
+class SimulatedDbcEncoder:
+    """One encoder, and what is wrong with it.
+
+    Attributes:
+        shift: by how much it shows more, in the unit of the joint.
+        is_silent: it sends nothing.
+        has_alarm: the signals that say whether it is healthy have other values.
+    """
+
+    def __init__(self, signal: PositionSignal, healthy: dict[str, int]) -> None:
+        self._signal, self._healthy = signal, healthy
+        self._frozen: float | None = None
+        self._position = self.shift = 0.0
+        self.is_silent = self.has_alarm = False
+
+    def frame(self, position: float) -> bytes:
+        """The data of its message at a position."""
+        self._position = position if self._frozen is None else self._frozen
+        values: dict[str, Any] = {signal.name: 0 for signal in self._signal.message.signals}
+        values |= {name: value + self.has_alarm for name, value in self._healthy.items()}
+        values[self._signal.signal.name] = (self._position + self.shift) / self._signal.scale
+        data: bytes = self._signal.message.encode(values, strict=False)
+        return data
+
+    def set_frozen(self, *, on: bool) -> None:
+        """Send the current position for ever, or the true one again."""
+        self._frozen = self._position if on else None
+
+
+class SimulatedDbcBank(_CanBank):
+    """Six encoders on a virtual CAN bus, each with a message of its own.
+
+    ``positions`` gives the six joint variables; they are sent every five milliseconds of real time, or when
+    the request of the cell file comes.
+    """
+
+    def __init__(self, settings: EncoderSettings, described: DbcSettings, positions: Positions) -> None:
+        self._settings, self._positions = settings, positions
+        database = read_database(described, settings.unit, settings.step)
+        self._signals = database.signals
+        if len(database.frames) < len(self._signals):
+            raise FileError("legs share a message", subject=described.file, action="Give each leg its own")
+        super().__init__()
+        self._encoders = tuple(SimulatedDbcEncoder(one, described.must_be) for one in self._signals)
+        if described.request is None:
+            PeriodicAction(self.bus, PERIOD_S, self._send)
+        else:
+            asked = int(described.request.partition("#")[0], 16)
+            self.bus.subscribe(asked, lambda _id, _data, _time: self._send())
+        self.bus.start()
+
+    def faults(self, leg: int) -> dict[FaultKind, Switch]:
+        encoder = self._encoders[leg - 1]
+        return {
+            "unplugged": setting(encoder, "is_silent"),
+            "silent": setting(encoder, "is_silent"),
+            "frozen": encoder.set_frozen,
+            "jumped": setting(encoder, "shift", JUMP, 0.0),
+            "alarm": setting(encoder, "has_alarm"),
+        }
+
+    def _send(self) -> None:
+        positions = shown_positions(self._settings, self._positions)
+        for signal, encoder, position in zip(self._signals, self._encoders, positions, strict=True):
+            data = encoder.frame(position)
+            if not encoder.is_silent:
+                self.bus.send_message(signal.frame.number, data)

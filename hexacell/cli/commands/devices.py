@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from drivers.discovery.node_ids import set_node_id
+from drivers.discovery.encoders import set_node_id
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.cli.terminal import is_interactive

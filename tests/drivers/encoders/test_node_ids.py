@@ -6,12 +6,12 @@ from functools import partial
 
 import pytest
 
-from drivers.discovery import SearchTimeouts, node_ids
+from drivers.discovery import SearchTimeouts, encoders
 from drivers.errors import BusError
 from hexacell.errors import DeviceError
 from tests.drivers.encoders.conftest import LSS_REQUEST
 
-set_node_id = partial(node_ids.set_node_id, timeouts=SearchTimeouts(adapter=0.3, node=0.1))
+set_node_id = partial(encoders.set_node_id, timeouts=SearchTimeouts(adapter=0.3, node=0.1))
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import can
 import pytest
 
 from drivers.encoders.dbc import DbcBank
-from drivers.simulated.encoders.dbc_bank import SimulatedDbcBank
+from drivers.simulated.encoders.bank import SimulatedDbcBank
 from hexacell.cell.devices import LinearEncoderSettings
 
 TIMEOUT_S = 0.4

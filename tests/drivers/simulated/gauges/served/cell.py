@@ -5,9 +5,8 @@ import contextlib
 from collections.abc import Callable
 
 from drivers.gauges.cdi import CdiGauge
-from drivers.gauges.described import RequestGauge, StreamGauge
+from drivers.gauges.described import ModbusGauge, RequestGauge, StreamGauge
 from drivers.gauges.displays import DigimaticUsbGauge, HeidenhainGauge, IdHGauge, KeyenceGauge
-from drivers.gauges.modbus import ModbusGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.gauges.sylvac import SylvacGauge

@@ -230,12 +230,6 @@ class RobotPhysics:
             if now < self._motion.end_s:
                 self._motion = replace(self._motion, stopped_s=now)
 
-    @property
-    def motion_end_s(self) -> float:
-        """When the joints reached, or will reach, standstill, on the cell's clock."""
-        with self._lock:
-            return self._motion.end_s
-
     def progress(self) -> float:
         """The completed fraction of the last motion, 0 to 1."""
         with self._lock:

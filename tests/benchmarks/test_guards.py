@@ -189,7 +189,7 @@ async def stopping_s(folder: Path, protocol: str, kind: FaultKind, device: str) 
         )
         with pytest.raises(GuardTripped) as tripped:
             await cell.slow_move(2)
-        still_s = cell.simulated.physics.motion_end_s
+        still_s = cell.simulated.physics._motion.end_s
         struck_s = injected_s[0] if injected_s else still_s
         return still_s - struck_s, tripped.value.trip.guard
 

@@ -15,6 +15,7 @@ from hexacell.cell.devices import LinearEncoderSettings
 from hexacell.cell.loader import load_cell
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
+from tests.linuxcnc_orders import joints_of, pose_of
 
 ALL = frozenset(StartupAction)
 THERE = Pose(40.0, -20.0, 560.0, 5.0, -4.0, 10.0)
@@ -30,7 +31,7 @@ async def driver(linuxcnc):
 
 
 async def distance(driver: LinuxcncrshController, pose: Pose) -> float:
-    there = (await driver.pose()).as_tuple()
+    there = (await pose_of(driver)).as_tuple()
     return max(abs(one - other) for one, other in zip(there, pose.as_tuple(), strict=True))
 
 
@@ -124,7 +125,7 @@ async def test_its_scales_are_read_also_during_a_move(linuxcnc, driver) -> None:
     await moving
     after = await scales.read()
     assert len({before.counts, on_the_way.counts, after.counts}) == 3
-    assert after.positions == pytest.approx(await driver.joint_positions(), abs=1e-9)
+    assert after.positions == pytest.approx(await joints_of(driver), abs=1e-9)
 
 
 async def test_a_frozen_server_is_told_and_it_goes_on_when_it_answers_again(linuxcnc, driver) -> None:

@@ -22,6 +22,7 @@ from hexacell.kinematics.mechanism import inverse_kinematics, joint_zeros
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot.model import config_layout
 from tests.linuxcnc.conftest import TWO_FILES, LinuxCNC
+from tests.linuxcnc_orders import joints_of, pose_of
 from tests.waiting import wait_until
 
 ALL = frozenset(StartupAction)
@@ -88,7 +89,7 @@ async def test_other_zeros_are_read_by_a_restart_in_which_no_motor_moves(
         commit(change, hexapod.folder / "backup")
         await driver.reload(ALL)
         motors.wait()
-        pose, told = await driver.pose(), await driver.joint_positions()
+        pose, told = await pose_of(driver), await joints_of(driver)
     finally:
         await driver.close()
     places = np.array(motors.places()[stood:])

@@ -153,16 +153,6 @@ class LinuxcncrshController:
                 return None
             return ReportedPosition(await commands.pose(), await commands.joints())
 
-    async def pose(self) -> Pose:
-        """The actual pose by the controller's own kinematics, mm and deg."""
-        async with self._order:
-            return await (await self._session.synchronized()).pose()
-
-    async def joint_positions(self) -> tuple[float, ...]:
-        """The six joints as the controller has them, mm."""
-        async with self._order:
-            return await (await self._session.synchronized()).joints()
-
     async def joints_now(self) -> tuple[float, ...] | None:
         """The six joints, also during ``move``; None before all are homed."""
         return await self._session.joints()

@@ -25,6 +25,7 @@ from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose
 from tests.drivers.simulated.conftest import served
 from tests.geometries import hexaglide_geometry
+from tests.linuxcnc_orders import pose_of
 
 ALL = frozenset(StartupAction)
 MOVE_S = 1.0
@@ -67,7 +68,7 @@ async def test_every_device_answers_and_the_robot_moves(bundled_cell) -> None:
             after = (await encoders.read()).positions
             readings = [(await gauge.read()).value_mm for gauge in gauges]
             seen = [cell.physics.gauge_displacement(axis) for axis in "xyz"]
-            assert (await controller.pose()).as_tuple() == pytest.approx(target.as_tuple(), abs=1e-3)
+            assert (await pose_of(controller)).as_tuple() == pytest.approx(target.as_tuple(), abs=1e-3)
         assert before != after
         assert after == pytest.approx(cell.physics.encoder_positions().tolist(), abs=0.01)
         assert readings == pytest.approx(seen, abs=0.05)
@@ -94,14 +95,14 @@ async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> Non
     with serve(bundled_cell) as cell:
         async with drivers(cell.settings) as (_, _, controller):
             await controller.prepare(ALL)
-            sliders, believed = cell.machine.joints(), await controller.pose()
+            sliders, believed = cell.machine.joints(), await pose_of(controller)
             config = bundled_cell.config_path
             values = bundled_cell.settings.simulation.geometry.model_dump()
             truth = hexaglide_geometry(values["S"], values["B"], values["l"])
             config.write_text(NativeToml(HEXAGLIDE_PARAMETERS).rewrite(config.read_text(), truth))
             await controller.reload(ALL)
             assert cell.machine.joints() == pytest.approx(sliders, abs=1e-6)
-            assert (await controller.pose()).position != pytest.approx(believed.position, abs=0.5)
+            assert (await pose_of(controller)).position != pytest.approx(believed.position, abs=0.5)
 
 
 def test_settings_have_an_address_for_every_device_and_no_simulation(bundled_cell) -> None:

@@ -86,7 +86,7 @@ async def test_a_fault_during_a_move_stops_the_robot_and_trips_its_guard(
     if device == "controller" and kind in {"unplugged", "frozen"}:
         assert str(tripped.value).startswith("PRESS THE EMERGENCY STOP. The robot could not be stopped")
     else:
-        assert site.simulated.physics.motion_end_s < struck_s[0] + 20.0, "a second on the wall"
+        assert site.simulated.physics._motion.end_s < struck_s[0] + 20.0, "a second on the wall"
 
 
 @pytest.mark.slow

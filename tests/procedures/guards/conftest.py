@@ -105,7 +105,7 @@ class Scene:
         self.controller._do("move", str(pose))
         stops = self.stops
         self.rig.machine.move(pose, duration_s)
-        while self.now < self.rig.physics.motion_end_s:
+        while self.now < self.rig.physics._motion.end_s:
             await self.rig.clock.sleep(0.005)
         if self.stops != stops or not self.controller.now.may_move:
             raise MotionInterrupted("stopped on the way", subject="controller")

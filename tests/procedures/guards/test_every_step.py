@@ -199,7 +199,7 @@ async def test_the_robot_stops_within_the_limit_for_each_guard_and_step(stage, s
     at_s, ended = await struck(scene, fault, doing)
     goes_on = step is reload and step not in fault.steps
     assert (scene.rig.config == config) is not goes_on
-    assert scene.rig.physics.motion_end_s <= at_s + MUST_S or (step in OUTSIDE and step not in fault.steps)
+    assert scene.rig.physics._motion.end_s <= at_s + MUST_S or (step in OUTSIDE and step not in fault.steps)
     if step is move_afterwards and fault.guard in {Guard.GAUGE_END, Guard.PLATE}:
         assert isinstance(ended, events.RecordRejected), "a verdict on the new geometry"
         assert scene.rig.performer.guards.supervisor.latched is None
@@ -223,7 +223,7 @@ async def test_no_step_begins_without_free_disk_space(stage: Any, step: Any, mon
     scene = stage(step)
     config = scene.rig.config
     doing = await step(scene)
-    orders, still_since_s = len(scene.controller.log), scene.rig.physics.motion_end_s
+    orders, still_since_s = len(scene.controller.log), scene.rig.physics._motion.end_s
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=49_900_000))
     with pytest.raises(HexacellError) as refusal:
         await doing()
@@ -232,4 +232,4 @@ async def test_no_step_begins_without_free_disk_space(stage: Any, step: Any, mon
     assert scene.rig.config == config
     if step is not reload:
         assert len(scene.controller.log) == orders
-    assert scene.rig.physics.motion_end_s == still_since_s
+    assert scene.rig.physics._motion.end_s == still_since_s

@@ -21,6 +21,7 @@ from tests.drivers.controllers.linuxcnc.dialogue import (
     TARGET,
     said,
 )
+from tests.linuxcnc_orders import joints_of, pose_of
 from tests.waiting import until
 
 
@@ -52,7 +53,7 @@ async def test_a_cancelled_move_raises_the_cancellation_even_if_the_stop_fails(p
 async def test_a_move_cancelled_before_its_turn_stops_nothing(play):
     answer = play.Pause()
     driver = await play.opened([("get joint_pos", answer, b"JOINT_POS 1 2 3 4 5 6\r\n")])
-    asking = asyncio.create_task(driver.joint_positions())
+    asking = asyncio.create_task(joints_of(driver))
     await asyncio.sleep(0)
     moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
     await answer.reached.wait()
@@ -71,13 +72,13 @@ async def test_the_late_answer_to_a_cancelled_query_is_discarded(play):
             ("get joint_pos", b"JOINT_POS 6 5 4 3 2 1\r\n"),
         ]
     )
-    asking = asyncio.create_task(driver.joint_positions())
+    asking = asyncio.create_task(joints_of(driver))
     await late.reached.wait()
     asking.cancel()
     with pytest.raises(asyncio.CancelledError):
         await asking
     late.set()
-    assert await driver.joint_positions() == (6.0, 5.0, 4.0, 3.0, 2.0, 1.0)
+    assert await joints_of(driver) == (6.0, 5.0, 4.0, 3.0, 2.0, 1.0)
 
 
 async def test_an_answer_after_its_timeout_is_discarded(play):
@@ -85,9 +86,9 @@ async def test_an_answer_after_its_timeout_is_discarded(play):
     late = play.Pause()
     driver = await play.opened([("get abs_act_pos", late, ARRIVED), ("get abs_act_pos", HALF_WAY)])
     with pytest.raises(ResponseTimeout, match=r"did not answer 'get abs_act_pos' within 0\.4 s"):
-        await driver.pose()
+        await pose_of(driver)
     late.set()
-    assert (await driver.pose()).x == 5.0
+    assert (await pose_of(driver)).x == 5.0
 
 
 async def test_a_missing_answer_makes_the_driver_reconnect(play):
@@ -96,17 +97,17 @@ async def test_a_missing_answer_makes_the_driver_reconnect(play):
         [("get abs_act_pos", play.SILENCE)], [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)]
     )
     with pytest.raises(ResponseTimeout):
-        await driver.pose()
-    assert (await driver.pose()).x == 5.0
+        await pose_of(driver)
+    assert (await pose_of(driver)).x == 5.0
 
 
 async def test_a_server_that_was_started_anew_is_connected_to_again(play):
     driver = await play.opened(
         [("get abs_act_pos", ARRIVED, play.HANG_UP)], [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)]
     )
-    assert (await driver.pose()).x == 10.0
+    assert (await pose_of(driver)).x == 10.0
     await until(driver._session._channel.commands.connection._reader.at_eof)
-    assert (await driver.pose()).x == 5.0
+    assert (await pose_of(driver)).x == 5.0
 
 
 async def test_a_garbled_query_is_repeated_and_a_garbled_command_is_not(play):
@@ -118,7 +119,7 @@ async def test_a_garbled_query_is_repeated_and_a_garbled_command_is_not(play):
             *said("get enable: ON | get error: No characters found in reading real value | get error: OK"),
         ]
     )
-    assert await driver.joint_positions() == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    assert await joints_of(driver) == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
     with pytest.raises(MoveRefused):
         await driver.move(TARGET, MOVE_S)
 
@@ -127,7 +128,7 @@ async def test_closing_ends_a_query_in_progress(play):
     play.patience = Timeouts(answer=3600.0)
     never = play.Pause()
     driver = await play.opened([("get joint_pos", never)])
-    asking = asyncio.create_task(driver.joint_positions())
+    asking = asyncio.create_task(joints_of(driver))
     await never.reached.wait()
     await driver.close()
     with pytest.raises(DeviceError):

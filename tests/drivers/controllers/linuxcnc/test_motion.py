@@ -34,6 +34,7 @@ from tests.drivers.controllers.linuxcnc.dialogue import (
     UNITS,
     said,
 )
+from tests.linuxcnc_orders import joints_of
 
 
 async def test_a_move_returns_when_the_position_is_within_tolerance(play):
@@ -131,7 +132,7 @@ async def test_a_move_that_exceeds_its_timeout_is_stopped_and_its_late_answer_is
     with pytest.raises(MotionInterrupted, match=r"still moving after 0\.03 s and was stopped"):
         await driver.move(TARGET, 0.01)
     stopped.set()
-    assert await driver.joint_positions() == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    assert await joints_of(driver) == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 
 async def test_a_connection_lost_during_a_move_stops_the_machine(play):

@@ -16,6 +16,7 @@ from drivers.wire_trace import WireTrace
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError, ExitCode, UsageError
 from tests.drivers.controllers.linuxcnc.dialogue import said
+from tests.linuxcnc_orders import joints_of, pose_of
 
 HELLO = "hello EMC hexacell 1.0"
 
@@ -46,7 +47,7 @@ async def test_a_server_without_echo_and_with_the_alias(play):
 async def test_answers_that_come_in_pieces(play):
     gap = play.Pause()
     driver = await play.opened([("get joint_pos", b"JOINT_POS 1 2 3 ", gap, b"4 5 6\r\n")])
-    asking = asyncio.create_task(driver.joint_positions())
+    asking = asyncio.create_task(joints_of(driver))
     await gap.reached.wait()
     gap.set()
     assert await asking == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -129,7 +130,7 @@ async def test_a_failed_opening_can_be_repeated_and_leaves_it_closed(play):
     with pytest.raises(ConnectionLost):
         await driver.open()
     with pytest.raises(DeviceError, match="is not connected"):
-        await driver.pose()
+        await pose_of(driver)
     await driver.open()
 
 

@@ -20,6 +20,7 @@ from tests.drivers.controllers.linuxcnc.dialogue import (
     TARGET,
     said,
 )
+from tests.linuxcnc_orders import joints_of
 
 
 async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(play):
@@ -104,9 +105,9 @@ async def test_the_driver_does_not_reconnect_during_a_stop(play):
         [*play.GREETING, ("set abort", speak, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
         [*play.OPENING[:-1], joints],
     )
-    await driver.joint_positions()
+    await joints_of(driver)
     stopping = asyncio.create_task(driver.stop())
-    asking = asyncio.create_task(driver.joint_positions())
+    asking = asyncio.create_task(joints_of(driver))
     await speak.reached.wait()
     connections_so_far = play.servers[0].connections
     speak.set()
@@ -121,7 +122,7 @@ async def test_a_move_that_waits_for_its_turn_is_not_begun_after_a_stop(play):
         [("get joint_pos", answer, b"JOINT_POS 1 2 3 4 5 6\r\n"), AGAIN_IN_CONTROL],
         [*play.GREETING, ("set abort", abort, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
     )
-    asking = asyncio.create_task(driver.joint_positions())
+    asking = asyncio.create_task(joints_of(driver))
     moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
     await answer.reached.wait()
     stopping = asyncio.create_task(driver.stop())

@@ -17,6 +17,7 @@ from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 from tests.drivers.simulated.linuxcnc.conftest import QUICK
+from tests.linuxcnc_orders import joints_of, pose_of
 
 ALL = frozenset(StartupAction)
 MOVE_S = 0.1
@@ -57,8 +58,8 @@ async def test_an_inch_machine_is_commanded_and_told_in_mm(machine):
         await controller.prepare(ALL)
         await controller.move(TARGET, MOVE_S)
         assert machine.pose() == TARGET
-        assert (await controller.pose()).as_tuple() == pytest.approx(TARGET.as_tuple(), abs=2e-5)
-        assert await controller.joint_positions() == pytest.approx(TARGET.as_tuple(), abs=2e-5)
+        assert (await pose_of(controller)).as_tuple() == pytest.approx(TARGET.as_tuple(), abs=2e-5)
+        assert await joints_of(controller) == pytest.approx(TARGET.as_tuple(), abs=2e-5)
         await controller.close()
         plain = ControllerSettings(config="machine.ini", port=server.port)
         controller = LinuxcncrshController(plain, timeouts=QUICK)

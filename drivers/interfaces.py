@@ -122,8 +122,7 @@ class Device(Protocol[Identity_co]):
     async def open(self) -> Identity_co:
         """Connect, and check that it is the expected device in usable settings; nothing moves.
 
-        Returns:
-            Its identity, or those of all its parts.
+        It gives its identity, or those of all its parts.
         """
 
     async def close(self) -> None:
@@ -138,17 +137,10 @@ class Gauge(Device[DeviceIdentity], Protocol):
         """Its name in the cell file."""
 
     async def read(self) -> GaugeReading:
-        """The plunger's position now.
-
-        Returns:
-            The value, mm, in the instrument's own zero and direction, once readings agree.
-        """
+        """The plunger's position now, mm, in its own zero and direction, once readings agree."""
 
     async def read_once(self) -> GaugeReading:
-        """The displayed value at this moment, also during motion: for supervision, never for a record.
-
-        Returns:
-            The value of a single query, mm.
+        """The value of a single query, mm, also during motion: for supervision, never for a record.
 
         Raises:
             drivers.errors.WrongAnswer: the answer is garbled.
@@ -162,11 +154,7 @@ class EncoderBank(Device[tuple[DeviceIdentity, ...]], Protocol):
     """Six encoders of the joints that are sampled simultaneously."""
 
     async def read(self) -> EncoderSample:
-        """Sample all six encoders.
-
-        Returns:
-            One complete sample, all of the same instant.
-        """
+        """One complete sample of all six encoders, all of the same instant."""
 
 
 class Controller(Device[DeviceIdentity], Protocol):
@@ -191,18 +179,10 @@ class Controller(Device[DeviceIdentity], Protocol):
         """
 
     async def position(self) -> ReportedPosition | None:
-        """Where it has the robot now.
-
-        Returns:
-            Pose and joints; None before it is homed, when nobody knows.
-        """
+        """Where it has the robot now, pose and joints; None before it is homed, when nobody knows."""
 
     async def status(self) -> ControllerStatus:
-        """Its status now, also during ``move``.
-
-        Returns:
-            Emergency stop, enabled, error messages and heartbeat.
-        """
+        """Its emergency stop, enabled, error messages and heartbeat now, also during ``move``."""
 
     async def stop(self) -> None:
         """Stop the motion in place, at once, also during ``move``."""
@@ -232,11 +212,7 @@ class StopInput(Device[DeviceIdentity | None], Protocol):
     """A contact or a file that forbids motion; without hardware it has no identity."""
 
     async def active_reason(self) -> str | None:
-        """Why motion is forbidden now. Fail-safe: a lost line forbids motion.
-
-        Returns:
-            The reason in words; None if motion is allowed.
-        """
+        """Why motion is forbidden now, in words; None if it is allowed. A lost line forbids it."""
 
 
 class Thermometer(Device[DeviceIdentity], Protocol):
@@ -247,8 +223,4 @@ class Thermometer(Device[DeviceIdentity], Protocol):
         """Its name in the cell file."""
 
     async def read(self) -> TemperatureReading:
-        """The temperature now.
-
-        Returns:
-            The temperature, deg C, within the time-out of the cell file.
-        """
+        """The temperature now, deg C, within the time-out of the cell file."""

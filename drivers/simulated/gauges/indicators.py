@@ -36,8 +36,7 @@ class Mux10(Instrument):
     @staticmethod
     def format_value(channel: int, value: float, *, inch: bool) -> bytes:
         """A data frame: eight characters of digits and point, the sign apart."""
-        sign = b"-" if value < 0 else b"+"
-        return b"0%dA%s%08.*f\r" % (channel, sign, 5 if inch else 3, abs(value))
+        return b"0%dA%+09.*f\r" % (channel, 5 if inch else 3, value)
 
 
 class Sylvac(SingleIndicator):
@@ -176,5 +175,4 @@ class Uwave(Instrument):
     def format_value(channel: int, value: float, *, inch: bool) -> bytes:
         """A frame of one transmitter; a status line now and then is ignored by readers."""
         unit, decimals = (b"I", 5) if inch else (b"M", 3)
-        sign = b"-" if value < 0 else b"+"
-        return b"DT1%04d%s%011.*f%s\r" % (channel, sign, decimals, abs(value), unit)
+        return b"DT1%04d%+012.*f%s\r" % (channel, decimals, value, unit)

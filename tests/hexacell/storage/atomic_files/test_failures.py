@@ -64,7 +64,7 @@ def test_a_write_that_the_kernel_cuts_short_leaves_nothing(path: Path, tmp_path:
         (errno.EXDEV, os.strerror(errno.EXDEV)),
     ],
 )
-@pytest.mark.parametrize("name", ["replace", "fchmod"])
+@pytest.mark.parametrize("name", ["replace", "chmod"])
 def test_failures_are_reported_in_plain_words(
     path: Path, monkeypatch: pytest.MonkeyPatch, name: str, code: int, words: str
 ) -> None:

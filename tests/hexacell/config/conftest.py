@@ -73,9 +73,7 @@ class Faults:
 
     @contextmanager
     def active(self) -> Iterator["Faults"]:
-        names = (
-            "open fsync replace fchmod fstat stat lstat readlink access listxattr chmod mkdir unlink close"
-        )
+        names = "open fsync replace fstat stat lstat readlink access listxattr chmod mkdir unlink close"
         with pytest.MonkeyPatch.context() as patch:
             for name in names.split():
                 patch.setattr(os, name, self.wrap(name, getattr(os, name)))

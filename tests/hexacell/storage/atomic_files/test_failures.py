@@ -68,7 +68,7 @@ def test_a_write_that_the_kernel_cuts_short_leaves_nothing(path: Path, tmp_path:
 def test_failures_are_reported_in_plain_words(
     path: Path, monkeypatch: pytest.MonkeyPatch, name: str, code: int, words: str
 ) -> None:
-    def fail(*_: object) -> None:
+    def fail(*_: object, **_named: object) -> None:
         raise OSError(code, os.strerror(code))
 
     monkeypatch.setattr(os, name, fail)

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import stat
 import tempfile
 import threading
@@ -162,13 +163,13 @@ def test_the_order_is_data_then_name_then_folder(path: Path, monkeypatch: pytest
 def test_no_other_user_can_read_a_private_file_while_it_is_written(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seen, fchmod = [], os.fchmod
+    seen, copystat = [], shutil.copystat
 
-    def look(descriptor: int, mode: int) -> None:
-        seen.append(stat.S_IMODE(os.fstat(descriptor).st_mode))
-        fchmod(descriptor, mode)
+    def look(source: Path, target: Path) -> None:
+        seen.append(stat.S_IMODE(target.stat().st_mode))
+        copystat(source, target)
 
     path.chmod(0o600)
-    monkeypatch.setattr(os, "fchmod", look)
+    monkeypatch.setattr(shutil, "copystat", look)
     atomic_files.write_atomically(path, b"new")
     assert seen == [0o600]

@@ -16,10 +16,13 @@ QUICKER = 100.0
 FAULTY_LEG = 3
 
 
-class ServedTwin(Closeable):
-    """One gauge of the simulation; it shows the length that is set."""
+class served_twin(Closeable):  # noqa: N801 - named as what a test writes behind ``with``
+    """One simulated gauge on a pseudo-terminal, an instrument of one's own or that of the protocol.
 
-    def __init__(self, settings: GaugeSettings, instrument: InstrumentFactory | None) -> None:
+    It shows the length that is set.
+    """
+
+    def __init__(self, settings: GaugeSettings, instrument: InstrumentFactory | None = None) -> None:
         self._mm = 0.0
         others = {} if instrument is None else {settings.protocol: instrument}
         plungers = {settings.name: lambda: self._mm}
@@ -44,13 +47,11 @@ class ServedTwin(Closeable):
         self._bank.close()
 
 
-def served_twin(settings: GaugeSettings, instrument: InstrumentFactory | None = None) -> ServedTwin:
-    """Serve a simulated gauge on a pseudo-terminal: an instrument of one's own, or that of the protocol."""
-    return ServedTwin(settings, instrument)
+class served_encoder_twin(Closeable):  # noqa: N801
+    """Six simulated encoders in this process, CiA 406 or what the settings describe.
 
-
-class ServedEncoderTwin(Closeable):
-    """The six encoders of the simulation; they stand where they are put."""
+    They stand where they are put.
+    """
 
     def __init__(self, settings: EncoderSettings) -> None:
         self._joints: Sequence[float] = (0.0,) * 6
@@ -67,8 +68,3 @@ class ServedEncoderTwin(Closeable):
 
     def close(self) -> None:
         self._bank.close()
-
-
-def served_encoder_twin(settings: EncoderSettings) -> ServedEncoderTwin:
-    """Serve six simulated encoders in this process, CiA 406 or what the settings describe."""
-    return ServedEncoderTwin(settings)

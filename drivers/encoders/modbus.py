@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from drivers.encoders.bank import BankSession, ThreadedBank
 from drivers.errors import BusError, InvalidSampleError, PortLost, SilentNodeError
 from drivers.interfaces import DeviceIdentity
-from drivers.serial.adapters import adapter_at
 from drivers.serial.modbus_port import FUNCTIONS, REQUEST, ModbusPort, RefusedRequest
+from drivers.serial.opening import adapter_at
 from drivers.serial.request_port import NoAnswer
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.described_devices import ModbusEncoderSettings

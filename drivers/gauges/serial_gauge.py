@@ -23,7 +23,7 @@ from drivers.gauges.protocol import (
     Unit,
 )
 from drivers.interfaces import DeviceIdentity, GaugeReading
-from drivers.serial.adapters import adapter_at
+from drivers.serial.opening import adapter_at
 from drivers.serial.port import SerialPort
 from drivers.serial.request_port import NoAnswer, RequestPort
 from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts

@@ -179,16 +179,18 @@ class KeyedConfig:
     def __init__(
         self,
         parameters: ParameterSet,
-        keys: NumberKeys,
+        options: KeyedOptions,
+        default: DefaultKey,
         open_text: OpenText,
-        unit_mm: float,
         read_limits: ReadLimits = lambda _, __: ControllerLimits(),
+        *,
+        is_part: bool,
     ) -> None:
         self._read_limits = read_limits
         self._parameters = parameters
-        self._keys = keys
+        self._keys = NumberKeys.of(parameters, options, default, is_part=is_part)
         self._open = open_text
-        self._unit_mm = unit_mm
+        self._unit_mm = options.unit_mm
 
     def read(self, path: Path) -> ControllerGeometry:
         """The geometry in the file; raises ``FileError`` with file and line."""

@@ -27,7 +27,7 @@ from pydantic import Field
 
 from hexacell.cell.fields import Text
 from hexacell.config.interface import NUMBER, NumberToken
-from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, NumberKeys, options_of
+from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, options_of
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.parameters import LEGS, ParameterSet
 
@@ -57,14 +57,17 @@ class LineTemplates(KeyedConfig):
         names = Counter(name for template in templates for name in template.names)
         if options.branch is None and f"{BRANCH}1" in names:
             options = options.model_copy(update={"branch": f"{BRANCH}{{leg}}"})
-        keys = NumberKeys.of(parameters, options, lambda parameter: parameter.name, is_part=is_part)
+        super().__init__(
+            parameters,
+            options,
+            lambda parameter: parameter.name,
+            lambda text, path: _MatchedLines.of(text, path, templates),
+            is_part=is_part,
+        )
         for name in parameters.names:
             if names[name] > 1 or not (names[name] or is_part):
                 often = "in no line" if not names[name] else "in more than one line"
                 raise UsageError(f"config_options: {name} is {often}", action="Put it into one")
-        super().__init__(
-            parameters, keys, lambda text, path: _MatchedLines.of(text, path, templates), options.unit_mm
-        )
 
 
 @dataclass(frozen=True, slots=True)

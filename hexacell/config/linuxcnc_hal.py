@@ -11,7 +11,7 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from pydantic import Field
 
 from hexacell.cell.fields import Text
 from hexacell.config.interface import NumberToken, token_error
-from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, NumberKeys, options_of
+from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, options_of
 from hexacell.errors import FileError
 from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
 
@@ -43,10 +43,7 @@ class HalPins(KeyedConfig):
         self, parameters: ParameterSet, given: Mapping[str, Any], *, is_part: bool = False
     ) -> None:
         options = options_of(HalPinsOptions, "linuxcnc-hal", given)
-        keys = NumberKeys.of(
-            parameters, options, lambda parameter: _pin(options.component, parameter), is_part=is_part
-        )
-        super().__init__(parameters, keys, HalText, options.unit_mm)
+        super().__init__(parameters, options, partial(_pin, options.component), HalText, is_part=is_part)
 
 
 def _pin(component: str, parameter: GeometricParameter) -> str:

@@ -34,7 +34,7 @@ from hexacell.config.interface import (
     number_of,
     token_error,
 )
-from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, NumberKeys, NumberLookup, options_of
+from hexacell.config.keyed_config import KeyedConfig, KeyedOptions, NumberLookup, options_of
 from hexacell.errors import FileError
 from hexacell.kinematics.parameters import LEGS, ParameterSet
 from hexacell.storage import atomic_files
@@ -53,13 +53,13 @@ class LinuxcncIni(KeyedConfig):
         self, parameters: ParameterSet, given: Mapping[str, Any], *, is_part: bool = False
     ) -> None:
         options = options_of(LinuxcncIniOptions, "linuxcnc-ini", given)
-        keys = NumberKeys.of(parameters, options, lambda parameter: parameter.name.upper(), is_part=is_part)
         super().__init__(
             parameters,
-            keys,
+            options,
+            lambda parameter: parameter.name.upper(),
             lambda text, path: IniText(text, path, options.section),
-            options.unit_mm,
             lambda text, path: limits_in(text, path, options.unit_mm),
+            is_part=is_part,
         )
 
 

@@ -10,7 +10,7 @@ import tomlkit
 
 from drivers.discovery.encoders import BusFindings, FoundFrame, FoundNode
 from drivers.discovery.gauges import FoundGauge, PortFindings
-from drivers.serial.adapters import SerialPortFound
+from drivers.serial.opening import SerialPortFound
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.services.devices.device_diagnosis import DeviceDiagnosis, Failure
 from hexacell.services.devices.device_search import (

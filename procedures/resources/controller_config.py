@@ -137,10 +137,6 @@ class ConfigChanges:
         """Where the config is kept while the controller has a provisional geometry."""
         return self.folder.path / PROVISIONAL_FOLDER
 
-    def holds_provisional(self) -> bool:
-        """Whether the config holds the provisional geometry of this run; raises ``FileError``."""
-        return holds_provisional(self.folder, self.cell.config_paths)
-
     def change_to(self, geometry: Geometry, state: RunState) -> ConfigChange:
         """The change of the config to a geometry in the controller's frames; nothing is written."""
         return propose(

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 from hexacell.cell.fields import GeometryDocument
 from hexacell.config.write_record import WriteKind
 from hexacell.errors import HexacellError
+from procedures.resources.controller_config import holds_provisional
 from procedures.resources.run_resources import RunResources
 from procedures.run.cancellation import in_thread
 from procedures.run.state import RunState
@@ -85,7 +86,7 @@ class TakeBack(StepWithoutMotion):
 
     async def perform(self, run: RunResources, state: RunState) -> ProvisionalReverted:
         config = run.config
-        is_written = config.holds_provisional()
+        is_written = holds_provisional(run.folder, run.cell.config_paths)
         if is_written:
             cause = config.cause(WriteKind.PROVISIONAL_TAKEN_BACK, "it was to be used in the run alone")
             await config.restore(config.provisional_backup, cause)

@@ -21,7 +21,7 @@ from drivers.discovery.encoders import (
     speaks_slcan,
 )
 from drivers.discovery.gauges import FoundGauge, PortFindings, probe_of, search_port
-from drivers.serial.adapters import SerialPortFound, serial_ports
+from drivers.serial.opening import SerialPortFound, serial_ports
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.plugins import Group, load, names
 from hexacell.services.devices.first_cell import GAUGE_AXES, CellDraft, Document, FoundKeys

@@ -8,15 +8,15 @@ import pytest
 from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
-from drivers.serial import adapters
-from drivers.serial.adapters import adapter_at, serial_ports
+from drivers.serial import opening
+from drivers.serial.opening import adapter_at, serial_ports
 
 
 @pytest.fixture
 def plug(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Plugs adapters in: names of devices with serial number and USB socket."""
     by_id, by_path = tmp_path / "by-id", tmp_path / "by-path"
-    monkeypatch.setattr(adapters, "STABLE_NAMES", (by_id, by_path))
+    monkeypatch.setattr(opening, "STABLE_NAMES", (by_id, by_path))
 
     def plugged(**devices: tuple[str | None, str]) -> None:
         infos = []

@@ -6,11 +6,10 @@ from collections.abc import Callable
 
 from drivers.gauges.cdi import CdiGauge
 from drivers.gauges.described import ModbusGauge, RequestGauge, StreamGauge
-from drivers.gauges.displays import DigimaticUsbGauge, HeidenhainGauge, IdHGauge, KeyenceGauge
+from drivers.gauges.displays import DigimaticUsbGauge, HeidenhainGauge, IdHGauge, KeyenceGauge, UwaveGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.gauges.sylvac import SylvacGauge
-from drivers.gauges.uwave import UwaveGauge
 from drivers.gauges.visa import VisaGauge
 from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, instrument_class

@@ -34,9 +34,3 @@ def test_a_config_by_name(installed: Path, name: str) -> None:
 def test_an_unknown_config_name_is_refused_with_the_nearest() -> None:
     with pytest.raises(UsageError, match=r"'simulated-hexaglid' .* Did you mean 'simulated-hexaglide'"):
         bundled.bundled_config("simulated-hexaglid")
-
-
-@pytest.mark.usefixtures("installed")
-def test_a_config_name_without_a_near_match_is_refused_with_all_names() -> None:
-    with pytest.raises(UsageError, match="There are: linuxcnc-hexaglide, simulated-hexaglide"):
-        bundled.bundled_config("12")

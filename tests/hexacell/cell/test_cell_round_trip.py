@@ -110,16 +110,6 @@ def test_settings_dumped_and_described_load_as_the_same(load_text, settings):
     assert load_text(describe(cell)).settings == settings
 
 
-def test_dump_writes_every_number_in_full(load_changed):
-    settings = load_changed(("tilt_deg = 45.0", "tilt_deg = 44.300000000000004")).settings
-    assert "tilt_deg = 44.300000000000004\n" in dump(settings)
-
-
-def test_dump_leaves_out_what_is_not_set(load_text, cell_text):
-    settings = load_text(cell_text).settings
-    assert "\nport" not in dump(settings)
-
-
 def test_dump_of_a_real_cell_needs_no_simulation(load_text, cell_text):
     real = load_text(
         cell_text[: cell_text.index("[simulation]")]

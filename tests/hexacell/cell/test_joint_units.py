@@ -6,11 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.cell.by_mechanism import in_joint_unit
 from hexacell.cell.devices import LinearEncoderSettings, RotaryEncoderSettings
-from hexacell.cell.limits import SpeedSettings
 from hexacell.cell.loader import describe, load_cell
-from hexacell.cell.measuring import NoiseSettings
 from hexacell.errors import FileError
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.robot.stated import stated_effects
@@ -73,17 +70,6 @@ def test_a_length_check_is_of_encoders_of_lengths(tmp_path: Path) -> None:
     section = f"[length_check]\n{values}[simulation]"
     with pytest.raises(FileError, match="those of this mechanism are of angles"):
         load_cell(changed(tmp_path, "[simulation]", section))
-
-
-def test_sections_in_mm_stay_as_they_are() -> None:
-    assert in_joint_unit(NoiseSettings, JointUnit.MM) is NoiseSettings
-    in_deg = in_joint_unit(SpeedSettings, JointUnit.DEG)()
-    assert in_deg.model_dump() == {
-        "joint_deg_s": 30.0,
-        "edge_mm_s": 100.0,
-        "joint_at_gauges_deg_s": 7.5,
-        "edge_at_gauges_mm_s": 25.0,
-    }
 
 
 def test_a_count_is_a_length_or_an_angle() -> None:

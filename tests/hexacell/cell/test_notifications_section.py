@@ -8,10 +8,9 @@ import pytest
 from pydantic import ValidationError
 
 from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import dump, load_cell
+from hexacell.cell.loader import load_cell
 from hexacell.cell.operation import USUAL_OCCASIONS, NotificationSettings, Occasion, OccasionWord
 from hexacell.errors import FileError
-from hexacell.storage.toml_document import without_secrets
 
 OPEN_ADDRESSES = [
     "https://host:8443/a/b",
@@ -46,11 +45,6 @@ def test_addresses_without_secrets_may_stand_there(url) -> None:
     settings = NotificationSettings(name="one", url=url)
     assert (settings.url, settings.on) == (url, USUAL_OCCASIONS)
     assert Occasion.PASS not in USUAL_OCCASIONS
-
-
-@pytest.mark.parametrize("url", OPEN_ADDRESSES)
-def test_the_copy_with_a_run_keeps_them(url) -> None:
-    assert without_secrets(f'url = "{url}"') == f'url = "{url}"'
 
 
 def test_runs_whose_copy_has_a_masked_address_can_still_be_read() -> None:
@@ -97,11 +91,6 @@ def test_a_word_that_is_no_occasion_is_answered_with_each_that_is_once(cell_with
     for word in get_args(OccasionWord):
         assert str(raised.value).count(f"'{word}'") == 1
     assert str(raised.value).count("alarm") == 1
-
-
-def test_a_first_one_can_be_added_to_a_cell_file_that_was_written_with_defaults(cell_with) -> None:
-    found = cell_with(ONE, dump(load_cell(bundled_config("simulated-hexaglide")).settings))
-    assert [one.name for one in found.settings.notifications] == ["one"]
 
 
 def test_names_differ(cell_with) -> None:

@@ -8,13 +8,7 @@ import pytest
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
-from hexacell.cell.recovery import (
-    Action,
-    AttendedRecovery,
-    FailureKind,
-    RecoverySettings,
-    UnattendedRecovery,
-)
+from hexacell.cell.recovery import Action, AttendedRecovery, FailureKind, UnattendedRecovery
 from hexacell.errors import FileError
 
 
@@ -58,8 +52,3 @@ def test_there_is_an_escalation_for_every_kind_but_the_final_ones(escalations: A
     named = set(type(escalations).model_fields)
     assert named == {kind.value for kind in FailureKind} - {FailureKind.FINAL.value}
     assert escalations.action(FailureKind.FINAL, 1) is Action.ABORT
-
-
-def test_the_limit_of_agreement_is_tighter_than_that_of_drift() -> None:
-    settings = load_cell(bundled_config("simulated-hexaglide")).settings
-    assert RecoverySettings().agreement_mm < settings.acceptance.drift_mm

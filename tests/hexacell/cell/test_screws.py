@@ -51,11 +51,6 @@ def test_its_robot_has_legs_that_the_screws_correct(cell_with) -> None:
     assert 0.01 < np.abs(added).max() < 5.0 / 4.0
 
 
-def test_every_robot_of_a_cell_has_the_same_mechanism(cell_with) -> None:
-    settings = load_cell(cell_with("gough-stewart", SCREWS)).settings
-    assert settings.mechanism is settings.mechanism
-
-
 def test_errors_of_scale_go_with_them(cell_with) -> None:
     mechanism = load_cell(cell_with("gough-stewart", SCREWS, *SCALES)).settings.mechanism
     assert isinstance(mechanism, WithEncoderScales)

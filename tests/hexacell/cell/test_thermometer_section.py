@@ -9,10 +9,6 @@ from hexacell.cell.loader import describe
 ROOM = '\n[[thermometers]]\nname = "room"\npath = "/sys/class/hwmon/hwmon0/temp1_input"\n'
 
 
-def test_a_cell_without_thermometers_is_valid(load_text, cell_text) -> None:
-    assert load_text(cell_text).settings.thermometers == ()
-
-
 def test_settings_of_a_thermometer(load_text, cell_text) -> None:
     rails = ROOM.replace("room", "rails") + 'protocol = "laser"\ntimeout_s = 0.5\n'
     cell = load_text(cell_text + ROOM + rails)

@@ -6,7 +6,6 @@ from typing import get_args
 
 import pytest
 
-from hexacell.cell.loader import describe
 from hexacell.cell.uncertainty import SIZES_OF_GRADES, Grade, RotaryUncertaintySettings, UncertaintySettings
 
 SECTION = '[uncertainty]\ngrade = "ideal"\n'
@@ -34,12 +33,6 @@ def test_every_grade_is_told_and_only_states_sizes_that_exist(load_section, grad
     assert {key: getattr(stated, key) for key in sizes} == sizes
 
 
-def test_an_ideal_machine_has_no_effect_at_all(load_section) -> None:
-    stated = load_section(SECTION).settings.uncertainty
-    constants = {key for key in SIZES if key.endswith("_mm") or "expansion" in key or "compliance" in key}
-    assert all(getattr(stated, key) == 0.0 for key in SIZES - constants)
-
-
 def test_a_size_replaces_that_of_the_grade_and_has_its_source(load_section) -> None:
     stated = load_section(
         '[uncertainty]\ngrade = "ordinary"\nload_n = 50\nrail_wave_long_um = 4.0\n'
@@ -48,13 +41,6 @@ def test_a_size_replaces_that_of_the_grade_and_has_its_source(load_section) -> N
     assert (stated.load_n, stated.rail_wave_long_um, stated.rail_wave_short_um) == (50.0, 4.0, 5.0)
     sources = [stated.source(key) for key in ("load_n", "rail_wave_long_um", "rail_wave_short_um")]
     assert sources == ["cell file", "certificate 7", "assumed: ordinary"]
-
-
-def test_the_description_shows_every_size_and_reads_back(load_section, load_text) -> None:
-    cell = load_section('[uncertainty]\ngrade = "ordinary"\nload_n = 50.0\n')
-    text = describe(cell)
-    assert "encoder_scale_um_m = 20.0  # default\n" in text
-    assert load_text(text).settings == cell.settings
 
 
 @pytest.mark.parametrize(

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 import pytest
 
-from hexacell.cell.fields import GeometrySettings
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 NAMES = ["simulated-hexaglide", "paper-experiment"]
-BRANCH: Branch = (-1, -1, -1, 1, 1, 1)
 
 # Table 3 of Abtahi et al. 2010: the ball's positions P1 to P6.
 P1, P2, P3 = (0, 0, 550), (0, -200, 550), (100, -100, 500)
@@ -27,10 +21,6 @@ def cell(request: pytest.FixtureRequest) -> Cell:
     return load_cell(CONFIGS / f"{request.param}.toml")
 
 
-def geometry(values: GeometrySettings) -> Geometry:
-    return Geometry.of(HEXAGLIDE_PARAMETERS, values.model_dump())
-
-
 def test_geometries_obey_the_paper_frame(cell):
     """S2 = 0, S3z = 0, B2z = B3z = B5z, B2y = B5y: the drawing and the truth can be compared."""
     assert cell.settings.simulation is not None
@@ -40,14 +30,6 @@ def test_geometries_obey_the_paper_frame(cell):
         assert values["S"][2][2] == 0
         assert values["B"][1][2] == values["B"][2][2] == values["B"][4][2]
         assert values["B"][1][1] == values["B"][4][1]
-
-
-def test_controller_configs_contain_more_than_the_geometry():
-    for name in NAMES:
-        text = (CONFIGS / f"{name}.controller.toml").read_text()
-        assert set(tomllib.loads(text)) > {"geometry", "machine", "axes"}
-        inside = text[text.index("S = [") : text.index("B = [")]
-        assert inside.count("# leg") == 6
 
 
 def test_simulated_hexaglide_is_table_1():

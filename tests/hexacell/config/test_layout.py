@@ -159,13 +159,6 @@ def test_a_pin_set_to_a_variable_of_the_ini_file_is_in_that_file_alone(tmp_path)
     assert LAYOUT.read(hal, ini).geometry.vector == pytest.approx(drawn_geometry().vector, abs=0.0)
 
 
-def test_numbers_twice_in_one_file_are_refused_with_their_line(tmp_path) -> None:
-    hal, ini = write_config(tmp_path)
-    hal.write_text(f"{hal.read_text()}setp genhexkins.base.0.x 1.0\n")
-    with pytest.raises(FileError, match=r"genhexkins\.base\.0\.x is set a second time, after line 2"):
-        LAYOUT.read(hal, ini)
-
-
 @pytest.mark.parametrize("value", [np.nan, -1.0e9])
 def test_an_unphysical_geometry_is_written_into_none(value) -> None:
     text = "\n".join(ini_file(dict.fromkeys(NAMES, "1.5")))

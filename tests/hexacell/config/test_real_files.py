@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import tempfile
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -30,7 +26,6 @@ CELLS = {
     "toml": CONFIGS / "simulated-hexaglide.toml",
 }
 HAL_AND_INI = "hal and ini"
-NOBODY = 65534
 REMARKS = ("", "# of the owner: S1X = 5.0", "# µm, ä", "#   [HEXAPOD]", "\t")
 INI_LINES = ("#INCLUDE other.inc", "; a remark", "# setp genhexkins.base.0.x 1")
 
@@ -56,22 +51,6 @@ def real(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
         cell = load_cell(CELLS[request.param])
         layout, paths = config_layout(cell.settings), cell.config_paths
     return Real(layout, tuple(path.read_bytes().decode().replace("\r\n", "\n") for path in paths))
-
-
-@pytest.fixture
-def folder() -> Iterator[Path]:
-    """One of an ordinary user, whose rights this process then has, even if root runs it."""
-    made = Path(tempfile.mkdtemp())
-    is_root = os.geteuid() == 0
-    if is_root:
-        os.chown(made, NOBODY, NOBODY)
-        os.setegid(NOBODY)
-        os.seteuid(NOBODY)
-    yield made
-    if is_root:
-        os.seteuid(0)
-        os.setegid(0)
-    shutil.rmtree(made)
 
 
 def as_owned(text: str, line_end: str, added: list[tuple[int, str]]) -> bytes:
@@ -158,17 +137,4 @@ def test_what_is_not_utf8_is_refused_with_its_line_and_stays(real: Real, tmp_pat
     with pytest.raises(FileError, match="is not UTF-8 text") as caught:
         real.of(*links)
     assert caught.value.line == real.texts[-1].count("\n") + 1
-    assert [link.read_bytes() for link in links] == contents
-
-
-def test_a_file_that_its_owner_protects_is_left_alone(real: Real, folder: Path) -> None:
-    contents = [text.encode() for text in real.texts]
-    links = written(folder, contents)
-    geometry = real.of(*links)
-    change = propose(
-        links, real.layout, moved(geometry, list(np.arange(42))), fingerprint_at_start=fingerprint(*links)
-    )
-    links[-1].resolve().chmod(0o444)
-    with pytest.raises(FileError, match="cannot be written and is unchanged: permission denied"):
-        commit(change, folder / "backup")
     assert [link.read_bytes() for link in links] == contents

@@ -5,7 +5,6 @@ import os
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from hexacell.config.change import AFTER, BEFORE, ConfigChange, Receipt
@@ -231,14 +230,3 @@ def test_a_lost_copy_of_one_file_is_a_damaged_backup(either: Bench, tmp_path: Pa
     with pytest.raises(FileError, match="the backup is damaged"):
         rollback(receipt)
     assert either.found == either.after
-
-
-def test_random_contents_of_any_bytes_are_put_back(bench: Bench) -> None:
-    random = np.random.default_rng(16)
-    for _ in range(20):
-        before, after = (tuple(random.bytes(int(random.integers(0, 200))) for _ in "12") for _ in "12")
-        for path, data in zip(bench.files, (after[0], before[1]), strict=True):
-            path.write_bytes(data)
-        note_write(bench.files, before, after)
-        settle_interrupted_write(bench.files)
-        assert bench.found == before

@@ -99,26 +99,12 @@ def test_a_backup_of_another_version_is_not_overwritten(
     assert config.read_bytes() == proposal.text_before.encode()
 
 
-def test_a_run_folder_that_cannot_be_made_stops_the_commit(
-    config: Path, run: Path, proposal: ConfigChange
-) -> None:
-    run.parent.write_text("a file where a folder must be")
-    with pytest.raises(FileError, match="folder cannot be made"):
-        commit(proposal, run)
-    assert config.read_bytes() == proposal.text_before.encode()
-
-
 def test_a_deleted_config_is_not_brought_back(config: Path, run: Path, proposal: ConfigChange) -> None:
     receipt = commit(proposal, run)
     config.unlink()
     with pytest.raises(FileError, match="does not exist"):
         rollback(receipt)
     assert not config.exists()
-
-
-def test_a_missing_receipt_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="does not exist"):
-        Receipt.of(tmp_path)
 
 
 def test_a_config_that_does_not_read_back_is_restored(

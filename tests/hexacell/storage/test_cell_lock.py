@@ -104,12 +104,6 @@ def test_a_second_descriptor_does_not_keep_the_cell(config: Path, monkeypatch: p
         os.close(copy)
 
 
-def test_an_exception_releases_the_lock(config: Path) -> None:
-    with pytest.raises(ZeroDivisionError), cell_lock(config):
-        raise ZeroDivisionError
-    assert not is_busy(config)
-
-
 def test_links_and_other_spellings_of_the_path_are_the_same_cell(config: Path, tmp_path: Path) -> None:
     folder = tmp_path / "other"
     folder.mkdir()
@@ -224,17 +218,6 @@ def test_a_link_in_place_of_the_lock_file_is_not_followed(config: Path, tmp_path
     with pytest.raises(FileError, match="lock file cannot be opened"), cell_lock(config):
         pass
     assert victim.read_text() == "precious"
-
-
-def test_a_lock_file_that_may_not_be_opened_is_reported(
-    config: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def denied(*_: object) -> int:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(os, "open", denied)
-    with pytest.raises(FileError, match=r"permission denied.*mode 644"), cell_lock(config):
-        pass
 
 
 def test_a_file_system_without_locks_is_reported(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:

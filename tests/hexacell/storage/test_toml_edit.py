@@ -4,11 +4,9 @@ import tomllib
 from collections.abc import Mapping
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from hexacell.storage.toml_document import KeyPath, TomlDocument
-from tests.hexacell.storage.toml_texts import FIRST_MARK, documents, leaves
+from tests.hexacell.storage.toml_texts import leaves
 
 LAYOUTS = {
     "table": "[g]\na = [1, 2] # 1, 2\nb = 3\n",
@@ -61,18 +59,3 @@ def test_every_number_alone_can_be_replaced_and_restored(text: str) -> None:
         old = text.removeprefix(before).removesuffix(after)
         assert repr(tomllib.loads(f"x = {old}")["x"]) == repr(numbers(text)[path])
         assert replaced(changed, {path: old}) == text
-
-
-@given(documents(), st.sampled_from(["\n", "\r\n"]), st.sampled_from(["", "\ufeff"]), st.data())
-def test_only_the_tokens_asked_for_change(text: str, newline: str, mark: str, data: st.DataObject) -> None:
-    text = mark + text.replace("\r\n", "\n").replace("\n", newline)
-    places = [
-        path for path, value in numbers(text).items() if isinstance(value, int) and value >= FIRST_MARK
-    ]
-    chosen = data.draw(st.lists(st.sampled_from(places), unique=True) if places else st.just([]))
-    tokens = {path: f"{n}.25e3" for n, path in enumerate(chosen)}
-    expected = text
-    for path, token in tokens.items():
-        expected = expected.replace(str(numbers(text)[path]), token)
-    document = TomlDocument.parse(text)
-    assert document.replaced(tokens) == expected

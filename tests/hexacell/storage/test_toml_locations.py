@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.storage.toml_document import KeyPath, locate
-from tests.hexacell.storage.toml_texts import FIRST_MARK, documents, leaves
+from tests.hexacell.storage.toml_texts import leaves
 
 TRICKY = r'''
 # a comment with [brackets] and "quotes
@@ -152,13 +152,3 @@ def test_every_document_that_a_writer_makes_is_understood(data: dict[str, Any]) 
     except tomllib.TOMLDecodeError:
         return  # a writer's own mistake
     check(text)
-
-
-@given(documents())
-def test_numbers_are_found_on_their_lines(text: str) -> None:
-    lines = lines_of(text)
-    expected = leaves(tomllib.loads(text))
-    assert set(lines) == set(expected)
-    for path, value in expected.items():
-        if isinstance(value, int) and value >= FIRST_MARK:
-            assert lines[path] == text[: text.index(str(value))].count("\n") + 1

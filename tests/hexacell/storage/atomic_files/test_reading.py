@@ -44,9 +44,3 @@ def test_the_name_of_every_new_folder_is_synced_in_its_parent(
     monkeypatch.setattr(atomic_files, "sync_folder", synced.append)
     atomic_files.create_folder_durably(tmp_path / "runs" / "cell" / "run")
     assert set(synced) == {tmp_path, tmp_path / "runs", tmp_path / "runs" / "cell"}
-
-
-def test_checksums_are_those_of_the_standard() -> None:
-    """FIPS 180-4, the example "abc"."""
-    expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
-    assert atomic_files.sha256(b"abc") == expected

@@ -4,27 +4,14 @@ import errno
 import os
 import shutil
 import stat
-import tempfile
 import threading
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from hexacell.errors import FileError
 from hexacell.storage import atomic_files
 from tests.hexacell.storage.atomic_files.ownership import NOBODY, names
-
-
-@given(st.binary(max_size=300), st.binary(max_size=300))
-def test_written_bytes_are_read_back(old: bytes, new: bytes) -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "file"
-        for data in (old, new):
-            atomic_files.write_atomically(path, data)
-            assert atomic_files.read_bytes(path) == data
-        assert names(Path(folder)) == ["file"]
 
 
 def test_readers_see_the_old_text_or_the_new_one_never_a_mixture(path: Path) -> None:

@@ -21,29 +21,24 @@ from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
 
 
-def test_minutes_are_of_points_records_and_references_read_again():
-    pace = TimeModel(point_minutes=5.0, record_seconds=30.0)
-    assert pace.minutes(10, 2) == pytest.approx(2 * 5.0 + 12 * 0.5)
-
-
-def test_without_a_limit_all_records_are_left():
-    assert Budget(None, None, TimeModel(5.0, 30.0)).records_left(1000, 100) == math.inf
-
-
-@pytest.mark.parametrize(("records", "stations", "left"), [(0, 0, 20), (19, 2, 1), (20, 2, 0), (30, 3, 0)])
-def test_records_are_counted(records, stations, left):
-    assert Budget(20, None, TimeModel(5.0, 30.0)).records_left(records, stations) == left
-
-
-@pytest.mark.parametrize(("records", "stations", "left"), [(0, 1, 29), (29, 1, 0), (0, 2, 18), (0, 5, 0)])
-def test_minutes_left_are_those_after_points_and_references_read_again(records, stations, left):
-    assert Budget(None, 20.0, TimeModel(5.0, 30.0)).records_left(records, stations) == left
-
-
-def test_the_tighter_limit_holds():
-    assert Budget(10, 20.0, TimeModel(5.0, 30.0)).records_left(0, 1) == 10
-    assert Budget(100, 20.0, TimeModel(5.0, 30.0)).records_left(0, 1) == 29
-    assert Budget(100, 20.0, TimeModel(5.0, 30.0)).description == "100 records or 20 minutes"
+@pytest.mark.parametrize(
+    ("limits", "records", "stations", "left"),
+    [
+        ((None, None), 1000, 100, math.inf),
+        ((20, None), 0, 0, 20),
+        ((20, None), 19, 2, 1),
+        ((20, None), 30, 3, 0),
+        ((None, 20.0), 0, 1, 29),
+        ((None, 20.0), 29, 1, 0),
+        ((None, 20.0), 0, 2, 18),
+        ((None, 20.0), 0, 5, 0),
+        ((10, 20.0), 0, 1, 10),
+        ((100, 20.0), 0, 1, 29),
+    ],
+)
+def test_the_tighter_of_records_and_minutes_holds(limits, records, stations, left):
+    """Minutes are those after points of 5 minutes, and after references that are read again."""
+    assert Budget(*limits, TimeModel(5.0, 30.0)).records_left(records, stations) == left
 
 
 def test_durations_of_a_cell(make_plan):
@@ -86,30 +81,25 @@ def measured(counts: dict[int, int], done: set[int], point: int | None = None) -
     return CampaignState(MeasurementSet(records), point, frozenset(done))
 
 
-def test_without_a_point_out_of_reach_all_get_what_is_planned() -> None:
-    assert shared_sizes(PLANNED, measured({}, set()), set()) == PLANNED
-    assert shared_sizes(PLANNED, measured({1: 11, 2: 4}, {1}, 2), set()) == PLANNED
+@pytest.mark.parametrize(
+    ("state", "unreachable", "changed"),
+    [
+        (measured({}, set()), set(), {}),
+        (measured({1: 11, 2: 4}, {1}, 2), set(), {}),
+        (measured({1: 11, 2: 4}, {1}, 2), {5}, {2: 14, 3: 14, 4: 14}),
+        (measured({1: 11, 2: 14, 3: 14, 4: 9}, {1, 2, 3}, 4), {5}, {4: 16}),
+        (measured({1: 11}, {1, 2, 3, 4, 5}), set(), {}),
+        (measured({1: 11, 2: 14, 3: 14}, {1, 2, 3}, 4), set(), {}),
+        (measured({1: 22}, {1}), set(), {}),
+    ],
+    ids=["none", "begun", "one out of reach", "the last one", "all done", "in reach again", "too many"],
+)
+def test_the_others_share_what_a_point_does_not_get(state, unreachable, changed) -> None:
+    assert shared_sizes(PLANNED, state, unreachable) == PLANNED | changed
 
 
-def test_the_others_share_what_a_point_does_not_get() -> None:
-    found = shared_sizes(PLANNED, measured({1: 11, 2: 4}, {1}, 2), {5})
-    assert found == PLANNED | {2: 14, 3: 14, 4: 14}
+def test_one_point_takes_at_most_twice_its_own() -> None:
     assert shared_sizes(PLANNED, measured({1: 3, 2: 5}, {1}, 2), set())[2] == 13, "8 among 4"
-
-
-def test_the_last_point_gets_what_is_left() -> None:
-    state = measured({1: 11, 2: 14, 3: 14, 4: 9}, {1, 2, 3}, 4)
-    assert shared_sizes(PLANNED, state, {5})[4] == 16
-    assert shared_sizes(PLANNED, measured({1: 11}, {1, 2, 3, 4, 5}), set()) == PLANNED
-
-
-def test_a_point_that_is_in_reach_again_gets_what_was_planned_for_it() -> None:
-    state = measured({1: 11, 2: 14, 3: 14}, {1, 2, 3}, 4)
-    assert shared_sizes(PLANNED, state, set()) == PLANNED
-    assert shared_sizes(PLANNED, measured({1: 22}, {1}), set()) == PLANNED
-
-
-def test_one_point_does_not_take_the_place_of_all() -> None:
     assert shared_sizes(PLANNED, measured({1: 4}, set(), 1), {2, 3, 4, 5})[1] == 22
 
 

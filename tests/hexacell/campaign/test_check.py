@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState
-from hexacell.checks.check import FEWEST_POINTS, Check, check_settings, identified_before
-from hexacell.checks.drift_estimator import DriftEstimator
+from hexacell.checks.check import FEWEST_POINTS, Check, identified_before
 from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
@@ -84,12 +83,6 @@ def test_an_unchanged_robot_passes_before_the_budget_is_used(unchanged) -> None:
     assert stated.further_records is None
 
 
-def test_the_statement_covers_the_true_error(unchanged) -> None:
-    check, state = unchanged
-    position = said(check, state.measurements).errors.position
-    assert abs(position.value) <= position.expanded
-
-
 def test_a_check_measures_at_two_points_at_least(unchanged) -> None:
     check, state = unchanged
     _, records = np.unique(state.measurements.points, return_counts=True)
@@ -99,16 +92,6 @@ def test_a_check_measures_at_two_points_at_least(unchanged) -> None:
     assert check.reached_at(1, at_first) is not None
     assert check.reached(at_first) is None
     assert check.reached(state.measurements) is not None
-
-
-def test_decisions_depend_on_the_records_alone(make_check, unchanged) -> None:
-    """A resumed check decides as the one that was interrupted."""
-    _, state = unchanged
-    half = MeasurementSet(state.measurements.records[:4])
-    at_half = CampaignState(half, point=1, present=half.records[-1].pose)
-    first, second = (replace(make_check().plan, with_forecast=False).decide(at_half) for _ in range(2))
-    assert first == second
-    assert first.pose == state.measurements.records[4].pose
 
 
 def test_a_robot_that_was_hit_fails(make_check) -> None:
@@ -178,20 +161,3 @@ def test_an_effect_that_was_measured_before_has_its_value_in_the_errors(unchange
     assert plain.errors.position.value < 0.03
     assert stated.errors.position.value == pytest.approx(1000.0 * line.per_unit_mm, abs=0.05)
     assert stated.errors.position.expanded == pytest.approx(plain.errors.position.expanded, rel=0.3)
-
-
-def test_settings_of_a_check_leave_the_calibration_s_targets_out(make_plan) -> None:
-    settings = make_plan(identification__points=TWO_POINTS, identification__target_mm=0.5).settings
-    plan = check_settings(settings, 40).identification
-    assert plan.criterion == "task"
-    assert plan.target_mm is None
-    assert plan.budget_records == 40
-    assert plan.orientations * len(plan.points) >= 40
-
-
-def test_without_records_the_smallest_scale_is_taken(make_check) -> None:
-    check = make_check()
-    assert check.before is not None
-    estimator = DriftEstimator(check.robot, check.before)
-    assert estimator.likeliest(MeasurementSet(())).scale == 1.0
-    assert estimator.at_least(3.0, MeasurementSet(())).scale == 3.0

@@ -11,7 +11,6 @@ from hexacell.campaign.budget import usual_move_seconds
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.config.interface import ControllerGeometry
 from hexacell.dry_run.campaign import dry_run
-from hexacell.identification.solver.result import GeometryEstimate, Termination
 from hexacell.robot.model import make_robot
 from hexacell.robot.stated import stated_effects
 from hexacell.robot.virtual_robot import robots_within_tolerances
@@ -44,11 +43,6 @@ def test_systematic_effects_widen_the_expanded_uncertainty(result):
     assert wider.worst_sigma_mm == result.worst_sigma_mm < result.expanded_mm < wider.expanded_mm
 
 
-@pytest.mark.slow
-def test_the_dry_run_is_repeatable(result):
-    assert dry_run(at_two_points(**SEED)) == result
-
-
 def test_minutes_are_of_everything_that_is_measured(result):
     """Held-out poses are reached on straight lines."""
     plan = at_two_points(**SEED)
@@ -68,28 +62,6 @@ def test_robots_that_cannot_be_measured_do_not_count():
     assert found.robots == 0
     assert found.drawn == 6
     assert found.worst_sigma_mm is None
-
-
-def test_robots_are_within_the_tolerances_and_fill_them(make_plan):
-    plan = make_plan(tolerances__l_mm=2.0)
-    drawn = robots_within_tolerances(plan.robot, 64, seed=3)
-    lengths = np.array([robot["l"] - plan.robot.drawing["l"] for robot in drawn])
-    assert 1.9 < np.abs(lengths).max() <= 2.0
-    # Of joints the distances are in all frames the same: each of two joints errs by up to 7 mm an axis.
-    apart = np.array([np.linalg.norm(np.diff(robot["S"], axis=0), axis=1) for robot in drawn])
-    as_drawn = np.linalg.norm(np.diff(plan.robot.drawing["S"], axis=0), axis=1)
-    assert 10.0 < np.abs(apart - as_drawn).max() <= 14.0 * np.sqrt(3.0)
-    exact = [GeometryEstimate(robot, np.zeros((42, 42)), Termination.STEP, ()) for robot in drawn]
-    assert not any(plan.robot.tolerance_violations(one) for one in exact)
-
-
-def test_a_common_offset_of_the_ball_is_common(make_plan):
-    plan = make_plan(tolerances__ball_mm=30.0, tolerances__B_mm=0.001)
-    B = np.array(
-        [robot["B"] - plan.robot.drawing["B"] for robot in robots_within_tolerances(plan.robot, 16, seed=3)]
-    )
-    assert np.ptp(B, axis=1).max() < 0.01
-    assert np.abs(B).max() > 20.0
 
 
 def test_a_robot_calibrated_before_is_near_what_its_controller_has(make_plan, paper):

@@ -9,10 +9,9 @@ import pytest
 
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.forecast import PlannedInformation
-from hexacell.design.criteria import add_information, covariance_update
+from hexacell.design.criteria import add_information
 from hexacell.identification.diagnostics.pose_accuracy import predicted_accuracy
 from hexacell.identification.estimator import estimate_online
-from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot.virtual_robot import VirtualRobot
 from tests.hexacell.campaign.conftest import TWO_POINTS, at_two_points
@@ -63,17 +62,6 @@ def test_a_point_that_cannot_be_reached_has_no_set(make_plan):
     assert len(plan.planned_sets[1]) == 0
     seen = PlannedInformation.of(plan.planned_sets, plan.robot.belief())
     assert not seen.information(2, 8).any()
-
-
-def test_updating_one_by_one_or_at_once_is_the_same():
-    random = np.random.default_rng(0)
-    covariance = np.diag(random.uniform(1.0, 9.0, 5))
-    records = [(random.standard_normal((3, 5)), np.diag(random.uniform(0.1, 1.0, 3))) for _ in range(4)]
-    one_by_one: Array = covariance
-    for jacobian, noise in records:
-        one_by_one = covariance_update(one_by_one, jacobian, noise)
-    told = np.sum([jacobian.T @ np.linalg.inv(noise) @ jacobian for jacobian, noise in records], axis=0)
-    np.testing.assert_allclose(one_by_one, add_information(covariance, told), atol=1e-12)
 
 
 def test_the_error_at_the_task_is_that_of_the_assessment(campaign, two_points):

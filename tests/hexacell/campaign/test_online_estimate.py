@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.campaign import online_estimate
 from hexacell.campaign.online_estimate import (
     ChainedEstimate,
     OnlineEstimator,
@@ -17,7 +16,6 @@ from hexacell.campaign.online_estimate import (
 )
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import estimate_online
-from hexacell.identification.solver import multistart
 from hexacell.measurements.records import MeasurementSet
 from tests.hexacell.altered_records import altered
 
@@ -86,23 +84,6 @@ def test_a_robot_near_its_prior_keeps_all_records(noisy, chain):
     assert not last.false_records
 
 
-@pytest.mark.slow
-def test_a_search_in_vain_is_not_repeated_at_every_record(noisy, chain, monkeypatch):
-    searched = []
-    restarts = multistart.restarts
-
-    def counted(problem):
-        searched.append(problem.records)
-        return restarts(problem)
-
-    monkeypatch.setattr(online_estimate, "restarts", counted)
-    every = chain(with_change(noisy, None, np.negative))
-    assert every[-1].in_vain is not None
-    assert 1 <= len(searched) <= 15
-    implausible = [one for one in every if one.in_vain is not None]
-    assert len(implausible) > 30
-
-
 @pytest.mark.parametrize(
     ("cost", "records", "outdated"),
     [(100.0, 20, False), (199.0, 29, False), (200.0, 20, True), (100.0, 30, True), (10.0, 10, False)],
@@ -147,20 +128,6 @@ def test_the_continued_estimate_equals_the_estimate_from_the_drawing(two_points,
     sigma = np.sqrt(np.diag(anew.free_covariance))
     assert np.abs((chained.free - anew.free) / sigma).max() < 1e-3
     np.testing.assert_allclose(np.sqrt(np.diag(chained.free_covariance)), sigma, rtol=1e-3)
-
-
-def test_the_same_records_are_not_fitted_twice(two_points, records, monkeypatch):
-    fitted = []
-
-    def counting(problem, *before):
-        fitted.append(problem.records)
-        return update_estimate(problem, *before)
-
-    monkeypatch.setattr(online_estimate, "update_estimate", counting)
-    tracker = OnlineEstimator(two_points.robot)
-    for count in (3, 3, 4, 5, 5):
-        tracker.estimate(MeasurementSet(records[:count]))
-    assert fitted == [1, 2, 3, 4, 5]
 
 
 def test_an_implausible_estimate_is_repeated_from_other_starts(two_points, records):

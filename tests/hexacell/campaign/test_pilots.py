@@ -42,15 +42,6 @@ def test_without_their_reference_they_mean_nothing(campaign) -> None:
     assert with_pilots(end.measurements, ()) is end.measurements
 
 
-def test_they_turn_farther_and_farther_and_stay_inside(two_points, at_first) -> None:
-    reference = at_first.measurements.records[0].pose
-    turned = [reference.angle_to(one.pose) for one in at_first.pilots]
-    assert turned[0] < np.radians(5.0)
-    assert np.mean(turned[6:]) > 2.0 * np.mean(turned[:3])
-    largest = max(np.abs(one.deviation).max() for one in at_first.pilots)
-    assert largest < two_points.robot.limits.gauge_travel_mm
-
-
 def test_they_are_chosen_as_if_the_noise_were_larger_than_stated(two_points, at_first) -> None:
     """What a pose would show is as uncertain as by a robot with so much noise."""
     state = before(at_first, 6)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.task_accuracy import planned_systematic_mm
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.dry_run.campaign import VirtualCampaign
@@ -41,13 +40,6 @@ def test_exact_records_are_those_of_a_virtual_robot_without_errors_and_noise(mak
         assert one.pose.as_tuple() == pytest.approx(expected.pose.as_tuple(), abs=1e-9)
         assert one.joints == pytest.approx(expected.joints, abs=1e-6)
         assert one.deviation == pytest.approx(expected.deviation, abs=1e-6)
-
-
-def test_a_machine_without_effects_has_no_systematic_error(make_plan) -> None:
-    plan = make_plan()
-    assert plan.systematic_mm == 0.0
-    forecast = plan.forecast(CampaignState())
-    assert forecast.expanded_mm(forecast.end_mm) == 2.0 * forecast.end_mm
 
 
 def test_it_is_that_of_a_campaign_that_was_carried_out(ordinary, paper) -> None:

@@ -6,7 +6,6 @@ import csv
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState, Finished, FinishPoint, MeasurePose, StartPoint
@@ -55,20 +54,6 @@ def test_a_list_that_is_safe_is_visited_in_its_order(plan_of, visited, carry_out
         assert len(in_order) == len(there)
         assert _near(there[0], visited[point - 1][0])
     assert isinstance(taken[-1].decision, Finished)
-
-
-@pytest.mark.slow
-def test_a_list_without_small_rotations_is_visited_after_pilot_poses(plan_of, carry_out):
-    """As one made of an earlier campaign, whose first poses already were chosen with them."""
-    poses = at_both_points(carry_out(at_two_points()))
-    turned = [poses[0][0].angle_to(pose) for pose in poses[0][1:]]
-    assert min(turned) > np.radians(5.0)
-    assert len(carry_out(plan_of(poses, noise__revisits=0))[-1].state.measurements) == 2
-    state = carry_out(plan_of(poses))[-1].state
-    assert len(state.measurements) == 16
-    reference, pilots = poses[0][0], [record.pose for record in state.pilots]
-    # The commanded angle is the one of the estimated robot but for its errors.
-    assert max(map(reference.angle_to, pilots)) < 1.02 * max(turned)
 
 
 def test_a_pose_that_is_not_safe_yet_is_postponed(plan_of, visited, carry_out):
@@ -139,19 +124,6 @@ def test_a_list_is_read_beside_its_cell_file(cell):
     assert len(listed) == 4
     assert [pose.a for pose in listed.at(1)] == [0.0, 3.5]
     assert [pose.a for pose in listed.at(2)] == [0.0, -2.0]
-
-
-def test_without_a_list_poses_are_selected(cell):
-    plan = cell.settings.identification.model_copy(update={"poses": None})
-    assert (
-        pose_list_of(replace(cell, settings=cell.settings.model_copy(update={"identification": plan})))
-        is None
-    )
-
-
-def test_an_absent_list_is_an_error(cell):
-    with pytest.raises(FileError, match=r"list\.csv: cannot be read"):
-        pose_list_of(cell)
 
 
 def test_a_list_needs_the_columns_of_poses_only(cell):

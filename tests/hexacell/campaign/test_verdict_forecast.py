@@ -130,12 +130,6 @@ def test_as_many_simulated_machines_get_each_verdict_as_forecast(cell, simulated
         assert seen.count(verdict) / MACHINES == pytest.approx(share, abs=4.0 * spread)
 
 
-def test_the_probabilities_are_of_all_verdicts(forecast) -> None:
-    assert set(forecast.probabilities) == set(Verdict)
-    assert sum(forecast.probabilities.values()) == pytest.approx(1.0)
-    assert forecast.probabilities[Verdict.NOT_EVALUATED] >= 0.0029
-
-
 def test_95_percent_pass_the_limits_that_are_proposed(cell, forecast) -> None:
     stated = stated_errors(cell.found, cell.updated, cell.first, cell.second)
     far = 100.0 * forecast.passing.orientation_deg

@@ -22,7 +22,7 @@ from hexacell.study.design_study import (
     design_trials_of,
     run_design_trial,
 )
-from hexacell.text.studies import design_document, design_lines, design_picture
+from hexacell.text.studies import design_document, design_lines
 
 
 def outcome(trial: DesignTrial) -> DesignOutcome:
@@ -76,14 +76,6 @@ def test_robots_that_are_not_identified_are_counted() -> None:
     assert json.dumps(design_document(found), allow_nan=False)
 
 
-def test_the_study_is_shown() -> None:
-    found = study(2)
-    assert max(len(line) for part in design_lines(found) for line in part.splitlines()) <= 80
-    picture = design_picture(found)
-    assert picture.startswith("<svg ")
-    assert picture == design_picture(found)
-
-
 def test_a_robot_that_is_measured_at_one_point_only_is_not_identified(monkeypatch) -> None:
     def at_one_point(*arguments: Any) -> ChosenRecords:
         chosen = chosen_records(*arguments)
@@ -94,18 +86,3 @@ def test_a_robot_that_is_measured_at_one_point_only_is_not_identified(monkeypatc
     found = run_design_trial(DesignTrial(0, OrientationChoice.RANDOM, points=2))
     assert found.last is None
     assert "no second point" in found.reason
-
-
-@pytest.mark.slow
-def test_chosen_orientations_tell_more_than_random_ones_of_the_same_travel() -> None:
-    """One robot, three points; the trial is the same whenever it is made."""
-    usual = DesignTrial(0, points=3)
-    chosen, random = (
-        run_design_trial(usual),
-        run_design_trial(replace(usual, choice=OrientationChoice.RANDOM)),
-    )
-    assert chosen.last is not None
-    assert random.last is not None
-    assert chosen.last.sigma_mm < 0.5 * random.last.sigma_mm
-    assert max(chosen.deviation_mm, random.deviation_mm) <= usual.travel_mm
-    assert run_design_trial(replace(usual, choice=OrientationChoice.RANDOM)) == random

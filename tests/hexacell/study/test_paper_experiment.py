@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 
 from hexacell.study.paper_experiment import (
-    CALIBRATING,
-    ORIENTATIONS,
     REPEATABILITIES_MM,
     Differences,
     Experiment,
     ExperimentOutcome,
-    Reduction,
     experiment_summary,
     experiments_of,
     run_experiment,
@@ -22,11 +19,6 @@ from hexacell.study.paper_experiment import (
 @pytest.fixture(scope="module")
 def repeatable():
     return run_experiment(Experiment(0.0, 0))
-
-
-def test_every_orientation_but_the_first_has_its_distance(repeatable) -> None:
-    for part in (repeatable.calibrating, repeatable.verifying):
-        assert len(part.before) == len(part.ours) == CALIBRATING * (ORIENTATIONS - 1)
 
 
 def test_a_repeatable_robot_comes_back_to_the_place(repeatable) -> None:
@@ -40,12 +32,6 @@ def test_what_is_left_of_another_robot_is_its_repeatability() -> None:
     found = run_experiment(Experiment(0.5, 0))
     expected = 4.0 / np.sqrt(np.pi) * 0.5
     assert 0.8 * expected < np.mean(found.calibrating.ours) < 2.0 * expected
-
-
-def test_means_of_draws_have_a_median_of_those_that_ended() -> None:
-    draws = [Differences((1.0, 3.0), (0.5, 0.7), (0.1, 0.3)), Differences((4.0, 6.0), (), (0.4, 0.6))]
-    found = Reduction.of(draws)
-    assert (found.before, found.paper, found.ours) == pytest.approx((3.5, 0.6, 0.35))
 
 
 def test_all_of_it_is_of_its_own_experiments() -> None:

@@ -17,23 +17,6 @@ def problem(noisy, make_problem):
     return make_problem(noisy)
 
 
-def test_the_error_vector_has_all_the_papers_rows(visit, make_problem):
-    """Eq. 8: 3 m k (k-1) / 2."""
-    problem = make_problem(visit(points=3, orientations=5, seed=2).measured())
-    assert len(reference_solvers.error_vector(problem, problem.start.positions)) == 3 * 3 * 5 * 4 // 2
-
-
-def test_pairs_are_of_one_point_and_each_once(visit, make_problem):
-    problem = make_problem(visit(points=3, orientations=5, seed=2).measured())
-    pairs = [
-        tuple(pair) for pair in reference_solvers.pairs(problem.subset(problem.labels[:, 1] <= 4)).tolist()
-    ]
-    assert len(set(pairs)) == len(pairs) == 3 * 6
-    for first, second in pairs:
-        assert first < second
-        assert first // 4 == second // 4
-
-
 def test_the_pairwise_minimum_is_the_unweighted_centred_one(noisy, make_problem, problem):
     """With no noise on the encoders all weights are equal, and centring is subtracting the mean."""
     unweighted = make_problem(noisy, noise=Noise(encoder=0.0, gauge_mm=0.01))

@@ -66,11 +66,6 @@ def test_few_refined_ones_gain_more_than_the_best_of_thirty_times_as_many(space)
     assert many < quick < thorough
 
 
-def test_without_rounds_candidates_are_ranked_alone(space, candidates) -> None:
-    found = space.refined(candidates, ())
-    assert sorted(found.gains.tolist()) == sorted(candidates.gains.tolist())
-
-
 def test_all_candidates_stay_and_all_are_possible(space, candidates, refined) -> None:
     assert set(candidates.gains.tolist()) <= set(refined.gains.tolist())
     again = space.rated(refined.records.targets.poses.rotations)
@@ -78,15 +73,6 @@ def test_all_candidates_stay_and_all_are_possible(space, candidates, refined) ->
     np.testing.assert_allclose(again.gains, refined.gains, rtol=1e-9)
     used = np.abs(refined.records.deviation) + SAFETY_SIGMAS * refined.records.sigma
     assert used.max() <= TRAVEL_SHARE * space.belief.limits.gauge_travel_mm
-
-
-def test_refining_again_gives_the_same(space, candidates, refined, rounds) -> None:
-    np.testing.assert_array_equal(space.refined(candidates, rounds).gains, refined.gains)
-
-
-def test_the_best_come_first(refined) -> None:
-    assert refined.gains.tolist() == sorted(refined.gains.tolist(), reverse=True)
-    np.testing.assert_array_equal(refined[:5].records.deviation, refined.records.deviation[:5])
 
 
 @given(

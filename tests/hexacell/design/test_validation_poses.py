@@ -74,16 +74,6 @@ def test_validation_poses_differ_from_the_orientations_used(chosen, know, much, 
     assert nearest(away) > 1.2 * nearest(chosen)
 
 
-def test_an_orientation_used_already_is_selected_last(know, paper, limits):
-    exactly = know(paper.nominal, limits=replace(limits, singularity_margin=0.02))
-    centre = np.array([0.0, 0.0, 550.0])
-    turns = PoseBatch.of([Pose(0, 0, 0, tilt) for tilt in (8.0, 16.0, -12.0)]).rotations
-    without = select_validation_poses(exactly, centre, 2, turns)
-    assert without.pose(1).a == pytest.approx(16.0)
-    away = select_validation_poses(exactly, centre, 2, turns, used=turns[1:2])
-    assert away.pose(1).a == pytest.approx(-12.0)
-
-
 def test_validation_poses_are_within_the_limits_of_the_corrected_robot(chosen, much, legs):
     corrected = legs(much.geometry)
     for position, rotation in zip(chosen.positions, chosen.rotations, strict=True):
@@ -114,24 +104,9 @@ def pose_tilts(poses):
     return [poses.pose(row).a for row in range(len(poses))]
 
 
-def test_tilts_are_smaller_when_less_is_known(know, little, much, point):
-    def largest(estimate):
-        poses = select_validation_poses(know(estimate), point, 3, TURNS)
-        return Rotation.from_matrix(poses.rotations).magnitude().max()
-
-    assert largest(little) < largest(much)
-
-
 def test_a_point_out_of_reach_is_refused_and_named(know, much):
     with pytest.raises(LimitError, match=r"untilted platform cannot reach X0\.000 Y0\.000 Z900\.000"):
         select_validation_poses(know(much), np.array([0.0, 0.0, 900.0]), COUNT, TURNS)
-
-
-def test_a_point_the_corrected_robot_cannot_reach_is_refused(know, much, paper):
-    """Its legs are far shorter than the controller believes."""
-    short = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], paper.nominal["l"] - 150.0)
-    with pytest.raises(LimitError, match="untilted platform cannot reach"):
-        select_validation_poses(know(short), np.array([0.0, 0.0, 620.0]), COUNT, TURNS)
 
 
 def test_a_robot_whose_actual_pose_is_not_found_is_refused(know, paper):
@@ -145,13 +120,6 @@ def test_too_few_safe_orientations_are_counted(know, much, limits):
     tight = replace(know(much), limits=replace(limits, gauge_travel_mm=0.2))
     with pytest.raises(LimitError, match=r"only \d+ orientations .* inside the travel"):
         select_validation_poses(tight, CORNER, 40, TURNS[:128])
-
-
-def test_equal_orientations_do_not_count_twice(know, much):
-    same = np.repeat(Rotation.from_rotvec([0.02, 0.0, 0.0]).as_matrix()[None], 8, axis=0)
-    with pytest.raises(LimitError, match="only 2 orientations"):
-        select_validation_poses(know(much), CORNER, 3, same)
-    assert len(select_validation_poses(know(much), CORNER, 2, same)) == 2
 
 
 def test_the_first_pose_is_level_as_the_controller_has_it(know, much, paper):

@@ -41,14 +41,6 @@ class TestHexaglide(MechanismConformance):
     example = example_of("simulated-hexaglide", 0.2)
 
 
-class TestGoughStewart(MechanismConformance):
-    example = example_of("gough-stewart")
-
-
-class TestLinapod(MechanismConformance):
-    example = example_of("linapod")
-
-
 class TestRotaryCranks(MechanismConformance):
     example = example_of("rotary-cranks")
 

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hexacell.kinematics.forward import apply_twist, continue_solution, forward_kinematics, modes_of
+from hexacell.kinematics.forward import continue_solution, forward_kinematics
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -185,14 +185,3 @@ def test_batched_geometries_agree_with_single_ones(hexaglide, paper, inverse):
         alone = forward_kinematics(hexaglide, robot, joints[[row]], at[[row]])
         np.testing.assert_allclose(found.poses.positions[row], alone.poses.positions[0], atol=1e-9)
         np.testing.assert_allclose(found.poses.rotations[row], alone.poses.rotations[0], atol=1e-12)
-
-
-def test_nan_joints_do_not_affect_other_poses(hexaglide, paper, inverse):
-    at = PoseBatch.of([Pose(0, 0, 550), Pose(10, 0, 550), Pose(0, 10, 550)])
-    joints = inverse(paper.nominal, at)
-    joints[1] = np.nan
-    displaced = apply_twist(at, np.full((3, 6), 0.01))
-    mode = modes_of(hexaglide, paper.nominal, at, joints[[0, 0, 2]])
-    found = forward_kinematics(hexaglide, paper.nominal, joints, displaced, mode=mode)
-    assert found.found.tolist() == [True, False, True]
-    np.testing.assert_allclose(found.poses.positions[[0, 2]], at.positions[[0, 2]], atol=1e-8)

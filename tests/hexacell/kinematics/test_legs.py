@@ -10,8 +10,6 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import minimize
 
 from hexacell.kinematics.legs import segment_distances
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
-from hexacell.kinematics.pose import Pose, PoseBatch
 
 points = arrays(float, (4, 3), elements=st.floats(-100, 100, width=32))
 
@@ -52,13 +50,3 @@ def test_the_distance_of_two_segments_is_that_of_their_nearest_points(ends):
 )
 def test_the_distance_of_segments_that_are_easily_seen(ends, distance):
     assert segment_distances(*np.array(ends, dtype=float)) == pytest.approx(distance)
-
-
-def test_legs_close_the_mechanism(paper):
-    poses = PoseBatch.of([Pose(0, 0, 550), Pose(80, -80, 500, 5, 15, 10)])
-    joints = Hexaglide().inverse(paper.nominal, paper.branch, poses)
-    legs = Hexaglide().legs(paper.nominal, poses, joints)
-    lengths = np.linalg.norm(legs.base_joints - legs.platform_joints, axis=-1)
-    np.testing.assert_allclose(lengths, np.tile(paper.nominal["l"], (2, 1)))
-    np.testing.assert_allclose(legs.base_joints[..., 0], paper.nominal["S"][:, 0] + joints)
-    np.testing.assert_allclose(legs.base_joints[:, :, 1:], np.tile(paper.nominal["S"][:, 1:], (2, 1, 1)))

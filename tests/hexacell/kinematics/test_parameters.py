@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.cell.by_mechanism import geometry_settings, tolerance_settings
+from hexacell.cell.by_mechanism import tolerance_settings
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
@@ -29,15 +29,6 @@ def test_missing_keys_are_named_by_the_mechanisms_own_symbols(tmp_path: Path) ->
     needed = r"needs base \(six rows of 3 numbers, mm\), platform \(.*\) and offset \(six numbers, mm\)"
     with pytest.raises(FileError, match=rf"has no base.*{needed}"):
         NativeToml(PARAMETERS).read(config)
-
-
-def test_the_cell_file_has_the_keys_of_the_mechanism() -> None:
-    drawn = Geometry(PARAMETERS, np.arange(42.0)).document()
-    section = geometry_settings(PARAMETERS)
-    assert list(section.model_fields) == ["base", "platform", "offset"]
-    assert section.model_validate(drawn).model_dump()["offset"] == tuple(drawn["offset"])
-    tolerances = tolerance_settings(PARAMETERS)().model_dump()
-    assert list(tolerances) == ["base_mm", "platform_mm", "offset_mm", "ball_mm"]
 
 
 def test_a_unit_has_its_own_decimals_and_no_tolerance_by_default(tmp_path: Path) -> None:

@@ -20,20 +20,6 @@ def test_a_pose_converted_to_a_matrix_and_back_is_unchanged(pose):
     np.testing.assert_allclose(back.as_tuple(), pose.as_tuple(), rtol=0, atol=1e-9)
 
 
-def test_a_pose_reads_as_a_controllers_block():
-    assert str(Pose(10, 20, 560, 5, -4, 3)) == "X10.000 Y20.000 Z560.000 A5.000 B-4.000 C3.000"
-
-
-@given(st.lists(poses, max_size=4))
-def test_a_batch_contains_the_poses_it_was_made_of(several):
-    arrays = PoseBatch.of(several)
-    assert len(arrays) == len(several)
-    assert arrays.positions.shape == (len(several), 3)
-    assert arrays.rotations.shape == (len(several), 3, 3)
-    for row, pose in enumerate(several):
-        np.testing.assert_allclose(arrays.pose(row).as_tuple(), pose.as_tuple(), rtol=0, atol=1e-9)
-
-
 @pytest.mark.parametrize(
     ("rows", "expected"),
     [
@@ -48,13 +34,6 @@ def test_rows_are_taken_from_positions_and_rotations_alike(rows, expected):
     taken = PoseBatch.of(all_of_them)[rows]
     assert [taken.pose(row).z for row in range(len(taken))] == [all_of_them[n].z for n in expected]
     assert [round(taken.pose(row).a) for row in range(len(taken))] == [all_of_them[n].a for n in expected]
-
-
-def test_one_position_in_several_orientations():
-    turned = PoseBatch.of([Pose(0, 0, 0, 10), Pose(0, 0, 0, 0, 20)]).rotations
-    there = PoseBatch.at([1, 2, 3], turned)
-    np.testing.assert_array_equal(there.positions, [[1, 2, 3], [1, 2, 3]])
-    np.testing.assert_array_equal(there.rotations, turned)
 
 
 def test_tilt_is_the_angle_between_the_z_axes_whatever_the_turn_about_them():

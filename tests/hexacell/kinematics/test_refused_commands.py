@@ -17,10 +17,6 @@ def moved(column: int, by: float) -> Pose:
     return Pose(*numbers.tolist())
 
 
-def test_without_refusals_everything_is_allowed() -> None:
-    assert RefusedCommands().allow(PoseBatch.of([Pose(*POSE), Pose(0.0, 0.0, 0.0)])).all()
-
-
 def test_without_an_axis_the_command_itself_is_left_out_and_no_other() -> None:
     refused = RefusedCommands((RefusedCommand(POSE),))
     neighbours = [moved(column, 1e-3) for column in range(6)]

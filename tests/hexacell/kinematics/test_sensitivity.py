@@ -17,8 +17,7 @@ from hexacell.kinematics.sensitivity import (
     pose_sensitivity,
     singularity_margin,
 )
-from tests.geometries import hexaglide_geometry
-from tests.hexacell.kinematics.numeric import POSES, numeric_jacobian, turned_about
+from tests.hexacell.kinematics.numeric import POSES
 
 
 def pose_difference(legs, joints, steps, near):
@@ -57,34 +56,6 @@ def test_margin_is_the_smallest_singular_value_of_the_scaled_jacobian(
     assume(not np.isnan(joints).any())
     margin = singularity_margin(hexaglide, paper.actual, PoseBatch.of([pose]), joints[None])
     assert margin[0] == pytest.approx(legs(paper.actual).margin(joints, vector_of(pose)), abs=1e-5)
-
-
-@pytest.mark.parametrize(("axis", "clear", "beyond"), [("a", 30, 50), ("c", 40, 85), ("b", -30, -60)])
-def test_margin_is_zero_where_the_jacobian_changes_its_sign(hexaglide, paper, axis, clear, beyond):
-    def determinant(angle: float) -> float:
-        at = PoseBatch.of([turned_about(axis, angle)])
-        joints = hexaglide.inverse(paper.nominal, paper.branch, at)
-        return float(np.linalg.det(numeric_jacobian(hexaglide, paper.nominal, at, joints)))
-
-    low, high = float(clear), float(beyond)
-    assert determinant(low) * determinant(high) < 0.0
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if determinant(middle) * determinant(low) > 0.0 else (low, middle)
-    at = PoseBatch.of([turned_about(axis, angle) for angle in (clear, low, beyond)])
-    joints = hexaglide.inverse(paper.nominal, paper.branch, at)
-    margins = singularity_margin(hexaglide, paper.nominal, at, joints)
-    assert margins[1] < 1e-7
-    assert margins[0] > 0.03
-
-
-def test_margin_is_zero_with_two_equal_legs(hexaglide, paper, inverse):
-    S, B, l = paper.nominal["S"].copy(), paper.nominal["B"].copy(), paper.nominal["l"].copy()  # noqa: E741
-    S[4], B[4], l[4] = S[3], B[3], l[3]
-    twin = hexaglide_geometry(S, B, l)
-    at = PoseBatch.of([Pose(0, 0, 550), Pose(20, 30, 500, 10, -5, 8)])
-    margins = singularity_margin(hexaglide, twin, at, inverse(twin, at))
-    np.testing.assert_allclose(margins, 0.0, atol=1e-12)
 
 
 def test_margin_does_not_depend_on_the_size_of_the_machine(hexaglide, paper, inverse):

@@ -14,8 +14,9 @@ from hexacell.limits.limits import Limits
 TRAVEL = GaugeTravel(5.0, (6.25, 6.25, 6.25), (0.0, 0.0, 0.0), 1.0)
 
 
-def test_a_gauge_zeroed_in_the_middle_has_the_same_room_on_both_sides() -> None:
-    assert TRAVEL.room((0.0, 0.0, 0.0)) == GaugeRoom.symmetric(5.0)
+def test_a_gauge_zeroed_in_the_middle_or_not_at_all_has_the_same_room_on_both_sides() -> None:
+    assert TRAVEL.room((0.0, 0.0, 0.0)) == TRAVEL.room() == GaugeRoom.symmetric(5.0)
+    assert TRAVEL.sure_room == GaugeRoom.symmetric(4.0)
 
 
 def test_a_gauge_zeroed_off_the_middle_has_less_on_that_side_and_no_more_on_the_other() -> None:
@@ -23,15 +24,10 @@ def test_a_gauge_zeroed_off_the_middle_has_less_on_that_side_and_no_more_on_the_
     assert room.upper == pytest.approx((1.2, 5.0, 5.0))
     assert room.lower == pytest.approx((-5.0, -4.5, -5.0))
     assert room.smallest_mm == pytest.approx(1.2)
-
-
-def test_a_short_gauge_has_less_than_its_plate_allows() -> None:
-    short = replace(TRAVEL, half_mm=(2.5, 6.25, 6.25))
-    room = short.room((1.0, 0.0, 0.0))
-    assert (room.lower[0], room.upper[0]) == pytest.approx((-3.5, 1.5))
-
-
-def test_what_a_display_shows_in_the_middle_counts() -> None:
+    # A short gauge has less than its plate allows.
+    short = replace(TRAVEL, half_mm=(2.5, 6.25, 6.25)).room((1.0, 0.0, 0.0))
+    assert (short.lower[0], short.upper[0]) == pytest.approx((-3.5, 1.5))
+    # What a display shows in the middle counts.
     shifted = replace(TRAVEL, middle_mm=(6.25, 0.0, 0.0))
     assert shifted.room((7.25, 0.0, 0.0)).upper[0] == pytest.approx(4.0)
     assert shifted.places((7.25, 0.0, 0.0)) == (1.0, 0.0, 0.0)
@@ -43,11 +39,6 @@ def test_a_gauge_that_does_not_tell_its_place_may_stand_off_the_middle_to_both_s
         room = blind.room(zero)
         assert (room.lower[0], room.upper[0]) == (-4.0, 4.0)
     assert blind.places((3.8, 0.0, 0.0))[0] is None
-
-
-def test_before_they_are_zeroed_gauges_are_expected_in_the_middle() -> None:
-    assert TRAVEL.room() == GaugeRoom.symmetric(5.0)
-    assert TRAVEL.sure_room == GaugeRoom.symmetric(4.0)
 
 
 @pytest.mark.parametrize("place", [-1.0, -0.3, 0.7, 1.0])

@@ -60,24 +60,6 @@ def test_the_fastest_piece_is_passed_as_fast_as_allowed(end: Pose) -> None:
     assert share.max() == pytest.approx(1.0)
 
 
-def test_a_tilt_about_the_ball_takes_time_although_the_ball_stays() -> None:
-    """A feed rate would not see it: X, Y and Z do not change."""
-    tilted = Pose(0.0, 0.0, 550.0, 30.0, 0.0, 0.0)
-    radius_mm = np.linalg.norm(ROBOT.controller["B"], axis=1).max()
-    free = SpeedLimits(joint=1e9, edge_mm_s=25.0)
-    assert LINES.of(HOME, tilted, free) > 0.8 * radius_mm * np.radians(30.0) / 25.0
-
-
-def test_the_stricter_limit_decides() -> None:
-    end = Pose(50.0, 20.0, 530.0, 10.0, -5.0, 8.0)
-    by_joints = LINES.of(HOME, end, SpeedLimits(10.0, 1e9))
-    by_edge = LINES.of(HOME, end, SpeedLimits(1e9, 10.0))
-    assert LINES.of(HOME, end, SpeedLimits(10.0, 10.0)) == pytest.approx(max(by_joints, by_edge), rel=0.01)
-    assert LINES.of(HOME, end, SpeedLimits(5.0, 5.0)) == pytest.approx(
-        2.0 * max(by_joints, by_edge), rel=0.01
-    )
-
-
 def test_a_move_to_where_the_robot_is_has_a_duration_too() -> None:
     assert LINES.of(HOME, HOME, LIMITS) == SHORTEST_S
 

@@ -59,13 +59,6 @@ def test_the_fewest_lines(monkeypatch: pytest.MonkeyPatch, clear: Any, route: li
     assert len(lines.asked) == len(set(lines.asked)), "no line is checked twice"
 
 
-def test_a_straight_line_costs_one_check(monkeypatch: pytest.MonkeyPatch) -> None:
-    lines = Lines(monkeypatch, (0, 9))
-    nothing: Any = None
-    find_route(nothing, START, GOAL, VIA)
-    assert lines.asked == [(0, 9)]
-
-
 @pytest.fixture(scope="module")
 def belief() -> Any:
     return robot_of(load_cell(bundled_config("simulated-hexaglide"))).belief()
@@ -82,10 +75,6 @@ def test_a_route_over_level_poses_on_the_papers_robot(belief: Any) -> None:
     assert way is not None
     stops = [start, *(via[row] for row in way), goal]
     assert all(is_clear(belief, here, there) for here, there in pairwise(stops))
-
-
-def test_there_is_no_route_out_of_reach(belief: Any) -> None:
-    assert find_route(belief, at(0.0), PoseBatch.of([Pose(0.0, 0.0, 2000.0)]), []) is None
 
 
 def test_the_ball_of_a_robot_as_drawn_is_where_it_is_commanded(belief: Any) -> None:

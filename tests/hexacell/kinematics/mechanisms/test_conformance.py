@@ -50,12 +50,6 @@ def with_rails(directions: np.ndarray) -> MechanismExample:
     return replace(vertical, drawing=drawing, points=vertical.points * (1.0, 1.0, 0.3) + (0.0, 0.0, 150.0))
 
 
-class TestSlantedRails(MechanismConformance):
-    """Columns that lean toward the middle."""
-
-    example = with_rails(np.array([0.0, 0.0, 1.0]) - example_of("linapod").drawing["S"] / 2000.0)
-
-
 class TestCrossedRails(MechanismConformance):
     """The two rails of a column lean against each other."""
 

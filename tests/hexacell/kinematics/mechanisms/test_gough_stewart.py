@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 
 from hexacell.errors import UsageError
-from hexacell.kinematics.mechanisms.gough_stewart import (
-    GOUGH_STEWART_PARAMETERS,
-    THREE_LEGS_FRAME,
-    GoughStewart,
-)
-from hexacell.kinematics.parameters import MachinePart
+from hexacell.kinematics.mechanisms.gough_stewart import THREE_LEGS_FRAME, GoughStewart
 from hexacell.kinematics.pose import Pose, PoseBatch
 from tests.geometries import gough_stewart_geometry
 
@@ -73,7 +68,3 @@ def test_parameters_in_words() -> None:
     assert name("offset4") == "leg 4 offset"
     assert name("platform1z") == "platform1/platform3/platform5 z"
     assert name("base6y") == "base6 y"
-
-
-def test_every_part_of_it_expands() -> None:
-    assert {kind.part for kind in GOUGH_STEWART_PARAMETERS.kinds} == set(MachinePart)

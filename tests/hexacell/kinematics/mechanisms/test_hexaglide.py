@@ -40,14 +40,6 @@ def test_every_branch_closes_the_legs_and_is_recognised(hexaglide, paper, pose, 
     np.testing.assert_array_equal(hexaglide.branch(paper.nominal, at, joints), [branch])
 
 
-def test_the_branch_gives_the_side_of_each_slider(hexaglide, paper):
-    at = PoseBatch.of([Pose(0, 0, 550)])
-    joints = hexaglide.inverse(paper.nominal, paper.branch, at)[0]
-    platform_joints = paper.nominal["B"][:, 0]
-    assert (joints[:3] < platform_joints[:3]).all()
-    assert (joints[3:] > platform_joints[3:]).all()
-
-
 def test_only_the_leg_that_cannot_reach_is_missing(hexaglide, paper):
     lengths = paper.nominal["l"].copy()
     lengths[3] = 300.0

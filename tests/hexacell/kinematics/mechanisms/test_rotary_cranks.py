@@ -12,7 +12,6 @@ from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.mechanisms.rotary_cranks import ROTARY_CRANKS_PARAMETERS, RotaryCranks
-from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import turns_of
 from hexacell.robot.model import robot_of
@@ -49,23 +48,6 @@ def test_an_angle_is_that_of_the_crank_in_degrees(angle_deg: float) -> None:
     at_origin = PoseBatch.at(np.zeros((1, 3)), np.eye(3)[None])
     both = [MECHANISM.inverse(single(angle_deg), (s,) * 6, at_origin)[0, 0] for s in (-1, 1)]
     assert min(abs(found - angle_deg) for found in both) < 1e-9
-
-
-def test_a_zero_is_what_the_encoder_shows_too_little(drawing: Geometry) -> None:
-    joints = MECHANISM.inverse(drawing, BRANCH, POSES)
-    values = drawing.document() | {"zero": (drawing["zero"] + 1.5).tolist()}
-    shifted = Geometry.of(ROTARY_CRANKS_PARAMETERS, values)
-    np.testing.assert_allclose(MECHANISM.inverse(shifted, BRANCH, POSES), joints - 1.5, atol=1e-9)
-
-
-def test_a_larger_machine_has_the_same_angles(drawing: Geometry) -> None:
-    """Which is why no record tells how large it is."""
-    assert MECHANISM.frame_freedom.size
-    is_length = np.array([one.kind.unit is ParameterUnit.MM for one in ROTARY_CRANKS_PARAMETERS.parameters])
-    larger = Geometry(ROTARY_CRANKS_PARAMETERS, drawing.vector * np.where(is_length, 1.01, 1.0))
-    farther = PoseBatch(1.01 * POSES.positions, POSES.rotations)
-    joints = MECHANISM.inverse(drawing, BRANCH, POSES)
-    np.testing.assert_allclose(MECHANISM.inverse(larger, BRANCH, farther), joints, atol=1e-9)
 
 
 def test_an_axis_that_points_down_is_refused(drawing: Geometry) -> None:

@@ -107,19 +107,6 @@ def test_each_leg_is_corrected_by_its_formula(pose: Pose) -> None:
         assert joints[leg] == pytest.approx(expected, abs=1e-9)
 
 
-@given(poses)
-def test_a_turn_of_the_platform_about_a_leg_lengthens_it_by_its_share_of_the_lead(pose: Pose) -> None:
-    """About its own axis through both joints a leg is not moved: the screw alone is turned."""
-    batch, geometry, turn = PoseBatch.of([pose]), ROBOT.drawing, 1e-5
-    joint = batch.positions[0] + batch.rotations[0] @ geometry["platform"][0]
-    vector = joint - geometry["base"][0]
-    along = vector / np.linalg.norm(vector)
-    shift = np.cross(turn * along, batch.positions[0] - joint)
-    turned = apply_twist(batch, np.concatenate([shift, turn * along])[None])
-    longer = MECHANISM.inverse(geometry, (), turned)[0, 0] - MECHANISM.inverse(geometry, (), batch)[0, 0]
-    assert abs(longer) == pytest.approx(LEAD_MM * turn / (2.0 * np.pi), rel=1e-3)
-
-
 def test_without_a_lead_it_is_the_platform_itself() -> None:
     without = ScrewLegs(Screws(0.0, AXES.base_axes, AXES.platform_axes), ROBOT.drawing)
     batch = PoseBatch.of([Pose(10.0, 20.0, 780.0, 5.0, -10.0, 15.0)])

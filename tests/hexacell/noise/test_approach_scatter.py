@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
-from hexacell.noise.approach_scatter import ALONE, ScatterSource, approach_scatter
+from hexacell.noise.approach_scatter import ScatterSource, approach_scatter
 
 NOISE = 0.01
 VISITS = 7
@@ -90,21 +90,6 @@ def test_one_encoder_is_named(visit) -> None:
     found = Counter(visit(encoders=encoders).source for _ in range(60))
     assert found[ScatterSource.ENCODER_3] >= 45
     assert sum(found.values()) - found[ScatterSource.ENCODER_3] - found[None] <= 2
-
-
-@pytest.mark.slow
-def test_a_single_instrument_is_rarely_blamed_for_all_sliders_or_encoders(visit) -> None:
-    found = Counter(visit(sliders=0.03).source for _ in range(100))
-    found += Counter(visit(encoders=0.03).source for _ in range(100))
-    assert sum(found[source] for source in ALONE) <= 6
-
-
-def test_each_source_is_noise_of_its_instruments() -> None:
-    both = [ScatterSource.JOINTS.instruments, ScatterSource.ENCODERS.instruments]
-    assert [one.tolist() for one in both] == [[0, 0, 0, 1, 1, 1, 1, 1, 1]] * 2
-    assert np.sum([source.instruments for source in ALONE], axis=0).tolist() == [1] * 9
-    assert ScatterSource.GAUGE_Y.instruments.tolist() == [0, 1, 0, 0, 0, 0, 0, 0, 0]
-    assert ScatterSource.ENCODER_6.instruments.tolist() == [0, 0, 0, 0, 0, 0, 0, 0, 1]
 
 
 def test_less_scatter_than_stated_is_no_excess(visit) -> None:

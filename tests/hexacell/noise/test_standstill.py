@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, kstest
 
-from hexacell.cell.measuring import FEWEST_STANDSTILL_READINGS
-from hexacell.noise.standstill import (
-    LARGEST_CORRELATION,
-    SMALLEST_SERIES,
-    USUAL_STEP_MM,
-    display_step,
-    reading_noise,
-)
+from hexacell.noise.standstill import LARGEST_CORRELATION, USUAL_STEP_MM, display_step, reading_noise
 
 READINGS = 40
 SIGMA = 0.003
@@ -108,20 +101,9 @@ def test_the_mean_of_correlated_readings_is_as_noisy_as_drawn(correlation) -> No
     assert stated > 1.3 * SIGMA / np.sqrt(7.0)
 
 
-def test_the_mean_of_independent_readings_is_better_by_the_root_of_their_number(found) -> None:
-    independent = next(one for one in found if one.correlation == 0.0)
-    assert independent.of_mean(16) == pytest.approx(independent.reading / 4.0)
-
-
 def test_a_random_walk_has_the_largest_correlation() -> None:
     walk = np.cumsum(np.random.default_rng(6).standard_normal(400))
     assert reading_noise(walk, STEP).correlation == LARGEST_CORRELATION
-
-
-def test_too_short_a_series_is_refused() -> None:
-    with pytest.raises(ValueError, match="7 readings are no series"):
-        reading_noise(np.zeros(SMALLEST_SERIES - 1), STEP)
-    assert SMALLEST_SERIES == FEWEST_STANDSTILL_READINGS
 
 
 @pytest.mark.parametrize(

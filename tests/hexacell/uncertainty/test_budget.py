@@ -73,23 +73,6 @@ def test_squares_of_all_lines_are_added_at_every_pose(exact, budget_of) -> None:
     assert systematic @ systematic.T == pytest.approx(flat @ flat.T, abs=1e-15)
 
 
-def test_an_effect_of_twice_the_size_has_a_line_twice_as_large(exact, budget_of) -> None:
-    small, large = (budget_of(exact, [rail_waves(um, 600.0)]).lines[0] for um in (5.0, 10.0))
-    assert large.combined_mm == pytest.approx(2.0 * small.combined_mm)
-    assert large.columns == pytest.approx(2.0 * small.columns)
-    assert large.per_unit_mm == pytest.approx(small.per_unit_mm) == pytest.approx(small.combined_mm / 5.0)
-
-
-def test_u_of_the_largest_error_is_its_quantile(exact, budget_of) -> None:
-    """Independent draws of every effect, 5,000 machines of 2 task poses."""
-    budget = budget_of(exact, EFFECTS)
-    random = np.random.default_rng(5)
-    together = np.concatenate([budget.noise, *(line.columns for line in budget.lines)], axis=-1)
-    drawn = random.standard_normal((5000, together.shape[-1])) @ np.swapaxes(together[:, :3], 1, 2)
-    largest = np.linalg.norm(drawn, axis=-1).max(axis=0)
-    assert budget.expanded_mm == pytest.approx(np.quantile(largest, 0.95), rel=0.05)
-
-
 def test_an_estimated_effect_is_taken_out_of_the_noise_and_listed(laboratory, budget_of) -> None:
     """The covariance of the estimate already contains the gauges' scale: nothing is counted twice."""
     noise = Noise(0.01, 0.01, gauge_scale=GAUGE_SCALE)

@@ -18,11 +18,8 @@ from hexacell.robot.model import robot_of
 from hexacell.uncertainty.effect_kinds import (
     common_sag,
     encoder_eccentricities,
-    encoder_scales,
-    load_at_work,
     rail_directions,
     rail_waves,
-    stop_repeatability,
     temperature_at_work,
 )
 from hexacell.uncertainty.effects import Effect
@@ -56,12 +53,6 @@ def test_a_mechanism_without_rails_has_no_effects_of_rails(hexapod, effect) -> N
     assert columns(effect, hexapod).shape == (2, 6, 0)
 
 
-def test_it_has_the_effects_of_encoders_and_loads(hexapod) -> None:
-    assert columns(encoder_scales(1.0), hexapod).shape == (2, 6, 6)
-    assert columns(stop_repeatability(1.0), hexapod).shape == (2, 6, 6)
-    assert columns(load_at_work(1.0, 0.05), hexapod).shape == (2, 6, 3)
-
-
 def test_a_machine_that_expands_evenly_is_the_same_machine_larger(hexapod) -> None:
     """The platform moves away from the base's origin and does not turn; scales expand with the base."""
     even = temperature_at_work(1.0, dict.fromkeys(MachinePart, 10.0))
@@ -89,14 +80,6 @@ def test_a_slider_across_its_rail_moves_its_joint(paper, hexaglide) -> None:
 def moved(geometry: Geometry, shift: np.ndarray) -> Geometry:
     values = {"S": geometry["S"] + shift, "B": geometry["B"], "l": geometry["l"]}
     return Geometry.of(geometry.parameters, values)
-
-
-def test_legs_of_one_rail_are_beside_each_other_in_the_drawing(paper, hexaglide) -> None:
-    poses = PoseBatch.of([Pose(0.0, 0.0, 550.0)])
-    joints = hexaglide.inverse(paper.nominal, paper.branch, poses)
-    for rail in hexaglide.guides(paper.nominal, poses, joints).rails:
-        places = paper.nominal["S"][list(rail), 1:]
-        assert places == pytest.approx(np.broadcast_to(places[0], places.shape))
 
 
 def test_a_disc_off_centre_errs_by_a_sine_over_the_turn() -> None:

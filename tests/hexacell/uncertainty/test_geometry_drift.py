@@ -13,14 +13,7 @@ from hexacell.design.predicted_records import position_derivatives
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
-from hexacell.identification.problem.prior import (
-    IdentifiedBefore,
-    Noise,
-    Prior,
-    Tolerances,
-    drift_covariance,
-    drift_sigma,
-)
+from hexacell.identification.problem.prior import IdentifiedBefore, Noise, Prior, drift_covariance
 from hexacell.identification.problem.problem import Assumptions
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
@@ -51,11 +44,6 @@ def test_drifts_of_any_scale_are_added_to_what_was_left_unknown(hexaglide, geome
     np.testing.assert_array_equal(prior.covariance, 13.0 * np.eye(35))
     assert prior.centre is geometry
     np.testing.assert_array_equal(prior.free, hexaglide.convention.free_parameters(geometry))
-
-
-def test_lengths_drift_as_stated_whatever_their_tolerance(hexaglide) -> None:
-    sigma = drift_sigma(hexaglide, 0.02, Tolerances({"S": 7.0, "B": 3.0, "l": 1.0}))
-    np.testing.assert_array_equal(sigma, np.full(42, 0.02))
 
 
 def test_the_marginal_likelihood_is_that_of_a_normal_distribution(

@@ -62,13 +62,6 @@ def check_of(laboratory, found, machine, fixture) -> LengthCheck:
 
 
 @pytest.mark.parametrize("name", DIRECTIONS)
-def test_true_encoders_show_the_certified_length(laboratory, exact, paper, name) -> None:
-    check = check_of(laboratory, exact, ideal(paper), seats(name))
-    assert check.length_mm == pytest.approx(300.0, abs=1e-6)
-    assert abs(check.encoders_long_um_m) < 0.01
-
-
-@pytest.mark.parametrize("name", DIRECTIONS)
 @pytest.mark.parametrize("long_um_m", [1000.0, -300.0])
 def test_a_scale_of_all_encoders_is_found_in_every_direction(laboratory, paper, name, long_um_m) -> None:
     """The identified geometry is larger by the scale, or nearly so; no residual shows it."""

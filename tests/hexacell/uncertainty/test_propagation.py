@@ -111,17 +111,6 @@ def test_an_effect_adds_the_chi_square_that_its_records_have(laboratory, propaga
     assert found.chi2 == pytest.approx(size**2 * propagation.chi_square(alone), rel=2 * SHARE)
 
 
-def test_the_chi_square_hardly_sees_a_common_scale(propagation) -> None:
-    """An error of 0.1 mm at the task by it adds less than one to the chi-square, by a wave above 30."""
-
-    def chi_square_of_a_tenth(effect):
-        largest = np.linalg.norm(propagation.columns(effect).combined[:, :3], axis=1).max()
-        return propagation.chi_square(effect) * (0.1 / largest) ** 2
-
-    assert chi_square_of_a_tenth(common_encoder_scale(1.0)) < 1.0
-    assert chi_square_of_a_tenth(rail_waves(1.0, 600.0)) > 30.0
-
-
 def test_a_gauge_that_reads_too_much_is_propagated_through_the_result_only(
     laboratory, exact, propagation
 ) -> None:

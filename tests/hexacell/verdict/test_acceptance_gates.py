@@ -7,8 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
 from hexacell.identification.problem.prior import Noise, Tolerances
@@ -100,17 +98,6 @@ def test_a_rod_far_outside_its_tolerance_is_named_with_its_sign(judged, shifted)
     assert re.search(r"S1y \(\+\d\d\.\d\d mm\)", gate.sentence)
 
 
-@pytest.mark.slow
-def test_an_allowed_offset_of_the_ball_is_no_violation(judged, identified, paper):
-    """As the paper's own did: 30 mm in z."""
-    moved = replace(identified.estimate, geometry=paper.calibrated)
-    assert not judged(moved, largest_change_mm=50.0)["within tolerance"].passed
-    allowed = replace(TOLERANCES, ball_mm=40.0)
-    assert judged(moved, tolerances=allowed, largest_change_mm=50.0)["within tolerance"].passed
-    too_little = replace(TOLERANCES, ball_mm=15.0)
-    assert not judged(moved, tolerances=too_little, largest_change_mm=50.0)["within tolerance"].passed
-
-
 def test_the_ball_tolerance_does_not_apply_to_a_single_joint(judged, shifted):
     found = shifted(B4z=25.0)
     assert not judged(found, tolerances=replace(TOLERANCES, ball_mm=40.0))["within tolerance"].passed
@@ -138,14 +125,6 @@ def test_nan_in_the_geometry_fails_the_gates(judged, identified):
 def test_statistics_are_of_distances_not_of_coordinates():
     spread = DeviationStatistics.of([[3.0, 4.0, 0.0], [0.0, 0.0, -1.0]])
     assert spread == DeviationStatistics(mean_mm=3.0, poses=2)
-
-
-@given(st.lists(st.tuples(*[st.floats(-10, 10)] * 3), min_size=1, max_size=20))
-def test_the_mean_never_exceeds_the_largest(deviations):
-    spread = DeviationStatistics.of(deviations)
-    assert spread is not None
-    assert spread.mean_mm <= np.linalg.norm(deviations, axis=1).max() * (1 + 1e-12)
-    assert spread.poses == len(deviations)
 
 
 @pytest.mark.parametrize(

@@ -137,12 +137,6 @@ def test_a_check_that_contradicts_itself_says_nothing(verified) -> None:
     assert "length scale: checked" not in verification_text(verification)
 
 
-def test_a_distance_that_is_not_the_certified_one_looks_like_a_scale(verified) -> None:
-    """Nothing else can be said: the certificate is what is believed."""
-    verification, _ = verified(distance_mm=300.3)
-    assert length_of(verification).long_um_m == pytest.approx(1000.0, abs=60.0)
-
-
 def test_the_distance_is_that_at_the_temperature_of_the_fixture(verified) -> None:
     warm = length_of(verified(celsius=24.0, distance_mm=300.0 * (1.0 + 4 * 11.5e-6))[0])
     assert warm.distance_mm == pytest.approx(300.0138)

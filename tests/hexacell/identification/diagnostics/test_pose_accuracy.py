@@ -113,14 +113,6 @@ def test_repeated_measurements_have_the_predicted_errors(repeated, paper, worksp
     assert np.sqrt(np.mean(seen)) == pytest.approx(told.after.position_rms_mm, rel=0.25)
 
 
-def test_a_controller_with_the_estimate_has_no_error(identified, paper, workspace):
-    poses = PoseBatch.of(workspace)
-    found = accuracy_of(identified, identified.geometry, paper.branch, task=poses, workspace=poses)
-    assert found.before.position_largest_mm < 1e-8
-    assert found.before.orientation_largest_deg < 1e-8
-    assert 0.0 < found.after.position_rms_mm < 0.5
-
-
 def test_unreachable_poses_are_named_and_left_out(identified, paper, workspace, task):
     far = Pose(0.0, 900.0, 550.0)
     found = accuracy_of(

@@ -58,13 +58,6 @@ def test_levels_are_found_without_bias_and_with_their_standard_errors(levels_of,
         assert told == pytest.approx(scatter, rel=0.5)
 
 
-def test_an_encoder_noise_four_times_the_gauges_hides_it_and_is_itself_seen(levels_of):
-    found = levels_of(0.02, 0.005)
-    assert found.are_separable
-    assert found.encoder.estimated == pytest.approx(0.02, abs=4.0 * found.encoder.standard_error)
-    assert 0.005 < found.gauge.at_most < 0.015
-
-
 def test_levels_do_not_depend_on_what_was_stated(visit, make_problem):
     measured = with_noise(visit(seed=2), 0.02, 0.01, 3)
     first, second = (

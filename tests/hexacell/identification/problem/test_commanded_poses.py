@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hexacell.identification.estimator import estimate_online, identify
+from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
-from hexacell.kinematics.pose import PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
 
 EXACT_MM = 1e-6
@@ -31,17 +30,6 @@ def in_frames(measurements, change):
             for row, r in enumerate(measurements.records)
         )
     )
-
-
-def test_start_poses_close_the_drawing_at_the_measured_joints(hexaglide, paper, visit, make_problem):
-    problem = make_problem(visit(seed=2).measured(0.01, seed=1))
-    assert problem.has_start_pose.all()
-    np.testing.assert_allclose(
-        hexaglide.residual_and_jacobian(paper.nominal, problem.start, problem.joints)[0], 0.0, atol=1e-9
-    )
-    # Near the commanded poses: encoder noise is all that lies between.
-    moved = problem.start.positions - PoseBatch.of(visit(seed=2).commands).positions
-    assert np.abs(moved).max() < 1.0
 
 
 @pytest.mark.parametrize("controller", ["nominal", "actual"])
@@ -70,7 +58,7 @@ def test_old_and_new_records_may_be_in_one_file(paper, visit, make_problem):
     assert found.records == 55
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_calibrated_machine_is_calibrated_again(paper, visit, make_problem, seed):
     """It goes where its drawing cannot follow: the search begins at what commanded it."""
     problem = make_problem(
@@ -100,15 +88,6 @@ def test_the_solver_starts_at_the_provisional_geometry(paper, visit, make_proble
     assert identify(problem).geometry.largest_difference(paper.actual) < EXACT_MM
 
 
-def test_the_online_estimate_of_a_calibrated_machine_converges(paper, visit, make_problem):
-    measured = visit(paper.actual, paper.actual, degrees=40.0, seed=0).measured(0.01, seed=0)
-    for count in (2, 5, 14, 30):
-        some = MeasurementSet(measured.records[:count])
-        estimate = estimate_online(make_problem(some, controller=paper.actual))
-        assert estimate.converged
-    assert estimate.records == 30
-
-
 def test_the_controllers_frames_do_not_matter(paper, visit, make_problem):
     """Its origin on the floor, its axes rolled, its platform turned: the machine is the same."""
     measured = visit(seed=2).measured(0.01, seed=1)
@@ -121,18 +100,6 @@ def test_the_controllers_frames_do_not_matter(paper, visit, make_problem):
     assert there.geometry.largest_difference(here.geometry) < EXACT_MM
     np.testing.assert_allclose(there.covariance, here.covariance, atol=1e-7)
     assert there.chi2 == pytest.approx(here.chi2, rel=1e-6)
-
-
-def test_the_controllers_frames_do_not_matter_for_records_older_than_the_last_calibration(
-    paper, visit, make_problem
-):
-    """A calibration keeps the config's frames, and so commands of before and after share them."""
-    problem = make_problem(
-        in_frames(visit(seed=2).measured(), WORKSHOP),
-        controller=Hexaglide().change_frames(paper.actual, WORKSHOP),
-        drawing=paper.nominal,
-    )
-    assert identify(problem).geometry.largest_difference(paper.actual) < EXACT_MM
 
 
 def test_records_are_sorted_by_point_and_keep_their_labels(visit, make_problem):

@@ -8,7 +8,6 @@ import pytest
 from hexacell.errors import ExitCode, IdentifiabilityError
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
-from hexacell.identification.solver.result import Termination
 from hexacell.measurements.records import MeasurementSet
 from tests.geometries import hexaglide_geometry
 from tests.hexacell.altered_records import altered
@@ -82,8 +81,3 @@ def test_meaningless_deviations_never_give_a_good_fit(visit, make_problem):
     nonsense = altered(measured, lambda _: {"deviation": random.uniform(-5, 5, 3)})
     found = identify(make_problem(nonsense), find_outliers=False)
     assert not found.converged or found.chi2 > 1000 * found.dof
-
-
-@pytest.mark.parametrize("end", Termination)
-def test_only_a_minimum_counts_as_converged(end):
-    assert end.converged is (end in {Termination.STEP, Termination.PRECISION})

@@ -56,7 +56,7 @@ def test_some_of_these_data_need_the_solver_around_singularities(visit, make_pro
         assert 0 < end.singular.sum() < 5
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_other_robots_within_the_tolerances(hexaglide, paper, visit, make_problem, seed):
     errors = np.random.default_rng(seed).uniform(-7.0, 7.0, 35)
     true = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + hexaglide.convention.basis @ errors)
@@ -76,21 +76,11 @@ def test_a_robot_that_is_as_drawn(paper, visit, make_problem):
     assert_exact(identify(make_problem(visit(paper.nominal).measured())), paper.nominal, records=55)
 
 
-@pytest.mark.parametrize(("points", "orientations"), [(2, 11), (3, 8), (5, 5), (5, 4)])
+@pytest.mark.parametrize(("points", "orientations"), [(2, 11), (5, 4)])
 def test_few_records_are_enough_where_they_are_exact(paper, visit, make_problem, points, orientations):
     exact = visit(points=points, orientations=orientations, seed=1)
     found = identify(make_problem(exact.measured(), noise=Noise(1e-4, 1e-4)))
     assert_exact(found, paper.actual, records=points * orientations)
-
-
-def test_the_order_of_records_does_not_matter(visit, make_problem):
-    measured = visit(seed=2).measured(0.01, seed=3)
-    order = np.random.default_rng(0).permutation(len(measured))
-    shuffled = type(measured)(tuple(measured.records[row] for row in order))
-    there, here = identify(make_problem(shuffled)), identify(make_problem(measured))
-    assert there.geometry.largest_difference(here.geometry) < EXACT_MM
-    assert there.chi2 == pytest.approx(here.chi2)
-    np.testing.assert_allclose(there.covariance, here.covariance, atol=1e-8)
 
 
 def test_where_the_gauges_were_zeroed_does_not_matter(visit, make_problem):

@@ -59,12 +59,6 @@ def test_unmodelled_misalignment_costs_accuracy_and_fails_the_chi_square_test(pa
     assert ours < 0.5 * theirs
 
 
-def test_the_alignment_prior_costs_little_where_stations_are_aligned(noisy, make_problem, identified):
-    doubting = identify(make_problem(noisy, noise=STATED))
-    assert doubting.sigma.max() > identified.sigma.max()
-    assert doubting.data_faults == ()
-
-
 def test_a_station_that_is_surely_straight_is_the_limit_of_one_that_hardly_turns(
     noisy, make_problem, identified
 ):

@@ -52,19 +52,6 @@ def test_names_are_listed_without_importing(install: Install) -> None:
     assert "laser_a" not in sys.modules
 
 
-def test_every_kind_that_hexacell_itself_announces() -> None:
-    own = {group: plugins.names(group) for group in Group}
-    assert own == {
-        Group.GAUGES: GAUGES,
-        Group.SIMULATED_GAUGES: GAUGES,
-        Group.ENCODERS: ("cia406", "controller", "dbc", "modbus"),
-        Group.CONTROLLERS: ("linuxcncrsh",),
-        Group.THERMOMETERS: ("sysfs",),
-        Group.CONFIG_FORMATS: ("linuxcnc-hal", "linuxcnc-ini", "template", "toml"),
-        Group.MECHANISMS: ("gough-stewart", "hexaglide", "rotary-cranks", "six-rails"),
-    }
-
-
 @pytest.mark.parametrize("group", Group)
 def test_every_plugin_of_hexacell_can_be_loaded(group: Group) -> None:
     assert all(callable(plugins.load(group, name)) for name in plugins.names(group))

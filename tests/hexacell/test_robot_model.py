@@ -15,12 +15,12 @@ from hexacell.cell.loader import load_cell
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
-from hexacell.identification.estimator import estimate_online, identify
+from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Tolerances
 from hexacell.kinematics.mechanism import FrameTransform, inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.measurements.records import MeasurementSet
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import make_robot, robot_of
 
@@ -71,11 +71,6 @@ def copied(cell, tmp_path):
     copied = load_cell(path)
     assert copied.taught_path == tmp_path / "robot-taught.toml"
     return copied
-
-
-def test_the_robot_was_taught_with_its_config_if_the_cell_says_nothing_else(robot):
-    assert robot.taught is not None
-    np.testing.assert_array_equal(robot.taught.vector, robot.controller.vector)
 
 
 def test_the_taught_geometry_is_in_the_file_that_the_cell_names(copied, paper):
@@ -160,33 +155,6 @@ def test_a_geometry_returns_to_the_configs_frames(on_floor, hexaglide, paper):
     np.testing.assert_allclose(same.vector, on_floor.controller.vector, atol=1e-9)
 
 
-def test_frames_survive_a_calibration(cell, on_floor, paper):
-    """After the write-back the config is in the frames it had, so commands keep their meaning."""
-    calibrated = make_robot(
-        cell.settings, ControllerGeometry(on_floor.for_controller(paper.actual), paper.branch)
-    )
-    for before, after in (
-        (on_floor.frames.base, calibrated.frames.base),
-        (on_floor.frames.origin, calibrated.frames.origin),
-        (on_floor.frames.platform, calibrated.frames.platform),
-    ):
-        np.testing.assert_allclose(after, before, atol=1e-9)
-
-
-def test_records_in_the_configs_frames_are_identified(on_floor, paper, visit):
-    exact = visit(seed=2).measured()
-    commands, deviations = TO_FLOOR.poses(exact.poses), TO_FLOOR.deviations(exact.deviations)
-    records = tuple(
-        Record(r.point, r.orientation, commands.pose(row), r.joints, tuple(deviations[row].tolist()))
-        for row, r in enumerate(exact.records)
-    )
-    found = identify(on_floor.problem(MeasurementSet(records)))
-    assert found.converged
-    assert found.geometry.largest_difference(paper.actual) < 0.5  # stations may be turned: less is known
-    written = on_floor.for_controller(found.geometry)
-    assert written.largest_difference(Hexaglide().change_frames(found.geometry, TO_FLOOR)) < 1e-9
-
-
 def test_records_of_before_a_write_back_give_the_same_geometry_after_it(cell, on_floor, paper, visit):
     """The controller has other frames by then; what was commanded with the taught config keeps its own."""
     exact = visit(seed=2).measured(0.01, 1)
@@ -214,11 +182,3 @@ def test_the_belief_before_measuring_is_the_drawing_with_its_tolerances(robot, o
         np.testing.assert_allclose(known.estimate.vector, paper.nominal.vector, atol=1e-9)
         np.testing.assert_allclose(known.controller.vector, paper.nominal.vector, atol=1e-9)
         np.testing.assert_allclose(known.covariance, robot.prior.covariance, atol=1e-6)
-
-
-def test_the_belief_after_measuring_is_the_estimate_with_its_covariance(robot, noisy):
-    estimate = estimate_online(robot.problem(noisy))
-    known = robot.belief(estimate)
-    assert known.estimate.largest_difference(estimate.geometry) == 0.0
-    np.testing.assert_array_equal(known.covariance, estimate.free_covariance)
-    assert known.controller.largest_difference(robot.controller) < 1e-9

@@ -76,11 +76,6 @@ def test_numpy_numbers_are_written_as_numbers(csv_path):
     assert read_measurements(csv_path).records == tuple(rows)
 
 
-def test_writing_into_a_missing_folder_is_an_error(tmp_path):
-    with pytest.raises(FileError, match="cannot be written"):
-        write_measurements(tmp_path / "absent" / "m.csv", MeasurementSet(()))
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -151,11 +146,6 @@ def test_other_encodings_are_refused(csv_path, raw):
     with pytest.raises(FileError, match="UTF-8") as refused:
         read_measurements(csv_path)
     assert refused.value.line == (1 if raw.startswith(b"\xff") else 6)
-
-
-def test_absent_file_is_refused(tmp_path):
-    with pytest.raises(FileError, match="not exist"):
-        read_measurements(tmp_path / "absent.csv")
 
 
 @pytest.mark.parametrize("text", ["", "\n", "\ufeff", HEADER, HEADER + "\n"])

@@ -35,17 +35,6 @@ def test_points_are_grouped_in_the_order_of_measurement():
     np.testing.assert_array_equal(measurements.group, [0, 1, 0, 1, 2])
 
 
-def test_empty_set_has_empty_arrays():
-    measurements = MeasurementSet(())
-    assert len(measurements) == 0
-    assert measurements.labels.shape == (0, 2)
-    assert measurements.group.shape == (0,)
-    assert measurements.poses.positions.shape == (0, 3)
-    assert measurements.poses.rotations.shape == (0, 3, 3)
-    assert measurements.joints.shape == (0, 6)
-    assert measurements.deviations.shape == (0, 3)
-
-
 def test_the_same_record_twice_is_refused():
     with pytest.raises(UsageError, match="two records of point 2, orientation 3"):
         MeasurementSet((record(2, 3), record(2, 4), record(2, 3, z=0.0)))
@@ -58,9 +47,3 @@ def test_arrays_cannot_be_changed(name):
     array = attrgetter(name)(MeasurementSet((record(1, 1),)))
     with pytest.raises(ValueError, match="read-only"):
         array[0] = 0
-
-
-def test_sets_with_equal_records_are_equal():
-    first, second = MeasurementSet((record(1, 1),)), MeasurementSet((record(1, 1),))
-    assert first.joints is not second.joints
-    assert first == second

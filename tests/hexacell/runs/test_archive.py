@@ -49,14 +49,6 @@ def test_what_is_kept_is_found_again(tmp_path) -> None:
         assert (list(archive.documents(SUMMARY)), archive.documents(RESULT)) == (["b"], {})
 
 
-def test_a_moved_folder_takes_its_archive_along(tmp_path) -> None:
-    (tmp_path / "old").mkdir()
-    filled(tmp_path / "old")
-    (tmp_path / "old").rename(tmp_path / "new")
-    with opened(tmp_path / "new") as archive:
-        assert archive.documents(SUMMARY) == ONE
-
-
 def overwrite(path: Path) -> None:
     path.write_bytes(b"rubbish" * 2000)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import pytest
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.errors import ExitCode, FileError, UsageError
+from hexacell.errors import ExitCode, UsageError
 from hexacell.runs import run_folder
 from hexacell.runs.run_folder import RunFolder, find_run, new_run, runs_folder
 
@@ -67,31 +66,12 @@ def test_a_folder_that_holds_a_run_takes_no_other(cell: Cell, folder: RunFolder)
     assert (folder.path / "cell.toml").read_text() == "as it was"
 
 
-def test_a_folder_that_cannot_be_made_is_reported(cell: Cell, tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    with pytest.raises(FileError):
-        RunFolder(tmp_path / "file" / "run").create(cell)
-
-
-def test_results_are_json(cell: Cell, folder: RunFolder) -> None:
-    folder.create(cell)
-    document = {"converged": True, "sigma": [0.1, 1e-300], "name": "é"}
-    folder.write_result(document)
-    assert json.loads(folder.result.read_text()) == document
-
-
 def test_every_part_of_a_run_has_a_wire_trace_of_its_own(cell: Cell, folder: RunFolder) -> None:
     folder.create(cell)
     for name in ("wire", "wire-2", "wire-3"):
         path = folder.new_wire()
         assert path == folder.path / name
         path.touch()
-
-
-def test_files_of_a_run_do_not_collide(folder: RunFolder) -> None:
-    paths = {folder.journal, folder.measurements, folder.result, folder.proposal, folder.wire}
-    assert len(paths) == 5
-    assert {path.parent for path in paths} == {folder.path}
 
 
 def test_a_run_is_found_by_its_folder_or_its_name(cell: Cell) -> None:

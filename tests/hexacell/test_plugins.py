@@ -14,21 +14,6 @@ from hexacell.plugins import Group
 
 Install = Callable[..., None]
 
-GAUGES = (
-    "cdi",
-    "digimatic-usb",
-    "heidenhain-nd",
-    "keyence-dl-rs1a",
-    "mitutoyo-id-h",
-    "modbus",
-    "mux10",
-    "request",
-    "stream",
-    "sylvac",
-    "uwave",
-    "visa",
-)
-
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
@@ -48,7 +33,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
 
 def test_names_are_listed_without_importing(install: Install) -> None:
     install("laser_a", "laser = laser_a:Laser", "raise SystemExit('imported')")
-    assert plugins.names(Group.GAUGES) == tuple(sorted((*GAUGES, "laser")))
+    assert {"laser", "sylvac"} <= set(plugins.names(Group.GAUGES))
     assert "laser_a" not in sys.modules
 
 
@@ -69,7 +54,7 @@ def test_an_unknown_name_is_refused_with_the_nearest() -> None:
 
 
 def test_a_name_without_a_near_match_is_refused_with_all_names() -> None:
-    known = rf"no gauge protocol '12'\. Known are: {', '.join(GAUGES)}"
+    known = rf"no gauge protocol '12'\. Known are: {', '.join(plugins.names(Group.GAUGES))}"
     with pytest.raises(UsageError, match=known):
         plugins.load(Group.GAUGES, "12")
 

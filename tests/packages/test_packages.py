@@ -8,6 +8,8 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,18 +18,22 @@ from hexacell.cli.app import main
 from tests.cli.cell_folder import QUICK, CellFolder, copy_cell
 
 HERE = Path(__file__).parent
-PACKAGES = ("counter_gauge", "scale_box", "ring_mechanism")
 NOT_ITS_WORDS = re.compile(r".*\b(?:slider|hexaglide)\w*.*", re.IGNORECASE)
 
 
 @pytest.fixture(scope="module")
-def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder that they are installed in, with what .venv has, so without network."""
-    folder, copies = tmp_path_factory.mktemp("installed"), tmp_path_factory.mktemp("source")
-    sources = [str(shutil.copytree(HERE / name, copies / name)) for name in PACKAGES]
-    options = ("--quiet", "--no-deps", "--no-build-isolation", "--target", str(folder))
-    subprocess.run([sys.executable, "-m", "pip", "install", *options, *sources], check=True)
-    return folder
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Install a package with what .venv has, so without network; gives the folder that it is then in."""
+
+    @cache
+    def install(package: str) -> Path:
+        folder = tmp_path_factory.mktemp(package)
+        source = shutil.copytree(HERE / package, folder / "source")
+        options = ("--quiet", "--no-deps", "--no-build-isolation", "--target", str(folder / "installed"))
+        subprocess.run([sys.executable, "-m", "pip", "install", *options, str(source)], check=True)
+        return folder / "installed"
+
+    return install
 
 
 def python(
@@ -39,15 +45,12 @@ def python(
     return subprocess.run(command, env=environment, cwd=cwd, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("package", "with_it"),
-    [
-        ("counter_gauge", ()),
-        pytest.param("scale_box", ("hexacell_scale_box_twin.py",), marks=pytest.mark.slow),
-    ],
+    ("package", "with_it"), [("counter_gauge", ()), ("scale_box", ("hexacell_scale_box_twin.py",))]
 )
 def test_its_own_suite_passes(
-    package: str, with_it: tuple[str, ...], installed: Path, tmp_path: Path
+    package: str, with_it: tuple[str, ...], installed: Callable[[str], Path], tmp_path: Path
 ) -> None:
     """Run as its makers would, against what is installed."""
     ignored = shutil.ignore_patterns("hexacell_*")
@@ -55,14 +58,15 @@ def test_its_own_suite_passes(
     for name in with_it:
         shutil.copy(HERE / package / name, tests)
     options = ("-q", "-p", "no:cacheprovider", "-c", "/dev/null")
-    ended = python("-m", "pytest", *options, tests, path=installed, cwd=tmp_path)
+    ended = python("-m", "pytest", *options, tests, path=installed(package), cwd=tmp_path)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert " passed" in ended.stdout
 
 
-def test_encoders_are_found_by_the_name_of_their_protocol(installed: Path) -> None:
+@pytest.mark.slow
+def test_encoders_are_found_by_the_name_of_their_protocol(installed: Callable[[str], Path]) -> None:
     loaded = "from hexacell.plugins import Group, load; print(load(Group.ENCODERS, 'scale-box').__module__)"
-    assert python("-c", loaded, path=installed).stdout.split() == ["hexacell_scale_box"]
+    assert python("-c", loaded, path=installed("scale_box")).stdout.split() == ["hexacell_scale_box"]
 
 
 @pytest.fixture
@@ -73,19 +77,20 @@ def counted(tmp_path: Path) -> CellFolder:
     return cell
 
 
-def test_devices_finds_the_gauge_as_its_twin_serves_it(installed: Path, counted: CellFolder) -> None:
+def test_devices_finds_the_gauge_as_its_twin_serves_it(
+    installed: Callable[[str], Path], counted: CellFolder
+) -> None:
     options = ("--diagnose", "x", "--cell", counted.cell, "--seconds", "0.2")
-    watched = python("-m", "hexacell", "devices", *options, path=installed)
+    watched = python("-m", "hexacell", "devices", *options, path=installed("counter_gauge"))
     assert watched.returncode == 0, watched.stderr
     assert "x, counter: COUNTER7" in watched.stdout
 
 
 @pytest.mark.slow
-def test_a_cell_is_calibrated_with_the_gauge(installed: Path, counted: CellFolder) -> None:
+def test_a_cell_is_calibrated_with_the_gauge(installed: Callable[[str], Path], counted: CellFolder) -> None:
     counted.wait_long_for_devices()
-    run = python(
-        "-m", "hexacell", "run", counted.cell, "--unattended", "--mode", "optimise", path=installed
-    )
+    options = (counted.cell, "--unattended", "--mode", "optimise")
+    run = python("-m", "hexacell", "run", *options, path=installed("counter_gauge"))
     assert run.returncode == 0, run.stderr
 
 
@@ -97,18 +102,21 @@ def test_without_the_package_its_protocol_is_refused_by_name(
 
 
 @pytest.mark.slow
-def test_a_mechanism_is_calibrated_on_the_wire_in_its_own_words(installed: Path, tmp_path: Path) -> None:
+def test_a_mechanism_is_calibrated_on_the_wire_in_its_own_words(
+    installed: Callable[[str], Path], tmp_path: Path
+) -> None:
+    with_it = installed("ring_mechanism")
     cell = shutil.copytree(HERE / "ring_mechanism/cells", tmp_path / "cells") / "ring.toml"
     refused = python("-m", "hexacell", "cell", "show", cell, path=None)
     assert refused.returncode == 2
     assert "there is no mechanism 'ring'" in " ".join(refused.stderr.split())
-    shown = python("-m", "hexacell", "cell", "show", cell, path=installed)
+    shown = python("-m", "hexacell", "cell", "show", cell, path=with_it)
     assert shown.returncode == 0, shown.stderr
     assert "ring_mm = 1.0" in shown.stdout
     assert "rail_" not in shown.stdout
 
     run = python(
-        "-m", "hexacell", "run", cell, "--unattended", "--mode", "optimise", "--json", path=installed
+        "-m", "hexacell", "run", cell, "--unattended", "--mode", "optimise", "--json", path=with_it
     )
     assert run.returncode == 0, run.stderr
     line = json.loads(run.stdout)["line"]
@@ -116,7 +124,7 @@ def test_a_mechanism_is_calibrated_on_the_wire_in_its_own_words(installed: Path,
     assert line.endswith("(limit 0.3): pass")
     [folder] = (cell.parent / "runs" / "ring").glob("2*")
     measured = folder / "measurements.csv"
-    fitted = python("-m", "hexacell", "fit", cell, "--measurements", measured, path=installed)
+    fitted = python("-m", "hexacell", "fit", cell, "--measurements", measured, path=with_it)
     assert fitted.returncode == 0, fitted.stderr
     for text in (run.stderr, fitted.stdout, (folder / "result.json").read_text()):
         assert not NOT_ITS_WORDS.findall(text)

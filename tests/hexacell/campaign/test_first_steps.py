@@ -42,14 +42,14 @@ def test_no_robot_within_the_tolerances_leaves_the_travel_at_its_second_record(p
     first = plan.decide(opened)
     assert isinstance(first, MeasurePose)
     margin, moved = plan.robot.limits.singularity_margin, []
-    for number in range(1, 301):
+    for number in range(1, 161):
         virtual_robot = VirtualRobot(plan.robot, robot_number(plan, number))
         commands = plan.robot.from_commands([reference, first.pose])
         if virtual_robot.margins(commands)[0] >= margin:
             assert virtual_robot.can_take(commands).all()
             positions = virtual_robot.actual_poses(commands).poses.positions
             moved.append(np.abs(positions[1] - positions[0]).max())
-    assert len(moved) > 200
+    assert len(moved) > 110
     assert max(moved) < TRAVEL_MM
     assert np.median(moved) > 0.05  # or it would tell nothing
 

@@ -51,6 +51,28 @@ def load_changed(cell_text: str, load_text: Callable[[str], Cell]) -> Callable[.
 
 
 @pytest.fixture(scope="session")
+def load_with(cell_text: str, load_text: Callable[[str], Cell]) -> Callable[[str], Cell]:
+    """Load the good cell file with more text at its end."""
+    return lambda more: load_text(f"{cell_text}\n{more}")
+
+
+@pytest.fixture
+def copied(tmp_path: Path) -> Callable[..., Path]:
+    """Copy a bundled cell and its controller's config, with some of the cell's text replaced."""
+
+    def copy(name: str, *changes: tuple[str, str], more: str = "") -> Path:
+        cell, config = ((CONFIGS / f"{name}.{end}").read_text() for end in ("toml", "controller.toml"))
+        for old, new in changes:
+            assert old in cell
+            cell = cell.replace(old, new, 1)
+        (tmp_path / f"{name}.controller.toml").write_text(config)
+        (tmp_path / "cell.toml").write_text(cell + more)
+        return tmp_path / "cell.toml"
+
+    return copy
+
+
+@pytest.fixture(scope="session")
 def line_with(cell_text: str) -> Callable[[str], int]:
     """The number of the first line of the good cell file with this text in it."""
 

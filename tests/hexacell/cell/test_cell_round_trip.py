@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, get_args
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hexacell.cell import devices, limits, measuring, model, simulation
@@ -103,11 +103,12 @@ cells = st.builds(
 )
 
 
-@given(settings=cells)
-def test_settings_dumped_and_described_load_as_the_same(load_text, settings):
-    cell = load_text(dump(settings))
-    assert cell.settings == settings
-    assert load_text(describe(cell)).settings == settings
+@settings(max_examples=20)
+@given(stated=cells)
+def test_settings_dumped_and_described_load_as_the_same(load_text, stated):
+    cell = load_text(dump(stated))
+    assert cell.settings == stated
+    assert load_text(describe(cell)).settings == stated
 
 
 def test_dump_of_a_real_cell_needs_no_simulation(load_text, cell_text):

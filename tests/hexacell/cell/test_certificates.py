@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 from datetime import date
-from pathlib import Path
 
 import pytest
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.errors import FileError
 
-SECTIONS = """
-[report]
-machine = "Hexaglide HX 3"
-serial_number = "0017"
-"""
+
+@pytest.fixture
+def load_due(load_changed):
+    """A cell with a certificate of gauge x that holds until a day, and a machine named for reports."""
+    gauge = 'name = "x"\naxis = "x"\n'
+    report = '[report]\nmachine = "Hexaglide HX 3"\nserial_number = "0017"\n'
+
+    def load(due: str):
+        certificate = f'serial_number = "4711"\ncertificate = {{number = "D-K 17", due = {due}}}\n'
+        return load_changed((gauge, gauge + certificate), ("[simulation]", f"{report}[simulation]"))
+
+    return load
 
 
-def cell_file(folder: Path, due: str) -> Path:
-    text = bundled_config("simulated-hexaglide").read_text()
-    certificate = f'certificate = {{number = "D-K 17", due = {due}}}'
-    gauge = f'name = "x"\naxis = "x"\nserial_number = "4711"\n{certificate}\n'
-    path = folder / "cell.toml"
-    path.write_text(text.replace('name = "x"\naxis = "x"\n', gauge, 1) + SECTIONS)
-    return path
-
-
-def test_a_certificate_holds_until_the_day_that_is_stated(tmp_path) -> None:
-    settings = load_cell(cell_file(tmp_path, '"2027-03-31"')).settings
+def test_a_certificate_holds_until_the_day_that_is_stated(load_due) -> None:
+    settings = load_due('"2027-03-31"').settings
     assert settings.certificates["gauge x"].number == "D-K 17"
     assert settings.expired_on(date(2027, 3, 31)) == ()
     assert settings.expired_on(date(2027, 4, 1)) == ("gauge x",)
@@ -36,7 +31,7 @@ def test_a_certificate_holds_until_the_day_that_is_stated(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("due", ['"2027-02-30"', '"soon"', '""', '"31.3.2027"', "20270331", "true"])
-def test_what_is_no_day_is_refused_with_its_line(tmp_path, due) -> None:
+def test_what_is_no_day_is_refused_with_its_line(load_due, due) -> None:
     with pytest.raises(FileError, match="day") as refusal:
-        load_cell(cell_file(tmp_path, due))
+        load_due(due)
     assert refusal.value.line is not None

@@ -16,14 +16,6 @@ CONFIGS = Path(__file__).parents[3] / "configs"
 JOINT_KEYS = ("joint_min", "joint_max", "encoder", "following", "spread_encoder", "repeatability", "offset")
 
 
-def changed(folder: Path, old: str, new: str) -> Path:
-    text = (CONFIGS / "rotary-cranks.toml").read_text()
-    assert old in text
-    path = folder / "cell.toml"
-    path.write_text(text.replace(old, new))
-    return path
-
-
 def test_the_values_are_those_of_the_keys_in_deg() -> None:
     settings = load_cell(CONFIGS / "rotary-cranks.toml").settings
     assert (settings.limits.joint_min, settings.limits.joint_max) == (-90.0, 120.0)
@@ -59,17 +51,17 @@ def test_every_default_of_a_joint_is_told_in_deg_and_none_in_mm() -> None:
         ("counts_per_turn = 4194304", "counts_per_turn = 0", "must be 1 or more"),
     ],
 )
-def test_keys_of_lengths_are_refused(tmp_path: Path, old: str, new: str, problem: str) -> None:
+def test_keys_of_lengths_are_refused(copied, old: str, new: str, problem: str) -> None:
     with pytest.raises(FileError) as refused:
-        load_cell(changed(tmp_path, old, new))
+        load_cell(copied("rotary-cranks", (old, new)))
     assert problem in str(refused.value)
 
 
-def test_a_length_check_is_of_encoders_of_lengths(tmp_path: Path) -> None:
+def test_a_length_check_is_of_encoders_of_lengths(copied) -> None:
     values = "distance_mm = 300.0\nuncertainty_mm = 0.001\nfirst_seat = [0.0, 0.0, 600.0]\n"
     section = f"[length_check]\n{values}[simulation]"
     with pytest.raises(FileError, match="those of this mechanism are of angles"):
-        load_cell(changed(tmp_path, "[simulation]", section))
+        load_cell(copied("rotary-cranks", ("[simulation]", section)))
 
 
 def test_a_count_is_a_length_or_an_angle() -> None:
@@ -78,14 +70,12 @@ def test_a_count_is_a_length_or_an_angle() -> None:
     assert (rotary.step, rotary.unit) == (0.1, JointUnit.DEG)
 
 
-def test_an_inch_machine_tells_angles_in_degrees(tmp_path: Path) -> None:
-    inches = changed(tmp_path, "[controller]\n", "[controller]\nunit_mm = 25.4\n")
-    rotary = load_cell(inches).settings.controller
+def test_an_inch_machine_tells_angles_in_degrees(copied) -> None:
+    inches = ("[controller]\n", "[controller]\nunit_mm = 25.4\n")
+    rotary = load_cell(copied("rotary-cranks", inches)).settings.controller
     assert (rotary.unit_mm, rotary.joint_unit_mm) == (25.4, 1.0)
-    linear = tmp_path / "linear.toml"
-    text = (CONFIGS / "gough-stewart.toml").read_text()
-    linear.write_text(text.replace("[controller]\n", "[controller]\nunit_mm = 25.4\n"))
-    assert load_cell(linear).settings.controller.joint_unit_mm == 25.4
+    linear = load_cell(copied("gough-stewart", inches)).settings.controller
+    assert linear.joint_unit_mm == 25.4
 
 
 def test_encoders_of_angles_have_no_scale_and_are_off_centre() -> None:

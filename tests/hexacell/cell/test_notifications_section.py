@@ -7,8 +7,6 @@ from typing import get_args
 import pytest
 from pydantic import ValidationError
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.cell.operation import USUAL_OCCASIONS, NotificationSettings, Occasion, OccasionWord
 from hexacell.errors import FileError
 
@@ -18,19 +16,6 @@ OPEN_ADDRESSES = [
     "mailto://host:587?from=a@b&to=c@d",
     "http://user@h/x",
 ]
-
-
-@pytest.fixture
-def cell_with(tmp_path):
-    """The bundled cell, read with more text at its end."""
-    source = load_cell(bundled_config("simulated-hexaglide"))
-
-    def load(more: str, text: str = source.text):
-        path = tmp_path / source.path.name
-        path.write_text(f"{text}\n{more}")
-        return load_cell(path)
-
-    return load
 
 
 def section(**values: str) -> str:
@@ -62,9 +47,9 @@ def test_runs_whose_copy_has_a_masked_address_can_still_be_read() -> None:
         ("host/x", "no address"),
     ],
 )
-def test_secrets_are_refused_and_not_shown(cell_with, url, reason) -> None:
+def test_secrets_are_refused_and_not_shown(load_with, url, reason) -> None:
     with pytest.raises(FileError, match=reason) as raised:
-        cell_with(section(name='"one"', url=f'"{url}"'))
+        load_with(section(name='"one"', url=f'"{url}"'))
     assert raised.value.line is not None
     assert "hidden" not in str(raised.value)
 
@@ -85,14 +70,14 @@ def test_what_makes_no_sense_is_refused(settings) -> None:
         NotificationSettings.model_validate({"name": "one", "url": "mqtt://x"} | settings)
 
 
-def test_a_word_that_is_no_occasion_is_answered_with_each_that_is_once(cell_with) -> None:
+def test_a_word_that_is_no_occasion_is_answered_with_each_that_is_once(load_with) -> None:
     with pytest.raises(FileError) as raised:
-        cell_with(ONE + 'on = ["fail"]\n')
+        load_with(ONE + 'on = ["fail"]\n')
     for word in get_args(OccasionWord):
         assert str(raised.value).count(f"'{word}'") == 1
     assert str(raised.value).count("alarm") == 1
 
 
-def test_names_differ(cell_with) -> None:
+def test_names_differ(load_with) -> None:
     with pytest.raises(FileError, match="the same name"):
-        cell_with(ONE * 2)
+        load_with(ONE * 2)

@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.cell.recovery import Action, AttendedRecovery, FailureKind, UnattendedRecovery
 from hexacell.errors import FileError
 
 
-@pytest.fixture
-def with_section(tmp_path: Path):
-    source = bundled_config("simulated-hexaglide")
-
-    def make(text: str) -> Path:
-        path = tmp_path / "cell.toml"
-        path.write_text(source.read_text() + "\n" + text)
-        return path
-
-    return make
-
-
-def test_a_cell_states_its_own_escalations(with_section) -> None:
-    path = with_section('[recovery]\nagreement_mm = 0.02\n[recovery.unattended]\ndrift = ["abort"]\n')
-    recovery = load_cell(path).settings.recovery
+def test_a_cell_states_its_own_escalations(load_with) -> None:
+    cell = load_with('[recovery]\nagreement_mm = 0.02\n[recovery.unattended]\ndrift = ["abort"]\n')
+    recovery = cell.settings.recovery
     assert recovery.agreement_mm == 0.02
     assert recovery.unattended.action(FailureKind.DRIFT, 1) is Action.ABORT
     assert recovery.unattended.action(FailureKind.ZERO_VOID, 1) is Action.REDO_SET
@@ -42,9 +26,9 @@ def test_a_cell_states_its_own_escalations(with_section) -> None:
         ('[recovery.attended]\ndrifft = ["ask"]\n', "drift"),
     ],
 )
-def test_invalid_escalations_are_refused(with_section, text: str, words: str) -> None:
+def test_invalid_escalations_are_refused(load_with, text: str, words: str) -> None:
     with pytest.raises(FileError, match=words):
-        load_cell(with_section(text))
+        load_with(text)
 
 
 @pytest.mark.parametrize("escalations", [AttendedRecovery(), UnattendedRecovery()])

@@ -27,22 +27,10 @@ SCALES = (
 )
 
 
-@pytest.fixture
-def cell_with(tmp_path: Path):
-    def write(name: str, text: str, *changes: tuple[str, str]) -> Path:
-        cell, config = ((CONFIGS / f"{name}.{kind}").read_text() for kind in ("toml", "controller.toml"))
-        for old, new in changes:
-            assert old in cell
-            cell = cell.replace(old, new, 1)
-        (tmp_path / f"{name}.controller.toml").write_text(config)
-        (tmp_path / "cell.toml").write_text(cell + text)
-        return tmp_path / "cell.toml"
-
-    return write
-
-
-def test_its_robot_has_legs_that_the_screws_correct(cell_with) -> None:
-    with_screws, without = (robot_of(load_cell(cell_with("gough-stewart", text))) for text in (SCREWS, ""))
+def test_its_robot_has_legs_that_the_screws_correct(copied) -> None:
+    with_screws, without = (
+        robot_of(load_cell(copied("gough-stewart", more=text))) for text in (SCREWS, "")
+    )
     pose = PoseBatch.of([Pose(0.0, 0.0, 780.0, 10.0, 5.0, 15.0)])
     assert isinstance(with_screws.mechanism, ScrewLegs)
     added = with_screws.mechanism.inverse(with_screws.drawing, (), pose) - without.mechanism.inverse(
@@ -51,18 +39,18 @@ def test_its_robot_has_legs_that_the_screws_correct(cell_with) -> None:
     assert 0.01 < np.abs(added).max() < 5.0 / 4.0
 
 
-def test_errors_of_scale_go_with_them(cell_with) -> None:
-    mechanism = load_cell(cell_with("gough-stewart", SCREWS, *SCALES)).settings.mechanism
+def test_errors_of_scale_go_with_them(copied) -> None:
+    mechanism = load_cell(copied("gough-stewart", *SCALES, more=SCREWS)).settings.mechanism
     assert isinstance(mechanism, WithEncoderScales)
     assert isinstance(mechanism.exact, ScrewLegs)
 
 
-def test_a_mechanism_without_such_legs_refuses_them(cell_with) -> None:
+def test_a_mechanism_without_such_legs_refuses_them(copied) -> None:
     with pytest.raises(FileError, match="the legs of hexaglide are no screws"):
-        load_cell(cell_with("simulated-hexaglide", SCREWS))
+        load_cell(copied("simulated-hexaglide", more=SCREWS))
 
 
-def test_an_axis_without_a_direction_is_refused_by_its_line(cell_with) -> None:
+def test_an_axis_without_a_direction_is_refused_by_its_line(copied) -> None:
     wrong = SCREWS.replace("[1.0, 0.0, 0.0]", "[0.0, 0.0, 0.0]", 1)
     with pytest.raises(FileError, match=r"cell\.toml:\d+: .*length zero is no direction"):
-        load_cell(cell_with("gough-stewart", wrong))
+        load_cell(copied("gough-stewart", more=wrong))

@@ -11,7 +11,7 @@ from hexacell.noise.standstill import LARGEST_CORRELATION, USUAL_STEP_MM, displa
 READINGS = 40
 SIGMA = 0.003
 STEP = 1e-4
-SERIES = 4000
+SERIES = 2000
 
 
 def white(seed: int, sigma: float = SIGMA) -> np.ndarray:

@@ -15,7 +15,11 @@ from tests.simulated_campaign import SimulatedCampaign
 from tests.small_cell import changed
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["as drawn", "provisional"])
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(False, marks=pytest.mark.slow), True],
+    ids=["as drawn", "provisional"],
+)
 def campaign(request, bundled_cell, paper):
     """A campaign that is carried out, what its robot did, and where each point ended and should."""
     robot = robot_of(bundled_cell)

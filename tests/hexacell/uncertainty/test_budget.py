@@ -21,19 +21,15 @@ from hexacell.uncertainty.effect_kinds import (
     rail_waves,
     stop_repeatability,
 )
-from hexacell.uncertainty.propagation import Propagation
 from hexacell.uncertainty.statement import TaskErrors
-from tests.hexacell.uncertainty.conftest import belief_of
 
 GAUGE_SCALE = 2e-3
 
 
 @pytest.fixture(scope="module")
-def budget_of(laboratory, paper):
-    def budget(found, effects=()):
-        belief = belief_of(found, paper.nominal, paper.branch)
-        poses = {"task": laboratory.task, "workspace": laboratory.workspace}
-        return UncertaintyBudget.of(Propagation.of(found, belief, **poses), effects)
+def budget_of(laboratory):
+    def budget(found, effects=(), earlier=None):
+        return UncertaintyBudget.of(laboratory.propagation(found, earlier), effects)
 
     return budget
 
@@ -125,17 +121,13 @@ def test_a_geometry_beside_the_estimate_errs_by_the_difference_with_the_same_unc
     )
 
 
-def test_a_budget_with_an_earlier_one_has_its_effects_on_the_prior(laboratory, exact, visit, paper) -> None:
+def test_a_budget_with_an_earlier_one_has_its_effects_on_the_prior(
+    laboratory, exact, visit, budget_of
+) -> None:
     """Without them, a short update of a calibrated robot would seem to err by all that cancels."""
     updated = laboratory.updated(exact, visit(points=2, orientations=6, seed=5).measured())
     effects = (encoder_scales(10.0),)
-
-    def budget(found, earlier):
-        belief = belief_of(found, paper.nominal, paper.branch)
-        poses = {"task": laboratory.task, "workspace": laboratory.workspace}
-        return UncertaintyBudget.of(Propagation.of(found, belief, **poses, earlier=earlier), effects)
-
-    first = budget(exact, None)
-    shared, lost = (budget(updated, earlier) for earlier in (first.parameter_columns, None))
+    first = budget_of(exact, effects)
+    shared, lost = (budget_of(updated, effects, earlier) for earlier in (first.parameter_columns, None))
     assert shared.systematic_mm < 1.5 * first.systematic_mm
     assert lost.systematic_mm > 1.5 * shared.systematic_mm

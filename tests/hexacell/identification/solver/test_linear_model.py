@@ -8,20 +8,17 @@ from functools import partial
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
-from scipy.stats import binomtest
 
 from hexacell.identification.diagnostics.model_tests import leave_one_point_out, prediction_test
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise, no_systematic_errors
 from hexacell.identification.solver.linear_model import LinearCosts, systematic_errors
 from hexacell.kinematics.rotations import skew
-from hexacell.measurements.records import MeasurementSet
 from hexacell.uncertainty.effect_kinds import ball_roundness, encoder_scales, stop_repeatability
 from hexacell.uncertainty.effects import errors_by_effects
 
 NOISE = Noise(0.01, 0.01, alignment=0.005, gauge_scale=1e-3)
 EFFECTS = partial(errors_by_effects, (encoder_scales(30.0), stop_repeatability(8.0), ball_roundness(6.0)))
-MACHINES = 60
 
 
 @pytest.fixture(scope="module")
@@ -93,31 +90,3 @@ def test_without_systematic_errors_it_is_the_test_of_the_noise(found):
     assert alone.goodness == alone.noise_test
     assert linear.chi2 == pytest.approx(alone.noise_test.chi2, rel=1e-6)
     assert linear.expected == pytest.approx(alone.noise_test.expected)
-
-
-@pytest.mark.slow
-def test_machines_with_the_stated_effects_agree(visit, make_problem):
-    """Their chi-square has its degrees of freedom as mean; by the noise alone it would be far larger."""
-    exact, noise = visit(seed=2), Noise(0.01, 0.01)
-    sample = identify(make_problem(exact.measured(0.0, 0), noise=noise), find_outliers=False)
-    errors = systematic_errors(replace(sample.problem, systematic=EFFECTS), sample.prediction)
-    tests, by_noise = [], []
-    for seed in range(MACHINES):
-        random = np.random.default_rng([3, seed])
-        shared = errors.common @ random.standard_normal(errors.common.shape[-1])
-        root = np.linalg.cholesky(errors.own + 1e-12 * np.eye(3))
-        each = root @ random.standard_normal((len(shared), 3, 1))
-        measured = exact.measured(0.01, seed).records
-        moved = [
-            replace(record, deviation=tuple(np.add(record.deviation, error)))
-            for record, error in zip(measured, shared + each[..., 0], strict=True)
-        ]
-        problem = make_problem(MeasurementSet(tuple(moved)), noise=noise)
-        found = identify(replace(problem, systematic=EFFECTS), find_outliers=False)
-        tests.append(found.goodness)
-        by_noise.append(found.noise_test)
-    freedom = tests[0].expected
-    spread = 4.0 * np.sqrt(2.0 * freedom / MACHINES)
-    assert abs(np.mean([test.chi2 for test in tests]) - freedom) < spread
-    assert np.mean([test.chi2 for test in by_noise]) > freedom + 2.0 * spread
-    assert binomtest(sum(test.probability < 0.05 for test in tests), MACHINES, 0.05).pvalue > 1e-3

@@ -8,7 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.hexacell.storage.atomic_files.ownership import NOBODY
+NOBODY = 65534
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.errors import ExitCode, FileError
 from hexacell.storage import atomic_files
-from tests.hexacell.storage.atomic_files.ownership import names
+from tests.hexacell.storage.atomic_files.conftest import names
 
 
 def test_a_read_only_folder_is_reported(ordinary_folder: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from hexacell.storage import atomic_files
-from tests.hexacell.storage.atomic_files.ownership import names
+from tests.hexacell.storage.atomic_files.conftest import names
 
 
 class TestLeftovers:

@@ -11,7 +11,7 @@ import pytest
 
 from hexacell.errors import FileError
 from hexacell.storage import atomic_files
-from tests.hexacell.storage.atomic_files.ownership import NOBODY, names
+from tests.hexacell.storage.atomic_files.conftest import NOBODY, names
 
 
 def test_readers_see_the_old_text_or_the_new_one_never_a_mixture(path: Path) -> None:

@@ -16,7 +16,7 @@ from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.text.verdict import alarm_sentence, check_text
+from hexacell.text.verdict import alarm_sentence
 from hexacell.uncertainty.effect_kinds import encoder_scales
 from hexacell.verdict.decision import ErrorLimits
 from tests.hexacell.campaign.conftest import calibrated_to
@@ -88,16 +88,6 @@ def test_effects_that_the_calibration_had_too_are_no_change(check) -> None:
     assert aware is not None
     assert naive.is_raised
     assert aware.score < 0.5 * naive.score
-
-
-def test_the_result_of_a_check_has_it_and_the_verdict_does_not_heed_it(check) -> None:
-    records = measured(check, "l2", 0.08)
-    result = check_result(check, records, None, ())
-    assert result.alarm is not None
-    assert result.alarm.is_raised
-    assert result.left_out == ()
-    assert "Repeat the check" in " ".join(check_text(result).split())
-    assert max(map(len, check_text(result).splitlines())) <= 80
 
 
 def test_the_expansion_of_the_legs_raises_no_alarm(check) -> None:

@@ -77,14 +77,6 @@ def test_the_error_at_the_task_is_that_of_the_assessment(campaign, two_points):
     assert outlook.now_mm == pytest.approx(accuracy.after.position_largest_mm, rel=0.02)
 
 
-def test_without_task_poses_the_workspace_is_the_task(make_plan):
-    plan = make_plan(task__poses=())
-    assert len(plan.task.poses) > 20
-    outlook = plan.forecast(CampaignState())
-    assert outlook is not None
-    assert outlook.now_mm > 1.0
-
-
 def test_without_reachable_task_poses_there_is_no_forecast(make_plan, campaign):
     plan = make_plan(task__poses=((0.0, 0.0, 3000.0, 0.0, 0.0, 0.0),), identification__points=TWO_POINTS)
     assert plan.forecast(CampaignState()) is None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hexacell.design.candidates import orientations, reachable
+from hexacell.design.candidates import orientations, reachable, workspace_poses
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.pose import Pose, PoseBatch
 
@@ -94,3 +94,24 @@ def test_tilts_are_those_of_the_commands_in_whatever_frames_these_are(limits, he
     np.testing.assert_array_equal(here.allow_poses(poses, joints), [True, False, False])
     level = PoseBatch.at([0.0, 0.0, 550.0], here.orientations(np.eye(3)[None]))
     np.testing.assert_allclose(here.tilts(level), 0.0, atol=1e-7)
+
+
+@pytest.fixture
+def vague(know, paper):
+    return know(paper.nominal, sigma_mm=1.0)
+
+
+def test_poses_across_the_workspace_are_level_and_tilted_at_every_point(vague, paper):
+    poses = workspace_poses(vague, paper.points[:1])
+    assert len(poses) == 7
+    assert np.unique(np.round(np.degrees(poses.tilts()), 6)).tolist() == [0.0, 15.0]
+    assert np.allclose(poses.positions, paper.points[0])
+
+
+def test_their_tilts_keep_a_smaller_limit(vague, paper):
+    narrow = replace(vague, limits=replace(vague.limits, tilt=np.radians(8.0)))
+    assert np.degrees(workspace_poses(narrow, paper.points[:2]).tilts()).max() == pytest.approx(8.0)
+
+
+def test_those_out_of_reach_are_left_out(vague):
+    assert len(workspace_poses(vague, np.array([[0.0, 2000.0, 500.0]]))) == 0

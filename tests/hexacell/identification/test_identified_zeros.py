@@ -111,27 +111,6 @@ def test_the_stated_covariance_is_that_of_the_errors() -> None:
     np.testing.assert_allclose(np.var(errors, axis=1), np.diag(stated), rtol=0.12)
 
 
-def test_poses_err_less_than_with_the_drawing(named: str) -> None:
-    """Although other numbers are wrong as well, and much less than with all of them identified."""
-    robot, example = zeros_robot(named)
-    _, truth, *_ = example.robots()
-    found = identify(robot.problem(records_without_noise(example, truth)))
-    zeros = IdentifiedZeros.of(found, robot.controller)
-    free = found.free
-    errors = [np.linalg.norm(zeros_errors(zeros) @ (one - free)) for one in (zeros.held, zeros.free)]
-    assert errors[1] < 0.95 * errors[0]
-
-
-def zeros_errors(zeros: IdentifiedZeros) -> np.ndarray:
-    """Of the balls of the records, less a common shift of each point, by the free parameters."""
-    problem, jacobian = zeros.found.problem, zeros.found.prediction.jacobian
-    means = (
-        problem.group_sums(jacobian)
-        / np.diff(np.append(problem.first_rows, problem.records))[:, None, None]
-    )
-    return (jacobian - problem.per_record(means)).reshape(-1, jacobian.shape[-1])
-
-
 def test_few_records_determine_zeros_and_not_all_parameters() -> None:
     """Where the other numbers are known: by their tolerances."""
     robot, example = zeros_robot("gough-stewart")

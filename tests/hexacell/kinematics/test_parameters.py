@@ -9,9 +9,7 @@ import pytest
 
 from hexacell.cell.by_mechanism import tolerance_settings
 from hexacell.config.toml_format import NativeToml
-from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.gough_stewart import GOUGH_STEWART_PARAMETERS as PARAMETERS
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit
 
 RAILS = ParameterSet(
@@ -21,14 +19,6 @@ RAILS = ParameterSet(
     )
 )
 """Another number of parameters a leg, in two units."""
-
-
-def test_missing_keys_are_named_by_the_mechanisms_own_symbols(tmp_path: Path) -> None:
-    config = tmp_path / "robot.toml"
-    config.write_text("[geometry]\noffset = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]\n")
-    needed = r"needs base \(six rows of 3 numbers, mm\), platform \(.*\) and offset \(six numbers, mm\)"
-    with pytest.raises(FileError, match=rf"has no base.*{needed}"):
-        NativeToml(PARAMETERS).read(config)
 
 
 def test_a_unit_has_its_own_decimals_and_no_tolerance_by_default(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.cell.measuring import TaskSettings
 from hexacell.config.interface import ControllerGeometry
-from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import DataFault, DataFaultKind, Termination
 from hexacell.kinematics.geometry import Geometry
@@ -268,18 +266,3 @@ def test_the_document_is_json_and_has_the_findings(good):
     assert set(measures[0]) == {"point", "axis", "angle_deg", "pose", "correlation"}
     assert set(measures[0]["pose"]) == set("xyzabc")
     assert len(document["accuracy"]["before"]["position_mm"]) == 6
-
-
-@pytest.mark.parametrize(
-    ("instead", "told"),
-    [
-        ((), r"sigma 0.1\). A good residual"),
-        (("B3",), r"sigma 0.1\); B3 out of its tolerance would explain the records as well. A good"),
-        (("B3", "leg 2 length"), r"; B3 or leg 2 length out of its tolerance would explain the records as"),
-    ],
-)
-def test_joints_that_explain_a_fault_as_well_are_named_beside(good, instead, told) -> None:
-    violation = ToleranceViolation("S3x", 4.5, 2.0, 0.1, instead=instead)
-    [refused, *_] = findings(replace(good, tolerance_violations=(violation,)))
-    assert re.search(r"^Refused: S3 x is \+4.50 mm from the drawing \(tolerance 2, sigma 0.1\)", refused)
-    assert re.search(told, refused)

@@ -30,7 +30,6 @@ FIXTURE = LengthCheckSettings(
     temperature_sigma_k=0.3,
 )
 LONG_UM_M = 1900.0
-GUARD_BAND = "  a pass and a fail keep 1.5 U from the limit"
 FAR = [(3.0, 2.0, -1.0), (2.0, 2.0, 2.0)]
 NEAR = [(0.010, 0.002, -0.004), (0.003, 0.012, 0.002)]
 
@@ -76,8 +75,6 @@ def test_encoders_that_are_long_pass_falsely_without_the_check_and_is_found_with
     blind, line = verified(LONG_UM_M, checked=False)
     assert blind.verdict is Verdict.PASS, line
     assert not_checked() in verification_text(blind)
-    assert GUARD_BAND not in verification_text(blind)
-    assert "guard band" not in line
     seen, line = verified(LONG_UM_M)
     assert seen.verdict is Verdict.CONDITIONAL_FAIL, line
     assert seen.accuracy.position.value > 0.25
@@ -85,13 +82,10 @@ def test_encoders_that_are_long_pass_falsely_without_the_check_and_is_found_with
     assert length.long_um_m == pytest.approx(LONG_UM_M, abs=length.expanded_um_m)
     assert length.expanded_um_m < 60.0
     assert length.is_significant
-    assert ", guard band 1.5 U): conditional fail" in line
     said = verification_text(seen)
-    assert GUARD_BAND in said
     assert not_checked() not in said
     assert f"length scale: checked over 300.000 mm: encoders read {length.long_um_m:.0f} +- " in said
     assert f"scale factor of all encoders by {length.factor:.6f}" in said.replace("\n  ", " ")
-    assert max(map(len, said.splitlines())) <= 80
 
 
 def test_true_encoders_pass_with_the_scale_checked(verified) -> None:
@@ -100,8 +94,6 @@ def test_true_encoders_pass_with_the_scale_checked(verified) -> None:
     length = length_of(verification)
     assert abs(length.long_um_m) <= length.expanded_um_m
     assert not length.is_significant
-    said = verification_text(verification).splitlines()
-    assert said[-1].startswith("  length scale: checked over 300.000 mm: encoders read ")
     assert verification.tests[-1].name == "length check"
 
 

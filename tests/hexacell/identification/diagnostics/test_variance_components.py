@@ -10,8 +10,7 @@ from scipy.optimize import minimize
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
 from hexacell.identification.solver.result import Identification
-from hexacell.noise.record_noise import NoiseLevel, NoiseLevels, noise_levels
-from hexacell.verdict.findings import noise_sentence
+from hexacell.noise.record_noise import NoiseLevels, noise_levels
 from tests.hexacell.altered_records import altered
 
 REPETITIONS = 30
@@ -142,13 +141,3 @@ def test_few_records_do_not_separate_the_two(visit, make_problem):
     found = identify(make_problem(measured), find_outliers=False)
     levels = noise_levels(found)
     assert levels is None or not (levels.encoder.is_resolved and levels.gauge.is_resolved)
-
-
-def test_the_sentence_names_noise_that_cannot_be_separated():
-    vague = NoiseLevel(stated=0.01, estimated=0.01, standard_error=0.008, at_most=0.03)
-    sharp = NoiseLevel(stated=0.01, estimated=0.02, standard_error=0.001, at_most=0.022)
-    assert "cannot be separated" in noise_sentence(NoiseLevels(vague, vague, -0.5))
-    assert "cannot be separated" in noise_sentence(NoiseLevels(sharp, sharp, -0.95))
-    one = noise_sentence(NoiseLevels(sharp, vague, -0.5))
-    assert "encoders 0.0200 +- 0.0010 mm (stated 0.01)" in one
-    assert "gauges below 0.0300 mm" in one

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.identification.problem import problem as build
-from hexacell.identification.problem.commanded_poses import CommandedPoses, CommandingGeometry
+from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.prior import Noise, Prior, Tolerances
 from hexacell.identification.problem.problem import Assumptions
 from hexacell.measurements.records import MeasurementSet
@@ -45,18 +44,8 @@ def test_it_is_that_of_all_records_whichever_were_known(assumptions, records, kn
     assert_same(assumptions.problem(every, known=some), assumptions.problem(every))
 
 
-def test_only_new_records_are_attributed(hexaglide, assumptions, records, monkeypatch):
+def test_what_was_known_under_another_geometry_does_not_count(hexaglide, assumptions, records):
     known = assumptions.problem(MeasurementSet(records[:-1]))
-    attributed = []
-
-    class Counted(CommandedPoses):
-        @classmethod
-        def of(cls, mechanism, commands, *others):
-            attributed.append(len(commands))
-            return CommandedPoses.of(mechanism, commands, *others)
-
-    monkeypatch.setattr(build, "CommandedPoses", Counted)
-    assumptions.problem(MeasurementSet(records), known)
-    another = CommandingGeometry.of(hexaglide, assumptions.prior.centre)
-    replace(assumptions, controller=another).problem(MeasurementSet(records), known)
-    assert attributed == [1, len(records)]
+    another = replace(assumptions, controller=CommandingGeometry.of(hexaglide, assumptions.prior.centre))
+    every = MeasurementSet(records)
+    assert_same(another.problem(every, known=known), another.problem(every))

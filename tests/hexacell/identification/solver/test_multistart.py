@@ -55,11 +55,3 @@ def test_half_of_the_draws_are_as_wide_as_the_prior_and_half_as_the_tolerances(p
     assert by_prior.std(axis=0) == pytest.approx(np.sqrt(np.diag(prior.covariance)), rel=0.3)
     assert by_tolerances.std(axis=0) == pytest.approx(prior.sigma, rel=0.3)
     assert by_prior.std() > 1.3 * by_tolerances.std()
-
-
-def test_small_batches_give_the_same_starts(problem, started, monkeypatch):
-    monkeypatch.setattr(multistart, "BATCH_ROWS", 5 * problem.records)
-    again = list(restarts(problem))
-    np.testing.assert_array_equal(
-        [one.initial_parameters for one in again], [one.initial_parameters for one in started]
-    )

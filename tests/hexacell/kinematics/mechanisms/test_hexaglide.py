@@ -5,9 +5,12 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hexacell.errors import ExitCode, ReachError
+from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from tests.geometries import hexaglide_geometry
 
@@ -16,9 +19,6 @@ poses = st.builds(
     Pose, st.floats(-100, 100), st.floats(-200, 100), st.floats(450, 600), degrees, degrees, degrees
 )
 BRANCHES = list(product((-1, 1), repeat=6))
-
-
-# Off the surface of closed poses too: a solver linearises there.
 
 
 @given(poses)
@@ -46,3 +46,24 @@ def test_only_the_leg_that_cannot_reach_is_missing(hexaglide, paper):
     short = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], lengths)
     joints = hexaglide.inverse(short, paper.branch, PoseBatch.of([Pose(0, 0, 550), Pose(0, 0, 300)]))
     np.testing.assert_array_equal(np.isnan(joints), [[0, 0, 0, 1, 0, 0], [0] * 6])
+
+
+def test_inverse_agrees_with_linuxcnc(hexaglide, paper):
+    """LinuxCNC 2.9 running a hexaglide kinematics module of its own, docs/linuxcnc.md."""
+    joints = inverse_kinematics(
+        hexaglide, paper.nominal, paper.branch, PoseBatch.of([Pose(10, 20, 560, 5, -4, 3)])
+    )
+    expected = [-461.827519, -455.741652, -448.908104, 465.952312, 465.044723, 488.923462]
+    np.testing.assert_allclose(joints, [expected], atol=6e-7)
+
+
+def test_a_pose_out_of_reach_names_the_leg_and_the_pose(hexaglide, paper):
+    lengths = paper.nominal["l"].copy()
+    lengths[3] = 400.0
+    short_leg_4 = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], lengths)
+    poses = PoseBatch.of([Pose(0, 0, 500), Pose(0, 0, 550), Pose(0, 0, 560, 1)])
+    with pytest.raises(
+        ReachError, match=r"^leg 4 cannot reach the pose X0\.000 Y0\.000 Z550\.000 "
+    ) as caught:
+        inverse_kinematics(hexaglide, short_leg_4, paper.branch, poses)
+    assert caught.value.exit_code is ExitCode.USAGE

@@ -22,23 +22,24 @@ from hexacell.measurements.records import MeasurementSet, Record
 
 
 @pytest.mark.parametrize(
-    ("limits", "records", "stations", "left"),
+    ("most_records", "most_minutes", "records", "stations", "left"),
     [
-        ((None, None), 1000, 100, math.inf),
-        ((20, None), 0, 0, 20),
-        ((20, None), 19, 2, 1),
-        ((20, None), 30, 3, 0),
-        ((None, 20.0), 0, 1, 29),
-        ((None, 20.0), 29, 1, 0),
-        ((None, 20.0), 0, 2, 18),
-        ((None, 20.0), 0, 5, 0),
-        ((10, 20.0), 0, 1, 10),
-        ((100, 20.0), 0, 1, 29),
+        (None, None, 1000, 100, math.inf),
+        (20, None, 0, 0, 20),
+        (20, None, 19, 2, 1),
+        (20, None, 30, 3, 0),
+        (None, 20.0, 0, 1, 29),
+        (None, 20.0, 29, 1, 0),
+        (None, 20.0, 0, 2, 18),
+        (None, 20.0, 0, 5, 0),
+        (10, 20.0, 0, 1, 10),
+        (100, 20.0, 0, 1, 29),
     ],
 )
-def test_the_tighter_of_records_and_minutes_holds(limits, records, stations, left):
+def test_the_tighter_of_records_and_minutes_holds(most_records, most_minutes, records, stations, left):
     """Minutes are those after points of 5 minutes, and after references that are read again."""
-    assert Budget(*limits, TimeModel(5.0, 30.0)).records_left(records, stations) == left
+    budget = Budget(most_records, most_minutes, TimeModel(5.0, 30.0))
+    assert budget.records_left(records, stations) == left
 
 
 def test_durations_of_a_cell(make_plan):

@@ -33,7 +33,6 @@ from hexacell.services.devices.device_setup import devices_of
 from procedures.devices.device_set import Devices
 from procedures.guards.guards import Guards
 from procedures.run.keys import Phase, SetKey
-from procedures.run.readings import Reading
 from procedures.run.state import RunState, fold
 from procedures.run.trips import Guard, GuardTripped, WatchedSet
 from procedures.steps import events
@@ -41,6 +40,8 @@ from tests.benchmarks.figures import Figures, at_most
 from tests.benchmarks.samples import sample
 from tests.injection_times import injection_times
 from tests.native_config import NATIVE
+from tests.procedures.story import READING
+from tests.small_cell import changed
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 MUST_S = 0.2
@@ -72,9 +73,9 @@ class Watched:
     guards: Guards
     state: RunState
 
-    async def slow_move(self, orientation: int) -> None:
+    async def slow_move(self) -> None:
         watched = WatchedSet(self.state.zero_shown(P1), is_watched=True)
-        target = Pose(0.0, 0.0, 550.0, 0.0, 0.0, 2.0 * orientation)
+        target = Pose(0.0, 0.0, 550.0, 0.0, 0.0, 4.0)
         await self.guards.move(
             target, 1.3, watched, lambda: np.array(self.simulated.physics.encoder_positions())
         )
@@ -82,21 +83,13 @@ class Watched:
 
 def settings_of(cell: Cell, protocol: str) -> Any:
     """The bundled cell at the speed of the wall, on slow moves, with gauges of one protocol."""
-    settings = cell.settings
-    assert settings.simulation is not None
     gauges = tuple(
         gauge.model_copy(update={"protocol": protocol, "channel": channel, "port": None})
-        for channel, gauge in enumerate(settings.gauges, start=1)
+        for channel, gauge in enumerate(cell.settings.gauges, start=1)
     )
-    motion = settings.simulation.motion.model_copy(update={"minimum_s": 1.5, "ringing_mm": 0.0})
-    return settings.model_copy(
-        update={
-            "gauges": gauges,
-            "timing": settings.timing.model_copy(update={"clock_factor": 1.0}),
-            "guards": GuardSettings(),
-            "simulation": settings.simulation.model_copy(update={"motion": motion}),
-        }
-    )
+    slow = {"simulation.motion.minimum_s": 1.5, "simulation.motion.ringing_mm": 0.0}
+    real = {"timing.clock_factor": 1.0, "guards": GuardSettings()}
+    return changed(cell.settings, {"gauges": gauges} | slow | real)
 
 
 @asynccontextmanager
@@ -129,14 +122,7 @@ async def reference(devices: Devices) -> RunState:
     on_axes = [0.0, 0.0, 0.0]
     for mounted, answer in zip(devices.gauges, shown, strict=True):
         on_axes[mounted.axis.index] = mounted.axis.coordinate(answer.value_mm)
-    reading = Reading(
-        gauges_mm=(on_axes[0], on_axes[1], on_axes[2]),
-        spread_mm=(0.0, 0.0, 0.0),
-        joints=(0.0,) * 6,
-        answers=(),
-        counts=(),
-        skews_s=(),
-    )
+    reading = READING.model_copy(update={"gauges_mm": tuple(on_axes)})
     pose = (0.0, 0.0, 550.0, 0.0, 0.0, 0.0)
     zero = (0.0, 0.0, 0.0)
     return fold([events.RecordTaken(at=P1, orientation=1, pose=pose, reading=reading, deviation_mm=zero)])
@@ -188,7 +174,7 @@ async def stopping_s(folder: Path, protocol: str, kind: FaultKind, device: str) 
             SimulatedFault(kind=kind, device=device, at_move=schedule.move_count + 1, after_s=after)
         )
         with pytest.raises(GuardTripped) as tripped:
-            await cell.slow_move(2)
+            await cell.slow_move()
         still_s = cell.simulated.physics._motion.end_s
         struck_s = injected_s[0] if injected_s else still_s
         return still_s - struck_s, tripped.value.trip.guard

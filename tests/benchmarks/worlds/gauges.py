@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.kinematics.rotations import Array
-from tests.benchmarks.worlds.effects import Effect, Shift, Stops, in_steps
+from tests.benchmarks.worlds.effects import Effect, Shift, Stops
 
 TURN = 2.0 * np.pi
 
@@ -37,11 +37,6 @@ def hysteresis(half_mm: float) -> Effect:
     return Effect(
         gauge_error=lambda _, moved: -half_mm * np.sign(np.diff(moved, axis=0, prepend=moved[:1]))
     )
-
-
-def resolution(step_mm: float) -> Effect:
-    """Gauges read in steps."""
-    return Effect(gauge_error=lambda _, moved: in_steps(moved, step_mm) - moved)
 
 
 def more_noise(sigma_mm: Array, freedom: float | None = None) -> Effect:

@@ -11,8 +11,6 @@ from hexacell.kinematics.rotations import Array
 from tests.benchmarks.worlds.closure import leg_forces
 from tests.benchmarks.worlds.effects import Effect, Posture, Shift, Stops
 
-WARM_UP_HOURS = 0.5
-
 
 def _longer(of_pull: Callable[[Array], Array], weight: Array, centre: Array) -> Effect:
     """Legs are longer by a function of their pull (n, 6), N, under a weight (3,) at a centre (3,)."""
@@ -33,17 +31,15 @@ def play(half_mm: float, weight: Array, centre: Array, soft_n: float = 0.3) -> E
     return _longer(lambda pull: half_mm * np.tanh(pull / soft_n), weight, centre)
 
 
-def run_out(size_mm: float, waves: Array, phases: Array, *, at_platform: bool) -> Effect:
-    """Joints' centres move as legs turn in them: ``size_mm``, one sigma along each axis.
+def run_out(size_mm: float, waves: Array, phases: Array) -> Effect:
+    """Centres of platform joints move as legs turn in them: ``size_mm``, one sigma along each axis.
 
     The displacement is a wave over the direction of the leg, with wave vectors and phases (6, 3).
     """
 
     def shift(_: Stops, posture: Posture) -> Shift:
-        toward = _on_platform(posture) if at_platform else posture.bodies.directions(posture.poses)[0]
-        angle = np.sum(toward * waves, axis=-1)[..., None] + phases
-        moved = np.sqrt(2.0) * size_mm * np.sin(angle)
-        return Shift(platform=moved) if at_platform else Shift(sliders=moved)
+        angle = np.sum(_on_platform(posture) * waves, axis=-1)[..., None] + phases
+        return Shift(platform=np.sqrt(2.0) * size_mm * np.sin(angle))
 
     return Effect(shift=shift)
 
@@ -76,7 +72,6 @@ class Course(Enum):
     STEADY = "always the same"
     RISING = "by its size every hour"
     CENTRED = "by its size from the first record to the last, evenly, zero in the middle"
-    WARMING_UP = "quickly at first, then hardly any more"
 
     def shares(self, hours: Array) -> Array:
         """Of its size, at some hours (n,)."""
@@ -88,8 +83,6 @@ class Course(Enum):
                 shares = hours
             case Course.CENTRED:
                 shares = np.linspace(-0.5, 0.5, len(hours))
-            case Course.WARMING_UP:
-                shares = 1.0 - np.exp(-hours / WARM_UP_HOURS)
         return shares
 
 

@@ -76,10 +76,10 @@ class Calibrated:
     robot: Robot
     covariance: Array
 
-    def check(self, budget: int = 40, drift_mm: float = STATED_DRIFT_MM) -> Check:
+    def check(self, budget: int = 40) -> Check:
         """A check of it, with so many records at most."""
         settings = bundled().settings
-        before = identified_before(self.robot, self.covariance, drift_mm)
+        before = identified_before(self.robot, self.covariance, STATED_DRIFT_MM)
         limits = ErrorLimits.of(settings.acceptance)
         return Check(settings, self.robot, before, limits, budget, effort=EFFORT)
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 import os
 
 SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
-    "change_alarm": {"RUNS": (60, 200)},
+    "change_alarm": {"RUNS": (48, 200)},
     "check": {"RUNS": (8, 100)},
     "damaged_lines": {"FRAMES": (5_000, 1_000_000)},
     "design_efficiency": {"ROBOTS": (10, 24)},
     "drift_watch": {"CELLS": (6, 100), "STEPS": (60, 300)},
     "encoder_rounds": {"ROUNDS": (3_000, 100_000)},
     "first_resume": {"KILLS": (2, 200)},
-    "gauge_trials": {"TRIALS": (20, 100)},
+    "gauge_trials": {"TRIALS": (12, 100)},
     "guards": {"TIMES": (1, 3)},
     "healthy_robots": {"ROBOTS": (30, 1000)},
     "long_polling": {"HOURS": (1, 24)},
@@ -27,11 +27,11 @@ SAMPLES: dict[str, dict[str, tuple[int, int]]] = {
     "quick_level": {"ROBOTS": (12, 100)},
     "recalibration": {"MACHINES": (4, 100)},
     "screen_speed": {"RUNS": (3, 5)},
-    "statistics": {"PAIRED": (100, 100), "ROBOTS": (300, 1000), "SETS": (1000, 1000)},
+    "statistics": {"PAIRED": (100, 100), "ROBOTS": (200, 1000), "SETS": (1000, 1000)},
     "study_speed": {"ROBOTS": (24, 200)},
     "tolerances": {"BUILT": (300, 1500)},
     "worlds": {"RUNS": (1, 34)},
-    "year": {"NIGHTS": (45, 365)},
+    "year": {"NIGHTS": (40, 365)},
 }
 
 

@@ -10,19 +10,17 @@ import time
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from hexacell.campaign.decisions import CampaignState, Decision, Finished, MeasurePose
 from hexacell.campaign.online_estimate import OnlineEstimator
 from hexacell.campaign.planner import Plan
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import VirtualRobot
 from tests.benchmarks.figures import at_most
+from tests.benchmarks.machines import bundled
 from tests.benchmarks.virtual_calibration import robot_that_reaches
 
 LATE = range(44, 55)
@@ -33,22 +31,20 @@ Moment = tuple[Plan, CampaignState, MeasurePose]
 """A plan, a state, and what was decided."""
 
 
-@pytest.fixture(scope="module")
-def campaign() -> tuple[list[Moment], float]:
-    """The late moments of a whole campaign, and its processor seconds."""
-    cell = load_cell(bundled_config("simulated-hexaglide"))
+def late_moments() -> list[Moment]:
+    """Of a whole campaign."""
+    cell = bundled()
     robot, random = robot_of(cell), np.random.default_rng(1)
     virtual = VirtualRobot(robot, robot_that_reaches(cell, robot, random), random)
     running = VirtualCampaign(Plan(cell.settings, robot, with_forecast=False), virtual)
     moments: list[Moment] = []
     decision: Decision | None = None
-    begun = time.process_time()
     while not isinstance(decision, Finished):
         plan, state = running.plan, running.state
         decision = running.step()
         if isinstance(decision, MeasurePose) and len(state.measurements) in LATE:
             moments.append((plan, state, decision))
-    return moments, time.process_time() - begun
+    return moments
 
 
 def seconds_of(moment: Moment) -> float:
@@ -69,8 +65,6 @@ def seconds_of(moment: Moment) -> float:
     return min(taken)
 
 
-def test_a_late_decision(campaign, figure) -> None:
-    moments, seconds = campaign
-    late = float(np.median([seconds_of(moment) for moment in moments]))
+def test_a_late_decision(figure) -> None:
+    late = float(np.median([seconds_of(moment) for moment in late_moments()]))
     figure("a decision at 44 to 54 records", 1e3 * late, "ms", at_most(MOST_MS))
-    figure("a campaign of 55 records, deciding and measuring virtually", seconds, "s")

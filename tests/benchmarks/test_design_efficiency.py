@@ -13,8 +13,6 @@ import pytest
 
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.task_accuracy import Task
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
@@ -23,7 +21,6 @@ from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import VirtualRobot, random_robot
 from hexacell.study.design_records import possible_targets
 from hexacell.study.design_study import SEED
-from hexacell.study.tasks import processes
 from tests.benchmarks.continuous_design import (
     Criterion,
     Design,
@@ -35,6 +32,7 @@ from tests.benchmarks.continuous_design import (
     whitened,
 )
 from tests.benchmarks.figures import at_least
+from tests.benchmarks.machines import bundled, on_all_cores
 from tests.benchmarks.samples import sample
 
 ROBOTS = sample(__name__, "ROBOTS")
@@ -60,7 +58,7 @@ class Rating:
 
 def rated(number: int) -> Rating | None:
     """A robot's adaptive campaign beside the best designs; None if it cannot be calibrated."""
-    cell = load_cell(bundled_config("simulated-hexaglide"))
+    cell = bundled()
     model = robot_of(cell)
     truth = random_robot(
         model.mechanism, model.drawing, model.tolerances, np.random.default_rng([SEED, number])
@@ -94,8 +92,7 @@ def rated(number: int) -> Rating | None:
 
 
 def test_the_efficiency_of_adaptive_campaigns(figure) -> None:
-    with processes(2)() as executor:
-        found = [one for one in executor.map(rated, range(ROBOTS)) if one is not None]
+    found = [one for one in on_all_cores(rated, range(ROBOTS)) if one is not None]
     assert len(found) >= 0.95 * ROBOTS
     for name, values, target in (
         ("D", [one.d for one in found], at_least(LEAST)),

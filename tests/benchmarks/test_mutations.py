@@ -77,11 +77,7 @@ def test_mutated_input_is_refused_or_used(templates, figure) -> None:
         figure(f"mutations tried: {kind}", count)
     codes = Counter(one.found.code for one in found)
     figure("exit codes", ", ".join(f"{code}: {n}" for code, n in sorted(codes.items())))
-    figure(
-        "with a traceback, a warning or a change outside",
-        sum(bool(one.found.problems) for one in found),
-        "",
-        NEVER,
-    )
+    wrong = sum(bool(one.found.problems) for one in found)
+    figure("with a traceback, a warning or a change outside", wrong, "", NEVER)
     slowest = max(one.found.seconds for one in found)
     figure("longest answer, processor time", slowest, "s", at_most(LONGEST_S))

@@ -113,12 +113,6 @@ def test_encoders_that_show_too_much_bring_sliders_short(own):
     assert difference(reached(own, encoders.scale(shares)), found.poses) < 1e-8
 
 
-def test_zeros_of_encoders_are_a_shift_of_slider_joints(own):
-    offsets = 0.1 * np.arange(6.0)
-    moved = with_sliders(own, own.truth["S"] - offsets[:, None] * X)
-    assert difference(reached(own, encoders.offset(offsets)), reached(own, Effect(), moved)) < 1e-8
-
-
 def test_small_shifts_move_the_platform_as_the_derivatives_of_the_product_say(own):
     random = np.random.default_rng(1)
     sliders, platform = 1e-3 * random.standard_normal((2, 6, 3))
@@ -173,14 +167,6 @@ def test_sliders_that_do_not_repeat_scatter_the_platform_as_the_derivatives_say(
     expected = sigma * np.sqrt(np.sum(by_joints**2, axis=(1, 2)))
     assert np.allclose(errors.scatter, expected, rtol=0.35)
     assert errors.largest_mm < 0.5 * expected.max()
-
-
-def test_a_known_geometry_without_effects_has_no_error_in_whatever_frames(own):
-    turn = Rotation.from_rotvec([1e-3, -2e-3, 3e-3]).as_matrix()
-    values = {"S": own.truth["S"] + [1.0, -2.0, 3.0], "B": own.truth["B"] @ turn.T, "l": own.truth["l"]}
-    written = Geometry.of(own.truth.parameters, values)
-    errors = world(own, Effect()).errors(written, own.task.poses, own.task.workspace)
-    assert errors.largest_mm < 1e-6
 
 
 def test_best_frames_are_those_of_the_product(own):

@@ -21,9 +21,9 @@ from hexacell.text.line_face import EventFormatter, activity, gauges_text, recor
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.state import RunState
 from procedures.steps import events
-from procedures.steps.gauges import Place
+from procedures.steps.commit import Commit
 from procedures.steps.move import Move
-from procedures.steps.write_back import Commit
+from procedures.steps.place import Place
 
 PLAIN_TERMINALS = {"dumb", "unknown"}
 """Values of TERM: no bar is drawn, and each record has a line."""

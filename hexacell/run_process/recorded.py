@@ -24,7 +24,7 @@ from procedures.journal.journal import Entry, read_entries
 from procedures.run.questions import ask_placement
 from procedures.run.state import fold
 from procedures.steps import events
-from procedures.steps.gauges import Place
+from procedures.steps.place import Place
 
 LONGEST_WAIT_S = 60.0
 """Longest wait between two events, s of recorded time: nobody waits for a run resumed the next day."""

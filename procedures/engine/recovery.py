@@ -30,10 +30,12 @@ from procedures.run.state import RunState
 from procedures.run.trips import Guard, GuardTripped, RobotNotStopped, causes_of, may_still_move
 from procedures.steps import events
 from procedures.steps.base import BaseEvent, BaseStep, StepOfSet
-from procedures.steps.gauges import MountingError
-from procedures.steps.provisional import ProvisionalApplied, TakeBack
+from procedures.steps.commit import Committed
+from procedures.steps.lend import ProvisionalApplied
+from procedures.steps.place import MountingError
 from procedures.steps.registry import Step
-from procedures.steps.write_back import Committed, RollBack
+from procedures.steps.roll_back import RollBack
+from procedures.steps.take_back import TakeBack
 from procedures.workflow.next_step import StepExecutor
 from procedures.workflow.sets import NoSafePath, TravelError
 

@@ -35,7 +35,8 @@ from procedures.guards.polling import (
     WatchedController,
 )
 from procedures.guards.position_check import PositionCheck, PositionReports, PositionSource
-from procedures.guards.rules import GuardLimits, following_error, stuck_gauge
+from procedures.guards.rules.after_a_move import following_error, stuck_gauge
+from procedures.guards.rules.base import GuardLimits
 from procedures.guards.supervision import MotionSupervisor, Supervised
 from procedures.run.keys import ThreeNumbers
 from procedures.run.trips import Trip, WatchedSet

@@ -1,6 +1,6 @@
 """The state of a run, derived from its events and from nothing else.
 
-What an event changes is in the file of its step (:mod:`procedures.steps`).
+What an event changes is in its own file (:mod:`procedures.steps`).
 """
 
 from __future__ import annotations
@@ -17,16 +17,21 @@ from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.readings import Reading
 
 if TYPE_CHECKING:  # a state keeps events whole, and needs their names in its annotations alone
+    from procedures.steps.accept import ResultAccepted
+    from procedures.steps.assess_noise import NoiseMeasured
     from procedures.steps.base import BaseEvent, BaseStep
+    from procedures.steps.commit import Committed
     from procedures.steps.events import Ended, RunStarted
-    from procedures.steps.gauges import GaugesProbed
-    from procedures.steps.identify import Identified, Proposed
-    from procedures.steps.judge import ConfirmationPlanned, ResultAccepted, ResultValidated
+    from procedures.steps.identify import Identified
+    from procedures.steps.judge import ConfirmationPlanned, ResultValidated
+    from procedures.steps.lend import ProvisionalApplied
     from procedures.steps.move import PoseExcluded
-    from procedures.steps.noise import NoiseMeasured, ReferenceRepeated, StandstillRead
-    from procedures.steps.provisional import ProvisionalApplied
-    from procedures.steps.sample import PilotTaken, RecordTaken
-    from procedures.steps.write_back import Committed
+    from procedures.steps.pilot import PilotTaken
+    from procedures.steps.probe import GaugesProbed
+    from procedures.steps.propose import Proposed
+    from procedures.steps.repeat import ReferenceRepeated
+    from procedures.steps.sample import RecordTaken
+    from procedures.steps.standstill import StandstillRead
 
 EventT = TypeVar("EventT", bound="BaseEvent")
 

@@ -21,17 +21,28 @@ from hexacell.results.written_geometry import TaskDisplacement
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, place_of
 from procedures.run.trips import Guard, Trip
+from procedures.steps.accept import ResultAccepted
+from procedures.steps.assess_noise import NoiseMeasured
 from procedures.steps.base import BaseEvent, EventOfSet
-from procedures.steps.gauges import GaugesPlaced, GaugesProbed, GaugesTried
-from procedures.steps.identify import Identified, Proposed
-from procedures.steps.judge import ConfirmationPlanned, ResultAccepted, ResultValidated
-from procedures.steps.move import Arrived, Located, Move, PoseExcluded
-from procedures.steps.noise import NoiseMeasured, ReferenceRepeated, StandstillRead
-from procedures.steps.provisional import ProvisionalApplied, ProvisionalReverted
-from procedures.steps.reference import ReferenceConfirmed, SetClosed, SetInvalidated
+from procedures.steps.close import SetClosed
+from procedures.steps.commit import Committed
+from procedures.steps.identify import Identified
+from procedures.steps.judge import ConfirmationPlanned, ResultValidated
+from procedures.steps.lend import ProvisionalApplied
+from procedures.steps.locate import Located
+from procedures.steps.move import Arrived, Move, PoseExcluded
+from procedures.steps.pilot import PilotTaken
+from procedures.steps.place import GaugesPlaced
+from procedures.steps.probe import GaugesProbed
+from procedures.steps.propose import Proposed
 from procedures.steps.registry import STEPS, Step
-from procedures.steps.sample import PilotTaken, RecordRejected, RecordTaken
-from procedures.steps.write_back import Committed, RolledBack
+from procedures.steps.repeat import ReferenceRepeated
+from procedures.steps.revisit import ReferenceConfirmed, SetInvalidated
+from procedures.steps.roll_back import RolledBack
+from procedures.steps.sample import RecordRejected, RecordTaken
+from procedures.steps.standstill import StandstillRead
+from procedures.steps.take_back import ProvisionalReverted
+from procedures.steps.try_gauges import GaugesTried
 
 
 class RunStarted(BaseEvent):

@@ -1,4 +1,4 @@
-"""Judge and accept: the verdict of a run, or the confirming records that it needs first; who keeps it."""
+"""Judge: the verdict of a run, or the confirming records that it needs first."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import ClassVar, Literal
 
 from hexacell.cell.model import CellSettings
 from hexacell.checks.check_result import CheckResult, check_line, check_result
-from hexacell.errors import AnswerNeeded
 from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet, Record
@@ -19,10 +18,9 @@ from hexacell.verdict.outcome import length_line, outcome_line, reason_of
 from hexacell.verdict.verification import HeldOut, Verification, verify
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase, SixNumbers
-from procedures.run.questions import ask_acceptance
 from procedures.run.readings import legs_warmer
 from procedures.run.state import RunState
-from procedures.steps.base import BaseEvent, Computation, StepWithoutMotion
+from procedures.steps.base import BaseEvent, Computation
 from procedures.steps.sample import RecordTaken
 
 
@@ -149,38 +147,3 @@ def _held_out(settings: CellSettings, state: RunState) -> HeldOut:
 def _at_points_from(count: int, samples: Iterable[RecordTaken]) -> Iterator[Record]:
     """The records at points of their own, numbered after ``count`` others."""
     return (replace(sample.record, point=sample.at.point + count) for sample in samples)
-
-
-class ResultAccepted(BaseEvent):
-    """A person decided on a result that did not pass; ``by`` is who keeps it, null if nobody does.
-
-    ``asked`` is whether there was somebody to ask.
-    """
-
-    kind: Literal["accepted"] = "accepted"
-    by: str | None
-    asked: bool = True
-
-    def applied_to(self, state: RunState) -> RunState:
-        return replace(state, accepted=self)
-
-
-class Accept(StepWithoutMotion):
-    """Ask whether the written geometry stays; nothing is changed."""
-
-    kind: Literal["accept"] = "accept"
-
-    outcomes: ClassVar = (ResultAccepted,)
-    doing: ClassVar[str] = "waiting for a decision on the result"
-    is_reproducible: ClassVar[bool] = False
-
-    async def perform(self, run: RunResources, state: RunState) -> ResultAccepted:
-        judged = state.judged
-        assert judged is not None  # noqa: S101 - decided only after the verdict
-        assert judged.verification is not None  # noqa: S101 - only then it is offered
-        moved = state.proposed.displacement if state.proposed else None
-        try:
-            name = await run.operator.ask(ask_acceptance(judged.line, judged.verification, moved))
-        except AnswerNeeded:
-            return ResultAccepted(by=None, asked=False)
-        return ResultAccepted(by=name)

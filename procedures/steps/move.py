@@ -1,4 +1,4 @@
-"""Locate and move: the robot is asked where it is, and goes to a pose unless the controller refuses it."""
+"""Move: the robot goes to a pose, unless the controller refuses it."""
 
 from __future__ import annotations
 
@@ -14,50 +14,14 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.pose import Pose
-from hexacell.measurements.records import joints_of
 from procedures.resources.run_resources import RunResources
 from procedures.run.cancellation import in_thread
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.state import RunState
 from procedures.run.trips import Guard, GuardTripped, WatchedSet
-from procedures.steps.base import BaseEvent, BaseStep, EventAtPose, StepAtPose
+from procedures.steps.base import BaseEvent, EventAtPose, StepAtPose
 from procedures.steps.identify import Identified
 from procedures.steps.sample import RecordRejected
-
-
-class Located(BaseEvent):
-    """Controller and encoders agree on where the robot is.
-
-    ``joints`` are the controller's joint variables, None where it reports none; mm or deg.
-    """
-
-    kind: Literal["located"] = "located"
-    pose: SixNumbers
-    joints: SixNumbers | None
-    encoders: SixNumbers
-
-    def applied_to(self, state: RunState) -> RunState:
-        """The robot is at a pose of no set."""
-        return replace(state, at_pose=None, off_plan=True, target=self.pose, position_unknown=False)
-
-
-class Locate(BaseStep):
-    """Ask the controller for its pose: no path can be checked from an unknown one."""
-
-    kind: Literal["locate"] = "locate"
-
-    outcomes: ClassVar = (Located,)
-    doing: ClassVar[str] = "asking the controller where the robot is"
-
-    async def perform(self, run: RunResources, state: RunState) -> Located:
-        """Compare what controller and encoders report; raises ``GuardTripped`` if they do not agree."""
-        found = await run.locate()
-        return Located(
-            pose=found.pose.as_tuple(),
-            joints=None if found.joints is None else joints_of(found.joints),
-            encoders=joints_of(found.encoders),
-        )
-
 
 OFF_THE_PLATE = {Guard.GAUGE_END, Guard.PLATE}
 """Guards that trip on the pose alone, while all devices work."""

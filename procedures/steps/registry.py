@@ -6,16 +6,27 @@ from typing import TYPE_CHECKING, Annotated, Union
 
 from pydantic import Field
 
+from procedures.steps.accept import Accept
+from procedures.steps.assess_noise import AssessNoise
 from procedures.steps.base import BaseStep
-from procedures.steps.gauges import Place, Probe, Try
-from procedures.steps.identify import Identify, Propose
-from procedures.steps.judge import Accept, Judge
-from procedures.steps.move import Locate, Move
-from procedures.steps.noise import AssessNoise, Repeat, Standstill
-from procedures.steps.provisional import Lend, TakeBack
-from procedures.steps.reference import CloseSet, Revisit
-from procedures.steps.sample import Pilot, Sample
-from procedures.steps.write_back import Commit, RollBack
+from procedures.steps.close import CloseSet
+from procedures.steps.commit import Commit
+from procedures.steps.identify import Identify
+from procedures.steps.judge import Judge
+from procedures.steps.lend import Lend
+from procedures.steps.locate import Locate
+from procedures.steps.move import Move
+from procedures.steps.pilot import Pilot
+from procedures.steps.place import Place
+from procedures.steps.probe import Probe
+from procedures.steps.propose import Propose
+from procedures.steps.repeat import Repeat
+from procedures.steps.revisit import Revisit
+from procedures.steps.roll_back import RollBack
+from procedures.steps.sample import Sample
+from procedures.steps.standstill import Standstill
+from procedures.steps.take_back import TakeBack
+from procedures.steps.try_gauges import Try
 
 STEPS: tuple[type[BaseStep], ...] = (
     Locate,

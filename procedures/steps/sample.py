@@ -1,4 +1,4 @@
-"""Sample and pilot: a record is taken, or rejected because the ball left the gauges' travel."""
+"""Sample: a record is taken, or rejected because the ball left the gauges' travel."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from procedures.run.keys import ThreeNumbers
 from procedures.run.readings import Reading, in_words
 from procedures.run.state import RunState
 from procedures.steps.base import EventAtPose, EventOfSet, StepAtPose
-from procedures.steps.gauges import MountingError
+from procedures.steps.place import MountingError
 
 
 class RecordTaken(EventAtPose):
@@ -138,34 +138,3 @@ def require_room(settings: CellSettings, shown_mm: ThreeNumbers) -> None:
         errors.append(error)
     if errors:
         raise joined("the gauges must be mounted again", errors)
-
-
-class PilotTaken(EventAtPose):
-    """The reference was left for a pilot pose, and the gauges were read there."""
-
-    kind: Literal["piloted"] = "piloted"
-    reading: Reading
-
-    def record(self, zero: Reading) -> Record:
-        """The record for the choice of poses; ``zero`` is the reading at the set's reference."""
-        deviation = deviation_of(np.subtract(self.reading.gauges_mm, zero.gauges_mm))
-        return Record(self.at.point, self.orientation, Pose(*self.pose), self.reading.joints, deviation)
-
-    def applied_to(self, state: RunState) -> RunState:
-        measured = state.set(self.at)
-        pilots = (*measured.pilots, self)
-        return state.with_set(self.at, replace(measured, pilots=pilots, piloted=measured.piloted + 1))
-
-
-class Pilot(StepAtPose):
-    """Read the gauges where the reference was left: that steers the choice of poses, and nothing else."""
-
-    kind: Literal["pilot"] = "pilot"
-
-    outcomes: ClassVar = (PilotTaken, RecordRejected)
-
-    async def perform(self, run: RunResources, state: RunState) -> PilotTaken | RecordRejected:
-        reading = await read_inside(self, run, state)
-        if isinstance(reading, RecordRejected):
-            return reading
-        return PilotTaken(at=self.at, orientation=self.orientation, pose=self.pose, reading=reading)

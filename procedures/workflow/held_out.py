@@ -13,7 +13,8 @@ from hexacell.kinematics.rotations import Array
 from procedures.run.keys import Phase, SetKey, SixNumbers
 from procedures.run.state import RunState
 from procedures.steps.judge import Judge
-from procedures.steps.move import Locate, Move
+from procedures.steps.locate import Locate
+from procedures.steps.move import Move
 from procedures.steps.registry import Step
 from procedures.workflow.sets import SetSteps, TravelError, reference_move, reference_pose, require_zero
 from procedures.workflow.trial import TrialSteps

@@ -17,7 +17,8 @@ from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
-from procedures.steps.move import Locate, Move
+from procedures.steps.locate import Locate
+from procedures.steps.move import Move
 from procedures.steps.registry import Step
 from procedures.workflow.sets import NoSafePath, SetSteps, TravelError, reference_pose
 from procedures.workflow.trial import TrialSteps

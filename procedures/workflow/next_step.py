@@ -18,11 +18,14 @@ from procedures.calibration.calibration import Calibration, Mode
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase
 from procedures.run.state import RunState
+from procedures.steps.accept import Accept
 from procedures.steps.base import BaseEvent, BaseStep
-from procedures.steps.identify import Identify, Propose
-from procedures.steps.judge import Accept, Judge, ResultValidated
-from procedures.steps.provisional import TakeBack
-from procedures.steps.write_back import Commit, RollBack
+from procedures.steps.commit import Commit
+from procedures.steps.identify import Identify
+from procedures.steps.judge import Judge, ResultValidated
+from procedures.steps.propose import Propose
+from procedures.steps.roll_back import RollBack
+from procedures.steps.take_back import TakeBack
 from procedures.workflow.held_out import HeldOutSteps
 from procedures.workflow.length import LengthSteps
 from procedures.workflow.points import IdentificationSteps, NoiseSteps

@@ -20,12 +20,15 @@ from hexacell.noise.noise_assessment import visits_agree
 from procedures.calibration.calibration import campaign_state
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
-from procedures.steps.move import Locate, Move
-from procedures.steps.noise import AssessNoise, Repeat, Standstill, noise_readings
-from procedures.steps.provisional import Lend
-from procedures.steps.reference import CloseSet
+from procedures.steps.assess_noise import AssessNoise, noise_readings
+from procedures.steps.close import CloseSet
+from procedures.steps.lend import Lend
+from procedures.steps.locate import Locate
+from procedures.steps.move import Move
+from procedures.steps.pilot import Pilot
 from procedures.steps.registry import Step
-from procedures.steps.sample import Pilot
+from procedures.steps.repeat import Repeat
+from procedures.steps.standstill import Standstill
 from procedures.workflow.sets import Known, SetSteps, beside, move_to_chosen, reference_pose, require_zero
 from procedures.workflow.trial import TrialSteps
 

@@ -13,7 +13,7 @@ from hexacell.kinematics.pose import Pose
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.devices.device_set import Devices, gather_errors
 from procedures.guards.position_check import PositionCheck
-from procedures.guards.rules import motion_forbidden
+from procedures.guards.rules.stop_requested import motion_forbidden
 from procedures.guards.supervision import low_disk_space
 from procedures.run.cancellation import in_thread
 from procedures.workflow.next_step import length_poses

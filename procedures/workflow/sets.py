@@ -21,10 +21,11 @@ from hexacell.motion.paths import PathPlanner, find_route, next_return_move
 from hexacell.robot.model import Robot
 from procedures.run.keys import Phase, SetKey, SixNumbers, ThreeNumbers
 from procedures.run.state import RunState
-from procedures.steps.gauges import Place
+from procedures.steps.close import CloseSet
 from procedures.steps.move import Expectation, Move
-from procedures.steps.reference import CloseSet, Revisit
+from procedures.steps.place import Place
 from procedures.steps.registry import Step
+from procedures.steps.revisit import Revisit
 from procedures.steps.sample import Sample
 
 Known = tuple[RobotBelief, GaugeZero]

@@ -17,9 +17,10 @@ from hexacell.kinematics.rotations import Array
 from hexacell.motion.path_check import ball_position
 from procedures.run.keys import SetKey, ThreeNumbers
 from procedures.run.state import RunState
-from procedures.steps.gauges import Probe, Try
 from procedures.steps.move import Move
+from procedures.steps.probe import Probe
 from procedures.steps.registry import Step
+from procedures.steps.try_gauges import Try
 from procedures.workflow.sets import SetSteps, beside, reference_pose
 
 

@@ -16,7 +16,7 @@ from typing import Any
 from hexacell.errors import HexacellError
 from procedures.journal.journal import read_journal
 from procedures.steps import events
-from procedures.steps.gauges import MountingError
+from procedures.steps.place import MountingError
 from tests.benchmarks.figures import NEVER, at_least
 from tests.benchmarks.samples import sample
 from tests.procedures.rig import new_rig

@@ -15,7 +15,7 @@ from procedures.calibration.calibration import Mode
 from procedures.engine.commands import UnattendedOperator
 from procedures.journal.journal import Journal
 from procedures.steps import events
-from procedures.steps.write_back import RollBack
+from procedures.steps.roll_back import RollBack
 
 COMMITTED = events.Committed(approved_by="a tester")
 WITHDRAWN = [events.StepBegun(step=RollBack()), events.RolledBack()]

@@ -7,12 +7,17 @@ from collections.abc import Iterable
 from procedures.run.keys import Phase
 from procedures.steps import events
 from procedures.steps.base import StepOfSet, StepWithoutMotion
-from procedures.steps.gauges import Place, Probe, Try
-from procedures.steps.move import Locate, Move
-from procedures.steps.noise import Repeat, Standstill
-from procedures.steps.reference import Revisit
+from procedures.steps.locate import Locate
+from procedures.steps.move import Move
+from procedures.steps.pilot import Pilot
+from procedures.steps.place import Place
+from procedures.steps.probe import Probe
 from procedures.steps.registry import Step
-from procedures.steps.sample import Pilot, Sample
+from procedures.steps.repeat import Repeat
+from procedures.steps.revisit import Revisit
+from procedures.steps.sample import Sample
+from procedures.steps.standstill import Standstill
+from procedures.steps.try_gauges import Try
 
 STEPS = (
     "beginning",

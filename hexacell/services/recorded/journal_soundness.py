@@ -30,9 +30,10 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, apply
 from procedures.steps import events
 from procedures.steps.base import StepOfSet
-from procedures.steps.gauges import Place
 from procedures.steps.move import Move
-from procedures.steps.sample import Pilot, Sample
+from procedures.steps.pilot import Pilot
+from procedures.steps.place import Place
+from procedures.steps.sample import Sample
 
 LARGEST_COUNT = 2**63 - 1
 LARGEST_VARIANCE = 1e12

@@ -23,7 +23,7 @@ from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import Entry, read_entries
 from procedures.run.state import RunState, apply
 from procedures.steps import events
-from procedures.steps.write_back import reason_to_take_back
+from procedures.steps.roll_back import reason_to_take_back
 
 _OF_THE_RESULT = (WriteKind.RESULT, WriteKind.APPLIED, WriteKind.TAKEN_BACK)
 """Writes that the verdict of the run is about."""

@@ -15,8 +15,8 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState
 from procedures.steps import events
 from procedures.steps.base import StepOfSet
-from procedures.steps.gauges import Place
 from procedures.steps.move import Expectation, Move
+from procedures.steps.place import Place
 
 NO_RUN = {
     "Now": "no run is being measured here",

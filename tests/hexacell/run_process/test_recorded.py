@@ -28,7 +28,7 @@ from procedures.engine.commands import Undo
 from procedures.journal.journal import Entry, encode
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
-from procedures.steps.gauges import Place
+from procedures.steps.place import Place
 from tests.procedures.fakes import ManualClock
 from tests.procedures.story import Story
 

@@ -18,8 +18,8 @@ from procedures.calibration.calibration import Mode, campaign_state, expected_re
 from procedures.run.keys import Phase
 from procedures.run.state import apply, fold
 from procedures.steps import events
+from procedures.steps.close import CloseSet
 from procedures.steps.move import Move
-from procedures.steps.reference import CloseSet
 from procedures.steps.sample import Sample
 from tests.procedures.story import next_step
 

@@ -18,10 +18,10 @@ from procedures.calibration.calibration import Mode
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import fold
 from procedures.steps import events
-from procedures.steps.gauges import Place
 from procedures.steps.move import Move
+from procedures.steps.place import Place
+from procedures.steps.roll_back import RollBack
 from procedures.steps.sample import Sample
-from procedures.steps.write_back import RollBack
 from procedures.workflow import sets as path_planning
 from procedures.workflow.points import IdentificationSteps
 from tests.procedures.identified import an_identification

@@ -14,7 +14,7 @@ from procedures.devices.device_set import Devices, MountedGauge
 from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events
-from procedures.steps.reference import CloseSet
+from procedures.steps.close import CloseSet
 from procedures.steps.sample import Sample
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)

@@ -18,11 +18,11 @@ from hexacell.errors import ExitCode, HexacellError
 from procedures.run.keys import Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
-from procedures.steps.gauges import Place
+from procedures.steps.close import CloseSet
+from procedures.steps.commit import Commit
 from procedures.steps.move import Move
-from procedures.steps.reference import CloseSet
+from procedures.steps.place import Place
 from procedures.steps.sample import Sample
-from procedures.steps.write_back import Commit
 
 MUST_S = 0.2
 STRIKES_S = 0.3

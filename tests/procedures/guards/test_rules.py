@@ -18,11 +18,13 @@ from hexacell.errors import DeviceError, ExitCode, LimitError
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.limits.gauge_travel import GaugeRoom
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
-from procedures.guards.rules import GuardLimits, first_trip, following_error, stuck_gauge
+from procedures.guards.rules.after_a_move import following_error, stuck_gauge
+from procedures.guards.rules.base import GuardLimits
+from procedures.guards.rules.registry import first_trip
 from procedures.guards.supervision import low_disk_space
 from procedures.run.trips import DriftTripped, Guard, GuardTripped, Trip
 from procedures.steps import events
-from procedures.steps.reference import reference_drift
+from procedures.steps.close import reference_drift
 
 PLATE = GaugeRoom.symmetric(5.5)
 LIMITS = GuardLimits(stale_s=0.12, plate=PLATE)

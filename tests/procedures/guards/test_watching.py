@@ -13,14 +13,14 @@ from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError, HexacellError, LimitError
 from hexacell.limits.gauge_travel import GaugeRoom
 from procedures.guards.polling import DevicePoller, LineActivity, PolledDevices
-from procedures.guards.rules import GuardLimits
+from procedures.guards.rules.base import GuardLimits
 from procedures.guards.supervision import GuardMonitor
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
+from procedures.steps.close import CloseSet
 from procedures.steps.move import Expectation, Move
-from procedures.steps.reference import CloseSet
 from procedures.steps.sample import Sample
 
 LIMITS = GuardLimits(0.12, GaugeRoom.symmetric(5.5))

@@ -13,12 +13,13 @@ from hexacell.campaign.pilots import FIRST_PILOT
 from procedures.journal.journal import Journal, read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
+from procedures.steps.close import CloseSet
 from procedures.steps.events import EVENTS
 from procedures.steps.move import Move
-from procedures.steps.reference import CloseSet
+from procedures.steps.pilot import Pilot
 from procedures.steps.registry import STEPS, Step
-from procedures.steps.sample import Pilot, Sample
-from procedures.steps.write_back import RollBack
+from procedures.steps.roll_back import RollBack
+from procedures.steps.sample import Sample
 from tests.procedures.identified import an_identification
 
 POSE = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)

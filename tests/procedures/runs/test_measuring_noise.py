@@ -28,9 +28,11 @@ from procedures.replay.replayer import Replayer, ReplayReport
 from procedures.run.keys import Phase, SetKey, SixNumbers
 from procedures.run.state import RunState, fold
 from procedures.steps import events
+from procedures.steps.assess_noise import AssessNoise
 from procedures.steps.move import Move
-from procedures.steps.noise import AssessNoise, Repeat, Standstill
-from procedures.steps.sample import Pilot
+from procedures.steps.pilot import Pilot
+from procedures.steps.repeat import Repeat
+from procedures.steps.standstill import Standstill
 from tests.procedures.replay.test_replayer import numbered
 from tests.procedures.rig import MakeRig, Rig, new_rig
 from tests.procedures.runs.listening import PowerCut, happened, on, run_until, steps_of

@@ -12,7 +12,7 @@ from hexacell.cell.recovery import Action, FailureKind
 from hexacell.errors import ExitCode
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.steps import events
-from procedures.steps.gauges import MountingError
+from procedures.steps.place import MountingError
 from tests.procedures.runs.listening import happened, on, run_until
 
 OFF_MM = 3.8

@@ -6,10 +6,14 @@ from collections.abc import Callable
 
 from drivers.gauges.cdi import CdiGauge
 from drivers.gauges.described import ModbusGauge, RequestGauge, StreamGauge
-from drivers.gauges.displays import DigimaticUsbGauge, HeidenhainGauge, IdHGauge, KeyenceGauge, UwaveGauge
+from drivers.gauges.digimatic_usb import DigimaticUsbGauge
+from drivers.gauges.heidenhain_nd import HeidenhainGauge
+from drivers.gauges.keyence_dl_rs1a import KeyenceGauge
+from drivers.gauges.mitutoyo_id_h import IdHGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.gauges.sylvac import SylvacGauge
+from drivers.gauges.uwave import UwaveGauge
 from drivers.gauges.visa import VisaGauge
 from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, instrument_class

@@ -1,4 +1,4 @@
-"""Standstill, repeat and assess noise: the run counts with the noise that its first reference shows."""
+"""Assess noise: what was read at the first reference gives the noise that the run counts with."""
 
 from __future__ import annotations
 
@@ -13,57 +13,8 @@ from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.noise.noise_assessment import NoiseReadings, assess_noise
 from hexacell.noise.standstill import display_step
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import SetKey
-from procedures.run.readings import Reading, ReadingSeries
 from procedures.run.state import RunState, SetState
-from procedures.steps.base import BaseEvent, Computation, EventOfSet, StepOfSet
-
-
-class StandstillRead(ReadingSeries, BaseEvent):
-    """The devices were read again and again at a reference while nothing moved."""
-
-    kind: Literal["stood"] = "stood"
-    at: SetKey
-
-    def applied_to(self, state: RunState) -> RunState:
-        return state.with_set(self.at, replace(state.set(self.at), standstill=self))
-
-
-class Standstill(StepOfSet):
-    """At a set's reference: read all devices again and again without moving, which shows their noise."""
-
-    kind: Literal["standstill"] = "standstill"
-
-    outcomes: ClassVar = (StandstillRead,)
-    purpose: ClassVar[str] = "measuring the noise"
-
-    async def perform(self, run: RunResources, state: RunState) -> StandstillRead:
-        series = await run.read_series(run.settings.noise.standstill_readings)
-        return StandstillRead(at=self.at, **dict(series))
-
-
-class ReferenceRepeated(EventOfSet):
-    """The reference was left, visited again from another direction, and read."""
-
-    kind: Literal["repeated"] = "repeated"
-    reading: Reading
-
-    def applied_to(self, state: RunState) -> RunState:
-        measured = state.set(self.at)
-        visits = (*measured.visits, self)
-        return state.with_set(self.at, replace(measured, visits=visits, has_left=False, piloted=0))
-
-
-class Repeat(StepOfSet):
-    """Back at a set's reference from another direction: read again, which shows how well it repeats."""
-
-    kind: Literal["repeat"] = "repeat"
-
-    outcomes: ClassVar = (ReferenceRepeated,)
-    purpose: ClassVar[str] = "measuring the noise"
-
-    async def perform(self, run: RunResources, state: RunState) -> ReferenceRepeated:
-        return ReferenceRepeated(at=self.at, reading=await run.read())
+from procedures.steps.base import Computation, EventOfSet
 
 
 class NoiseMeasured(EventOfSet):

@@ -1,4 +1,4 @@
-"""Place, probe and try: the gauges are put around the ball, and each must follow it beside a reference."""
+"""Try: back at a set's reference it is judged whether each gauge followed the ball."""
 
 from __future__ import annotations
 
@@ -10,76 +10,15 @@ import numpy as np
 
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.model import CellSettings
-from hexacell.errors import DeviceError, joined
-from hexacell.kinematics.pose import Pose
+from hexacell.errors import joined
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of
 from hexacell.noise.gauge_trial import GaugeMistake, TrialFinding, judge_response, response_of
 from procedures.resources.run_resources import RunResources
-from procedures.run.keys import Phase, SixNumbers, ThreeNumbers
-from procedures.run.questions import ask_mounting, ask_placement
-from procedures.run.readings import Reading
+from procedures.run.keys import ThreeNumbers
 from procedures.run.state import RunState
 from procedures.steps.base import EventOfSet, StepOfSet
-
-
-class MountingError(DeviceError):
-    """Gauges are not mounted as a set needs them; nothing can be measured with them before they are."""
-
-
-class GaugesPlaced(EventOfSet):
-    """The gauges are placed around the ball."""
-
-    kind: Literal["placed"] = "placed"
-
-    def applied_to(self, state: RunState) -> RunState:
-        return state.with_set(self.at, replace(state.set(self.at), placed=True))
-
-
-class Place(StepOfSet):
-    """Have the gauges put around the ball, plungers in the middle of their travel."""
-
-    kind: Literal["place"] = "place"
-    pose: SixNumbers
-
-    outcomes: ClassVar = (GaugesPlaced,)
-    doing: ClassVar[str] = "the gauges are to be placed"
-
-    async def perform(self, run: RunResources, state: RunState) -> GaugesPlaced:
-        """Ask a person where one is needed; the robot stands still meanwhile."""
-        settings, pose = run.settings, Pose(*self.pose)
-        if self.at.phase is Phase.LENGTH and settings.length_check is not None:
-            if settings.length_check.mounting == "by-hand":
-                await run.ask_at_standstill(ask_mounting(self.at.point, self.at.seat, pose))
-        elif settings.stations.placement == "by-hand":
-            await run.ask_at_standstill(ask_placement(self.at, pose))
-        return GaugesPlaced(at=self.at)
-
-
-class GaugesProbed(EventOfSet):
-    """The ball was moved by a small known distance from a set's reference, and the gauges were read."""
-
-    kind: Literal["probed"] = "probed"
-    moved_mm: ThreeNumbers
-    reading: Reading
-
-    def applied_to(self, state: RunState) -> RunState:
-        measured = state.set(self.at)
-        return state.with_set(self.at, replace(measured, probes=(*measured.probes, self)))
-
-
-class Probe(StepOfSet):
-    """Beside a set's reference, after a small known move of the ball: read the gauges."""
-
-    kind: Literal["probe"] = "probe"
-    moved_mm: ThreeNumbers
-
-    outcomes: ClassVar = (GaugesProbed,)
-    purpose: ClassVar[str] = "trying the gauges"
-
-    async def perform(self, run: RunResources, state: RunState) -> GaugesProbed:
-        return GaugesProbed(at=self.at, moved_mm=self.moved_mm, reading=await run.read())
-
+from procedures.steps.place import MountingError
 
 MISTAKES: Mapping[GaugeMistake, tuple[str, str, str]] = {
     GaugeMistake.DEAD: (

@@ -1,0 +1,13 @@
+"""An encoder has an alarm or restarted, or a sample is incomplete."""
+
+from __future__ import annotations
+
+from procedures.guards.polling import PolledDevices
+from procedures.guards.rules.base import GuardLimits, fault_trip
+from procedures.run.trips import Guard, Trip
+
+
+def encoder_fault(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
+    """An encoder has an alarm or restarted, or a sample is incomplete."""
+    report = devices.encoders
+    return None if report is None or report.error is None else fault_trip(Guard.ENCODERS, report)

@@ -1,0 +1,47 @@
+"""Accept: a person decides whether a written geometry that did not pass stays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+from hexacell.errors import AnswerNeeded
+from procedures.resources.run_resources import RunResources
+from procedures.run.questions import ask_acceptance
+from procedures.run.state import RunState
+from procedures.steps.base import BaseEvent, StepWithoutMotion
+
+
+class ResultAccepted(BaseEvent):
+    """A person decided on a result that did not pass; ``by`` is who keeps it, null if nobody does.
+
+    ``asked`` is whether there was somebody to ask.
+    """
+
+    kind: Literal["accepted"] = "accepted"
+    by: str | None
+    asked: bool = True
+
+    def applied_to(self, state: RunState) -> RunState:
+        return replace(state, accepted=self)
+
+
+class Accept(StepWithoutMotion):
+    """Ask whether the written geometry stays; nothing is changed."""
+
+    kind: Literal["accept"] = "accept"
+
+    outcomes: ClassVar = (ResultAccepted,)
+    doing: ClassVar[str] = "waiting for a decision on the result"
+    is_reproducible: ClassVar[bool] = False
+
+    async def perform(self, run: RunResources, state: RunState) -> ResultAccepted:
+        judged = state.judged
+        assert judged is not None  # noqa: S101 - decided only after the verdict
+        assert judged.verification is not None  # noqa: S101 - only then it is offered
+        moved = state.proposed.displacement if state.proposed else None
+        try:
+            name = await run.operator.ask(ask_acceptance(judged.line, judged.verification, moved))
+        except AnswerNeeded:
+            return ResultAccepted(by=None, asked=False)
+        return ResultAccepted(by=name)

@@ -1,0 +1,80 @@
+"""Close: the reference of a set is read again at its end; the difference is drift."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from hexacell.measurements.records import deviation_of
+from procedures.resources.run_resources import RunResources
+from procedures.run.keys import ThreeNumbers
+from procedures.run.readings import Reading, in_words
+from procedures.run.state import RunState
+from procedures.run.trips import Guard, Trip
+from procedures.steps.base import EventOfSet, StepOfSet
+
+
+class SetClosed(EventOfSet):
+    """The reference was read again; ``drift_mm`` is the change since it was zeroed.
+
+    The ``reason`` is why the set has fewer records than planned; empty where it has all.
+    """
+
+    kind: Literal["closed"] = "closed"
+    drift_mm: ThreeNumbers
+    reading: Reading
+    reason: str = ""
+
+    def applied_to(self, state: RunState) -> RunState:
+        return state.with_set(self.at, replace(state.set(self.at), drift_mm=self.drift_mm))
+
+    def text(self, state: RunState) -> str:
+        samples = state.set(self.at).samples
+        largest = max(float(np.abs(sample.deviation_mm).max()) for sample in samples)
+        drift = float(np.abs(self.drift_mm).max())
+        line = (
+            f"{self.at.name:24} {len(samples):2} records, "
+            f"largest deviation {largest:.3f} mm, drift {drift:.3f} mm"
+        )
+        return (
+            f"{line}\n{self.at.name} ends with {len(samples)} records: {self.reason}"
+            if self.reason
+            else line
+        )
+
+
+class CloseSet(StepOfSet):
+    """Back at the set's reference pose: read again; the difference is drift.
+
+    The ``reason`` is why the set has fewer records than planned; empty where it has all.
+    """
+
+    kind: Literal["close"] = "close"
+    reason: str = ""
+
+    outcomes: ClassVar = (SetClosed,)
+    doing: ClassVar[str] = "reading the reference again, for the drift"
+
+    async def perform(self, run: RunResources, state: RunState) -> SetClosed:
+        """Read again; raises ``DriftTripped`` if the gauges show another value than before."""
+        reading = await run.read()
+        zero = state.set(self.at).samples[0].reading
+        drift_mm = deviation_of(np.subtract(reading.gauges_mm, zero.gauges_mm))
+        await run.check_gauges()
+        if trip := reference_drift(str(self.at), drift_mm, run.settings.acceptance.drift_mm):
+            raise trip.as_error()  # not latched, as nothing moved
+        return SetClosed(at=self.at, drift_mm=drift_mm, reading=reading, reason=self.reason)
+
+
+def reference_drift(point: str, drift_mm: tuple[float, ...], limit_mm: float) -> Trip | None:
+    """The trip of a set whose gauges show another value at its reference than at its begin."""
+    if max(map(abs, drift_mm)) <= limit_mm:
+        return None
+    return Trip(
+        Guard.DRIFT,
+        point,
+        f"back at the reference the gauges show {in_words(drift_mm)}, more than {limit_mm:g} mm",
+        "A gauge slipped or the machine does not repeat; resume measures this point again",
+    )

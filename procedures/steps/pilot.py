@@ -1,0 +1,47 @@
+"""Pilot: the gauges are read where the reference was left, which steers the choice of poses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.records import Record, deviation_of
+from procedures.resources.run_resources import RunResources
+from procedures.run.readings import Reading
+from procedures.run.state import RunState
+from procedures.steps.base import EventAtPose, StepAtPose
+from procedures.steps.sample import RecordRejected, read_inside
+
+
+class PilotTaken(EventAtPose):
+    """The reference was left for a pilot pose, and the gauges were read there."""
+
+    kind: Literal["piloted"] = "piloted"
+    reading: Reading
+
+    def record(self, zero: Reading) -> Record:
+        """The record for the choice of poses; ``zero`` is the reading at the set's reference."""
+        deviation = deviation_of(np.subtract(self.reading.gauges_mm, zero.gauges_mm))
+        return Record(self.at.point, self.orientation, Pose(*self.pose), self.reading.joints, deviation)
+
+    def applied_to(self, state: RunState) -> RunState:
+        measured = state.set(self.at)
+        pilots = (*measured.pilots, self)
+        return state.with_set(self.at, replace(measured, pilots=pilots, piloted=measured.piloted + 1))
+
+
+class Pilot(StepAtPose):
+    """Read the gauges where the reference was left: that steers the choice of poses, and nothing else."""
+
+    kind: Literal["pilot"] = "pilot"
+
+    outcomes: ClassVar = (PilotTaken, RecordRejected)
+
+    async def perform(self, run: RunResources, state: RunState) -> PilotTaken | RecordRejected:
+        reading = await read_inside(self, run, state)
+        if isinstance(reading, RecordRejected):
+            return reading
+        return PilotTaken(at=self.at, orientation=self.orientation, pose=self.pose, reading=reading)

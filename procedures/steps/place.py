@@ -1,0 +1,47 @@
+"""Place: the gauges are put around the ball, by a person unless they are fixed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+from hexacell.errors import DeviceError
+from hexacell.kinematics.pose import Pose
+from procedures.resources.run_resources import RunResources
+from procedures.run.keys import Phase, SixNumbers
+from procedures.run.questions import ask_mounting, ask_placement
+from procedures.run.state import RunState
+from procedures.steps.base import EventOfSet, StepOfSet
+
+
+class MountingError(DeviceError):
+    """Gauges are not mounted as a set needs them; nothing can be measured with them before they are."""
+
+
+class GaugesPlaced(EventOfSet):
+    """The gauges are placed around the ball."""
+
+    kind: Literal["placed"] = "placed"
+
+    def applied_to(self, state: RunState) -> RunState:
+        return state.with_set(self.at, replace(state.set(self.at), placed=True))
+
+
+class Place(StepOfSet):
+    """Have the gauges put around the ball, plungers in the middle of their travel."""
+
+    kind: Literal["place"] = "place"
+    pose: SixNumbers
+
+    outcomes: ClassVar = (GaugesPlaced,)
+    doing: ClassVar[str] = "the gauges are to be placed"
+
+    async def perform(self, run: RunResources, state: RunState) -> GaugesPlaced:
+        """Ask a person where one is needed; the robot stands still meanwhile."""
+        settings, pose = run.settings, Pose(*self.pose)
+        if self.at.phase is Phase.LENGTH and settings.length_check is not None:
+            if settings.length_check.mounting == "by-hand":
+                await run.ask_at_standstill(ask_mounting(self.at.point, self.at.seat, pose))
+        elif settings.stations.placement == "by-hand":
+            await run.ask_at_standstill(ask_placement(self.at, pose))
+        return GaugesPlaced(at=self.at)

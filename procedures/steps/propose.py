@@ -1,0 +1,59 @@
+"""Propose: the new config is prepared in the run folder, and the gates for writing it are evaluated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+from hexacell.cell.fields import GeometryDocument
+from hexacell.results.written_geometry import TaskDisplacement, as_written
+from hexacell.verdict.acceptance_gates import AcceptanceGate, gates
+from procedures.resources.run_resources import RunResources
+from procedures.run.state import RunState
+from procedures.steps.base import BaseEvent, Computation
+
+
+class Proposed(BaseEvent):
+    """The new config was saved in the run folder, and the gates for writing it were evaluated.
+
+    ``written`` is the geometry in it; ``displacement`` is how far that moves the task poses.
+    """
+
+    kind: Literal["proposed"] = "proposed"
+    gates: tuple[AcceptanceGate, ...]
+    written: GeometryDocument
+    displacement: TaskDisplacement | None = None
+
+    def applied_to(self, state: RunState) -> RunState:
+        return replace(state, proposed=self)
+
+
+class Propose(Computation):
+    """Prepare the change of the controller's config."""
+
+    kind: Literal["propose"] = "propose"
+
+    outcomes: ClassVar = (Proposed,)
+    doing: ClassVar[str] = "preparing the new config"
+
+    def compute(self, run: RunResources, state: RunState) -> Proposed:
+        """Save the change of the config and evaluate the gates; raises ``FileError``."""
+        assert state.identified is not None  # noqa: S101 - decided only after the identification
+        settings, robot, result = run.settings, run.calibration.robot, state.identified.result
+        identified = result.estimate(robot.mechanism.parameters)
+        commanding, _ = robot.mechanism.normalize_frames(robot.controller)
+        started = state.started
+        conditions = gates(
+            identified,
+            robot.tolerance_violations(identified),
+            residuals=result.residuals,
+            largest_change_mm=settings.acceptance.largest_change_mm,
+            before=commanding,
+            expired=started.expired if settings.certificates and started is not None else None,
+        )
+        written = as_written(settings, robot, identified.geometry)
+        change = run.config.change_to(written.geometry, state)
+        change.save(run.folder.proposal, like=run.cell.config_path)
+        return Proposed(
+            gates=conditions, written=written.geometry.document(), displacement=written.displacement
+        )

@@ -10,25 +10,13 @@ import pytest
 HERE = Path(__file__).parent
 
 LEAKS = {
-    "ERROR *::test_thread - *left behind: thread worker (*)": """
+    "ERROR *::test_thread - *left behind: daemon thread worker (*)": """
         def test_thread():
-            threading.Thread(target=END.wait, name="worker").start()
-    """,
-    "ERROR *::test_daemon_thread - *left behind: daemon thread helper (*)": """
-        def test_daemon_thread():
-            threading.Thread(target=END.wait, name="helper", daemon=True).start()
-    """,
-    "ERROR *::test_file - *left behind: descriptor * -> /dev/null": """
-        def test_file():
-            os.open("/dev/null", os.O_RDONLY)
+            threading.Thread(target=END.wait, name="worker", daemon=True).start()
     """,
     "ERROR *::test_terminal - *left behind: descriptor * -> /dev/ptmx, descriptor * -> /dev/pts/*": """
         def test_terminal():
             pty.openpty()
-    """,
-    "ERROR *::test_socket - *left behind: descriptor * -> socket:*": """
-        def test_socket():
-            KEPT.append(socket.socket())
     """,
     "ERROR *::test_server - *left behind: descriptor * -> socket:*": """
         async def test_server():
@@ -37,10 +25,6 @@ LEAKS = {
     "ERROR *::test_signal - *left behind: <Signals.SIGUSR1: *> blocked": """
         def test_signal():
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR1})
-    """,
-    "ERROR *::test_task - *left behind: <Task pending name='listener' *": """
-        async def test_task():
-            KEPT.append(asyncio.create_task(asyncio.Event().wait(), name="listener"))
     """,
     "ERROR *::test_task_of_a_fixture - *left behind: <Task pending name='pump' *": """
         @pytest.fixture
@@ -59,10 +43,6 @@ LEAKS = {
             thread = threading.Thread(target=lambda: 1 / 0, name="counter")
             thread.start()
             thread.join()
-    """,
-    "FAILED *::test_warning - DeprecationWarning: old": """
-        def test_warning():
-            warnings.warn("old", DeprecationWarning)
     """,
     "FAILED *::test_coroutine_never_awaited - *Exception ignored in: <coroutine object sleep*": """
         def test_coroutine_never_awaited():
@@ -88,14 +68,6 @@ CLEAN = """
     async def test_child_process():
         await (await asyncio.create_subprocess_exec("true")).wait()
 
-    async def test_server_closed():
-        server = await asyncio.start_server(print, "127.0.0.1", 0)
-        server.close()
-        await server.wait_closed()
-
-    def test_loop_of_its_own():
-        asyncio.run(asyncio.sleep(0))
-
     @pytest.fixture(scope="module")
     def shared_line():
         with socket.socket() as line:
@@ -104,18 +76,25 @@ CLEAN = """
     def test_what_belongs_to_the_module(shared_line, capfd, tmp_path):
         pass
 
-    @pytest.fixture
-    async def link():
-        task = asyncio.create_task(asyncio.Event().wait())
-        yield
-        task.cancel()
-
-    async def test_task_that_its_fixture_ends(link):
-        pass
-
     @given(st.integers())
     async def test_generated(number):
         await asyncio.sleep(0)
+"""
+
+MARKED = """
+    @pytest.mark.sample("a-*", "b-2")
+    @pytest.mark.parametrize("number", [1, 2])
+    @pytest.mark.parametrize("letter", ["a", "b"])
+    def test_of_which_some_are_slow(letter, number, request):
+        is_slow = request.node.get_closest_marker("slow") is not None
+        assert is_slow == (letter == "b" and number == 1)
+
+    def test_profile():
+        assert settings.default.derandomize
+
+    @pytest.mark.timeout(0.2)
+    def test_hangs():
+        time.sleep(9)
 """
 
 HEADER = """
@@ -138,11 +117,11 @@ def suite(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.
     return pytester
 
 
-def run(suite: pytest.Pytester, *sources: str, options: str = "") -> pytest.RunResult:
+def run(suite: pytest.Pytester, *sources: str) -> pytest.RunResult:
     """Run tests of these sources in a process of its own, so that what they leave dies with it."""
     text = "\n".join(dedent(source) for source in (HEADER, *sources))
     (suite.path / "tests" / "test_inner.py").write_text(text)
-    return suite.runpytest_subprocess("tests", *options.split())
+    return suite.runpytest_subprocess("tests", "-v")
 
 
 def test_a_leak_fails_its_test_and_no_other(suite: pytest.Pytester) -> None:
@@ -161,48 +140,17 @@ def test_tests_that_clean_up_pass(suite: pytest.Pytester) -> None:
     run(suite, CLEAN).assert_outcomes(passed=CLEAN.count("def test_"))
 
 
-SAMPLED = """
-    @pytest.mark.sample("a-*", "b-2")
-    @pytest.mark.parametrize("number", [1, 2])
-    @pytest.mark.parametrize("letter", ["a", "b"])
-    def test_of_which_some_are_slow(letter, number):
-        pass
-"""
-
-
-def test_parameters_that_are_not_in_the_sample_are_slow(suite: pytest.Pytester) -> None:
-    assert run(suite, SAMPLED, options="-m slow -v").stdout.str().count("[b-1] PASSED") == 1
-    run(suite, SAMPLED, options="--no-header").assert_outcomes(passed=4)
-    refused = run(suite, SAMPLED.replace("a-*", "c-*"))
+def test_what_is_marked_is_slow_a_benchmark_or_ended(
+    suite: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CI", "true")
+    suite.mkdir("tests/benchmarks")
+    speed = "def test_speed(request): assert request.node.get_closest_marker('benchmark')"
+    (suite.path / "tests/benchmarks/test_speed.py").write_text(speed)
+    result = run(suite, MARKED)
+    result.assert_outcomes(passed=6, failed=1)
+    result.stdout.fnmatch_lines(["FAILED *::test_hangs - *Timeout*"])
+    refused = run(suite, MARKED.replace("a-*", "c-*"))
     refused.stderr.fnmatch_lines(
         ["*these samples name no parameters of their tests: *test_of_which*, 'c-?'*"]
     )
-
-
-@pytest.mark.parametrize(("environment", "repeatable"), [({"CI": "true"}, True), ({}, False)])
-def test_hypothesis_is_repeatable_in_ci(
-    suite: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], repeatable: bool
-) -> None:
-    monkeypatch.delenv("CI", raising=False)
-    for name, value in environment.items():
-        monkeypatch.setenv(name, value)
-    body = f"""
-        def test_profile():
-            assert settings.default.derandomize is {repeatable}
-            assert settings.default.deadline is None
-    """
-    run(suite, body).assert_outcomes(passed=1)
-
-
-def test_a_test_that_hangs_is_ended(suite: pytest.Pytester, pytestconfig: pytest.Config) -> None:
-    assert 0 < float(pytestconfig.getini("timeout")) <= 300
-    result = run(suite, "def test_hangs(): time.sleep(9)", options="--timeout=0.2")
-    result.stdout.fnmatch_lines(["FAILED *::test_hangs - *Timeout*"])
-
-
-def test_tests_in_the_benchmark_folder_are_marked_as_benchmarks(suite: pytest.Pytester) -> None:
-    suite.mkdir("tests/benchmarks")
-    (suite.path / "tests/benchmarks/test_speed.py").write_text("def test_speed(): pass")
-    result = run(suite, "def test_sense(): pass", options="-m benchmark -v")
-    result.assert_outcomes(passed=1, deselected=1)
-    result.stdout.fnmatch_lines(["*::test_speed PASSED*"])

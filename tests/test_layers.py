@@ -38,12 +38,6 @@ FORBIDDEN = [
     ("procedures.devices", "procedures.guards"),
     *((f"hexacell.{module}", "hexacell.cell.model") for module in MATHEMATICS),
     *((f"hexacell.{module}", "pydantic") for module in MATHEMATICS),
-    ("hexacell.kinematics", "asyncio"),
-    ("hexacell.kinematics", "serial"),
-    ("hexacell.kinematics", "can"),
-    ("hexacell.kinematics", "canopen"),
-    ("hexacell.kinematics", "rich"),
-    ("hexacell.kinematics", "tomlkit"),
 ]
 
 

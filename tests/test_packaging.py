@@ -1,4 +1,4 @@
-"""What is shipped: sdist and wheel, installed elsewhere; the pins; a program that starts quickly."""
+"""What is shipped: sdist and wheel, installed elsewhere; and the pins."""
 
 from __future__ import annotations
 
@@ -18,39 +18,11 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from hexacell.plugins import Group
+
 CHECKOUT = Path(__file__).parent.parent
 VERSION = "0.1.0"
 PACKAGES = ("hexacell", "drivers", "procedures")
-SLOW_TO_IMPORT = {"scipy", "numpy", "pydantic", "textual", "matplotlib"}
-CELL = "simulated-hexaglide.toml"
-
-# Fewer records and wide limits, on a cell that lives fast.
-QUICK = (
-    ("clock_factor = 150.0", "clock_factor = 600.0"),
-    ("give_up_s = 60.0", "give_up_s = 6000.0"),
-    ("orientations = 11", "orientations = 7"),
-    ("platform_cone_deg = 45.0", "platform_cone_deg = 90.0"),
-    ("orientations = 6", "orientations = 2"),
-    ("position_mm = 0.3 ", "position_mm = 20.0"),
-    ("orientation_deg = 0.08", "orientation_deg = 5.0"),
-    # Each test of the model fails one healthy run in a thousand, and the suite has hundreds of runs.
-    ("encoder_mm = 0.01\ngauge_mm = 0.01", "encoder_mm = 0.014\ngauge_mm = 0.014"),
-)
-
-GAUGES = [
-    "cdi",
-    "digimatic-usb",
-    "heidenhain-nd",
-    "keyence-dl-rs1a",
-    "mitutoyo-id-h",
-    "modbus",
-    "mux10",
-    "request",
-    "stream",
-    "sylvac",
-    "uwave",
-    "visa",
-]
 
 
 def run(*command: object, folder: Path) -> str:
@@ -78,18 +50,6 @@ def pip(folder: Path) -> list[str]:
         if found.returncode == 0:
             return [python, "-m", "pip"]
     pytest.fail("there is no pip")
-
-
-def python(*arguments: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run Python in ``folder``, outside the checkout."""
-    return subprocess.run(
-        [sys.executable, *arguments],
-        cwd=folder,
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 def files_of(folder: str) -> set[str]:
@@ -135,52 +95,26 @@ def site_packages(venv: Path) -> Path:
     return folder
 
 
-def contents(folder: Path) -> set[str]:
-    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-
-
 def information(unpacked: Path, name: str) -> str:
     [folder] = unpacked.glob("*.dist-info")
     return (folder / name).read_text()
 
 
 def test_the_wheel_has_the_three_packages_and_nothing_else(unpacked: Path) -> None:
-    found = {name for name in contents(unpacked) if ".dist-info/" not in name}
+    every = {path.relative_to(unpacked).as_posix() for path in unpacked.rglob("*") if path.is_file()}
+    found = {name for name in every if ".dist-info/" not in name}
     expected = {f"{package}/{name}" for package in PACKAGES for name in files_of(package)}
     expected |= {f"hexacell/_configs/{name}" for name in files_of("configs")}
     assert found == expected
 
 
-def test_the_wheel_is_typed(unpacked: Path) -> None:
-    assert {f"{package}/py.typed" for package in PACKAGES} <= contents(unpacked)
-
-
-def test_the_wheel_is_licensed(unpacked: Path) -> None:
+def test_the_wheel_announces_its_licence_the_program_and_the_plugins(unpacked: Path) -> None:
     assert "License-Expression: BSD-3-Clause" in information(unpacked, "METADATA")
     assert "Copyright (c) 2026, the hexacell project" in information(unpacked, "licenses/LICENSE")
-
-
-def test_the_wheel_announces_the_program_and_the_plugins(unpacked: Path) -> None:
     announced = information(unpacked, "entry_points.txt")
     assert "[console_scripts]\nhexacell = hexacell.__main__:main" in announced
     groups = set(re.findall(r"^\[(hexacell\..*)\]$", announced, flags=re.MULTILINE))
-    names = (
-        "gauges",
-        "simulated_gauges",
-        "encoders",
-        "controllers",
-        "thermometers",
-        "config_formats",
-        "mechanisms",
-    )
-    assert groups == {f"hexacell.{name}" for name in names}
-
-
-def test_the_wheel_finds_its_configs(unpacked: Path, tmp_path: Path) -> None:
-    script = "from hexacell.cell import bundled; print(bundled.bundled_config('simulated-hexaglide'))"
-    result = python("-c", script, folder=tmp_path, PYTHONPATH=str(unpacked))
-    assert result.returncode == 0, result.stderr
-    assert Path(result.stdout.strip()) == unpacked / "hexacell/_configs/simulated-hexaglide.toml"
+    assert groups == {group.entry_points for group in Group}
 
 
 def required(name: str, extras: frozenset[str] = frozenset()) -> Iterator[Requirement]:
@@ -220,24 +154,7 @@ def test_every_requirement_is_pinned_as_installed_and_nothing_else_is() -> None:
     installed = {name: exact for name, exact in pins().items() if name not in compared_with}
     assert installed == {name: version(name) for name in everything_installed()}
     assert compared_with <= set(pins())
-
-
-def test_the_pins_are_versions_only() -> None:
-    lines = (CHECKOUT / "constraints.txt").read_text().splitlines()
-    assert [line for line in lines if not re.fullmatch(r"#.*|[a-z0-9-]+==[0-9.]+(b[0-9]+)?", line)] == []
-    assert lines[1:] == sorted(lines[1:])
-
-
-def test_help_imports_nothing_slow(tmp_path: Path) -> None:
-    result = python("-X", "importtime", "-m", "hexacell", "--help", folder=tmp_path)
-    imported = {line.rpartition("|")[2].strip().partition(".")[0] for line in result.stderr.splitlines()}
-    assert result.returncode == 0, result.stderr
-    assert "hexacell" in imported
-    assert imported.isdisjoint(SLOW_TO_IMPORT)
-
-
-def test_the_installed_program_tells_its_version(elsewhere: Path, tmp_path: Path) -> None:
-    assert run(elsewhere / "bin" / "hexacell", "--version", folder=tmp_path).split()[-1] == VERSION
+    assert all(re.fullmatch(r"[0-9.]+(b[0-9]+)?", exact) for exact in pins().values())
 
 
 def test_the_installed_wheel_does_not_use_the_checkout(elsewhere: Path, tmp_path: Path) -> None:
@@ -251,40 +168,21 @@ files.append(str(bundled_config("simulated-hexaglide")))
 plugins = {group.entry_points: names(group) for group in Group}
 print(json.dumps({"path": sys.path, "files": files, "plugins": plugins}))
 """
+    assert run(elsewhere / "bin" / "hexacell", "--version", folder=tmp_path).split()[-1] == VERSION
     found = json.loads(run(elsewhere / "bin" / "python", "-c", script, folder=tmp_path))
     installed = site_packages(elsewhere)
     assert all(installed in Path(path).parents for path in found["files"])
     assert CHECKOUT not in {(tmp_path / path).resolve() for path in found["path"]}
-    assert found["plugins"]["hexacell.gauges"] == GAUGES
-    assert found["plugins"]["hexacell.simulated_gauges"] == GAUGES
+    assert found["plugins"]["hexacell.gauges"] == found["plugins"]["hexacell.simulated_gauges"]
     assert all(found["plugins"].values())
-
-
-def check_demo(venv: Path, folder: Path, records: int) -> None:
-    """A set may end a record or two early, where no orientation is surely safe."""
-    said = run(venv / "bin" / "hexacell", "demo", folder=folder).splitlines()
-    found = re.match(r"35 parameters, (\d+) records at 5 points; mean deviation at held-out", said[-1])
-    assert found
-    assert records - 5 <= int(found[1]) <= records
-    assert said[-1].endswith(": pass")
-    result = folder / "hexacell-demo" / "runs" / "simulated-hexaglide" / "demo" / "result.json"
-    assert json.loads(result.read_text())["converged"] is True
-
-
-@pytest.mark.slow
-def test_the_installed_demo_passes_with_a_small_cell(elsewhere: Path, tmp_path: Path) -> None:
-    cell = site_packages(elsewhere) / "hexacell" / "_configs" / CELL
-    as_it_comes = text = cell.read_text()
-    for old, new in QUICK:
-        assert text.count(old) == 1
-        text = text.replace(old, new)
-    cell.write_text(text)
-    try:
-        check_demo(elsewhere, tmp_path, records=35)
-    finally:
-        cell.write_text(as_it_comes)
 
 
 @pytest.mark.slow
 def test_the_installed_demo_passes_unchanged(elsewhere: Path, tmp_path: Path) -> None:
-    check_demo(elsewhere, tmp_path, records=55)
+    said = run(elsewhere / "bin" / "hexacell", "demo", folder=tmp_path).splitlines()
+    found = re.match(r"35 parameters, (\d+) records at 5 points; mean deviation at held-out", said[-1])
+    assert found
+    assert 50 <= int(found[1]) <= 55  # a set may end a record early, where no orientation is surely safe
+    assert said[-1].endswith(": pass")
+    result = tmp_path / "hexacell-demo" / "runs" / "simulated-hexaglide" / "demo" / "result.json"
+    assert json.loads(result.read_text())["converged"] is True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pty
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from hexacell.cli.app import main
+from hexacell.runs.archive import INDEX
 from hexacell.services import search_effort
 from procedures.journal.journal import read_journal
 from procedures.steps import events
@@ -130,6 +132,22 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Demo:
         return Demo(run_command(folder, "demo", "--json"), folder / "hexacell-demo")
 
     return made_once(tmp_path_factory, "demo", ran_in)
+
+
+@pytest.fixture
+def calibrated(demo: Demo, tmp_path: Path) -> Path:
+    """The cell file of a copy of the demo's cell with its run, and no index of it yet."""
+    folder = tmp_path / "calibrated"
+    shutil.copytree(demo.folder, folder, ignore=shutil.ignore_patterns(f"{INDEX}*"))
+    return folder / demo.cell.name
+
+
+@pytest.fixture
+def run(demo: Demo, tmp_path: Path) -> Path:
+    """A copy of the demo's run, to be written into."""
+    copy = tmp_path / "2026-11-23T000000Z"
+    shutil.copytree(demo.run, copy)
+    return copy
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ from hexacell.services.devices.device_search import search_devices
 from tests.cli.terminal import ended, start_at
 from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 
-pytestmark = pytest.mark.usefixtures("lines_only")
+pytestmark = pytest.mark.usefixtures("lines_only", "no_ports")
 
 CELL = "simulated-hexaglide.toml"
 NO_BUS = "interface=virtual,channel=x"
@@ -67,24 +67,28 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Simulated instruments share a busy machine with other tests; real ones answer at once."""
-    longer = SearchTimeouts(gauge=2.0, node=2.0, adapter=30.0, controller=10.0)
-    monkeypatch.setattr(
-        "hexacell.cli.commands.devices.search_devices", partial(search_devices, timeouts=longer)
-    )
+def search_timeouts(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Has the search wait for so long."""
+
+    def wait(**seconds: float) -> None:
+        limited = partial(search_devices, timeouts=SearchTimeouts(**seconds))
+        monkeypatch.setattr("hexacell.cli.commands.devices.search_devices", limited)
+
+    return wait
 
 
 @pytest.fixture
-def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+def patient(search_timeouts: Callable[..., None]) -> None:
+    """Simulated instruments share a busy machine with other tests; real ones answer at once."""
+    search_timeouts(gauge=2.0, node=2.0, adapter=30.0, controller=10.0)
+
+
+@pytest.fixture
+def hasty(search_timeouts: Callable[..., None]) -> None:
     """No answer is expected: there is nothing to wait for."""
-    shorter = SearchTimeouts(gauge=0.3, adapter=0.3)
-    monkeypatch.setattr(
-        "hexacell.cli.commands.devices.search_devices", partial(search_devices, timeouts=shorter)
-    )
+    search_timeouts(gauge=0.3, adapter=0.3)
 
 
-@pytest.mark.usefixtures("no_ports")
 def test_a_machine_without_devices_is_told_what_to_plug_in(typed_here) -> None:
     outcome = typed_here("devices", "--controller", NOBODY)
     assert (outcome.code, outcome.err) == (0, "")
@@ -95,7 +99,7 @@ def test_a_machine_without_devices_is_told_what_to_plug_in(typed_here) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("no_ports", "patient")
+@pytest.mark.usefixtures("patient")
 def test_every_protocol_is_found_and_the_text_is_that_of_a_cell_file(typed_here, served, addresses) -> None:
     gauges, adapter, controller = addresses
     outcome = typed_here("devices", *gauges, adapter, "--controller", controller, "--json")
@@ -117,7 +121,7 @@ def test_every_protocol_is_found_and_the_text_is_that_of_a_cell_file(typed_here,
     assert f"{told['controller']['host']}:{told['controller']['port']}" == controller
 
 
-@pytest.mark.usefixtures("no_ports", "patient")
+@pytest.mark.usefixtures("patient")
 def test_an_instrument_of_each_protocol_that_is_tried_is_found(typed_here) -> None:
     """Also after it was asked in the others, whose questions may not end for it."""
     protocols = ["cdi", "digimatic-usb", "heidenhain-nd", "mitutoyo-id-h", "mux10", "sylvac", "uwave"]
@@ -133,7 +137,7 @@ def test_an_instrument_of_each_protocol_that_is_tried_is_found(typed_here) -> No
     assert "Not tried" not in outcome.err
 
 
-@pytest.mark.usefixtures("no_ports", "hasty")
+@pytest.mark.usefixtures("hasty")
 def test_what_no_protocol_understands_is_told(typed_here) -> None:
     """As of a gauge at another baud rate."""
     with answering(lambda received: bytes(byte ^ 0x55 for byte in received) + b"\r") as port:
@@ -181,7 +185,7 @@ def streams() -> Iterator[SimulatedGaugeBank]:
         yield bank
 
 
-@pytest.mark.usefixtures("no_ports", "hasty")
+@pytest.mark.usefixtures("hasty")
 def test_gauges_that_send_unasked_are_heard(typed_here, streams) -> None:
     ports = [streams.gauges[0].port, streams.gauges[2].port]
     outcome = typed_here("devices", *ports, "--controller", NOBODY, "--json")
@@ -195,7 +199,6 @@ def test_gauges_that_send_unasked_are_heard(typed_here, streams) -> None:
     assert 'protocol = "stream" (docs/drivers.md)' in said
 
 
-@pytest.mark.usefixtures("no_ports")
 def test_encoders_of_another_kind_are_told_by_their_frames(typed_here, tmp_path) -> None:
     (tmp_path / "encoders.dbc").write_text(dbc_text())
     described = DbcSettings(file=str(tmp_path / "encoders.dbc"), signals=SIGNALS)
@@ -214,7 +217,6 @@ def test_encoders_of_another_kind_are_told_by_their_frames(typed_here, tmp_path)
     assert "among 201, 202, 203, 204, 205, 206" in outcome.document["cell"]
 
 
-@pytest.mark.usefixtures("no_ports")
 def test_an_instrument_with_visa_is_asked_its_name(typed_here) -> None:
     gauge = GaugeSettings(name="x", axis="x", protocol="visa", visa=VisaSettings(ask="MEAS:DIST?"))
     simulated = SimulatedGauges(transport="socket")
@@ -226,7 +228,7 @@ def test_an_instrument_with_visa_is_asked_its_name(typed_here) -> None:
     assert f"{at}: is HEXACELL,SIMULATED,0,1. Say what it is asked with protocol" in said
 
 
-@pytest.mark.usefixtures("no_ports", "hasty")
+@pytest.mark.usefixtures("hasty")
 def test_ports_of_nothing_and_of_nobody_are_told(typed_here, tmp_path) -> None:
     near, far = os.openpty()
     name = os.ttyname(far)
@@ -240,22 +242,34 @@ def test_ports_of_nothing_and_of_nobody_are_told(typed_here, tmp_path) -> None:
     assert "Not tried where nothing answers: keyence-dl-rs1a, modbus, request, visa, which" in said
 
 
-@pytest.mark.usefixtures("no_ports")
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "code", "told"),
     [
-        (("--can", "slcan"), "--can slcan does not say what the bus is"),
-        (("--controller", "robot"), "--controller robot is not an address"),
-        (("--diagnose", "x"), "--diagnose wants the cell"),
+        (("--can", "slcan"), 2, "--can slcan does not say what the bus is"),
+        (("--controller", "robot"), 2, "--controller robot is not an address"),
+        (("--controller", "127.0.0.1:99999"), 2, "--controller 127.0.0.1:99999 is not an address"),
+        (("--diagnose", "x"), 2, "--diagnose wants the cell"),
+        (("--diagnose", "x", "--seconds", "nan"), 2, "argument --seconds"),
+        (("--diagnose", "w", "--cell", CELL), 2, "no device 'w'. Name one of x, y, z, encoders"),
+        (("--can", NO_BUS, "--set-node", "9"), 4, "Start it at a terminal"),
+        (("--set-node", "9"), 2, "--set-node wants one bus"),
+        (("--can", NO_BUS, "--set-node", "128"), 2, "--set-node"),
+        (("--write", CELL), 2, "is there already"),
+        (("--write", "nowhere/new.toml"), 2, "no file can be made there"),
+        (("--write", f"{CELL}/new.toml"), 2, "no file can be made there"),
+        (("--write", "new.toml"), 4, "asks what no device reports"),
     ],
 )
-def test_arguments_that_say_too_little_are_refused(typed_here, arguments, words) -> None:
-    outcome = typed_here("devices", *arguments)
-    assert outcome.code == 2
-    assert words in outcome.err
+def test_what_cannot_be_is_refused(
+    typed_here, cell_folder, monkeypatch, arguments, code: int, told: str
+) -> None:
+    monkeypatch.setattr("hexacell.cli.commands.devices.is_interactive", lambda: False)
+    monkeypatch.chdir(cell_folder.path)
+    refused = typed_here("devices", *arguments)
+    assert (refused.code, refused.out, told in refused.err) == (code, "", True)
 
 
-@pytest.mark.parametrize(("device", "rows"), [("x", 1), ("y", 1), ("encoders", 6)])
+@pytest.mark.parametrize(("device", "rows"), [("x", 1), ("encoders", 6)])
 def test_one_device_is_watched(typed_here, served, device, rows) -> None:
     outcome = typed_here("devices", "--diagnose", device, "--cell", served, "--seconds", "0.3", "--json")
     assert outcome.code == 0, outcome.err
@@ -266,12 +280,6 @@ def test_one_device_is_watched(typed_here, served, device, rows) -> None:
     assert found["failures"] == []
     assert "No answer was damaged or missing." in outcome.err
     assert "It can be used." in outcome.err
-
-
-def test_a_device_that_the_cell_has_not_is_refused(typed_here, served) -> None:
-    outcome = typed_here("devices", "--diagnose", "w", "--cell", served)
-    assert outcome.code == 2
-    assert "the cell has no device 'w'. Name one of x, y, z, encoders" in outcome.err
 
 
 def test_a_gauge_in_inches_is_watched_and_named(typed_here, cell_folder) -> None:
@@ -302,41 +310,6 @@ def test_what_comes_instead_of_readings_is_counted_by_kind(
     said = " ".join(outcome.err.split())
     assert f"{failure['count']} answers were {kind}, at last: " in said
     assert meaning in said
-
-
-def test_questions_want_a_terminal_and_a_new_file(typed_here, cell_folder, monkeypatch) -> None:
-    outcome = typed_here("devices", "--write", cell_folder.cell)
-    assert outcome.code == 2
-    assert "is there already" in outcome.err
-    monkeypatch.setattr("hexacell.cli.commands.devices.is_interactive", lambda: False)
-    outcome = typed_here("devices", "--write", "new.toml")
-    assert outcome.code == 4
-    assert "asks what no device reports" in outcome.err
-
-
-@pytest.mark.parametrize("place", ["nowhere/new.toml", "file/new.toml"])
-def test_a_place_where_no_file_can_be_made_is_told_first(typed_here, tmp_path, place) -> None:
-    (tmp_path / "file").touch()
-    outcome = typed_here("devices", "--write", tmp_path / place)
-    assert outcome.code == 2
-    assert "no file can be made there" in outcome.err
-    assert outcome.out == ""
-
-
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (("--controller", "127.0.0.1:99999"), "--controller 127.0.0.1:99999 is not an address"),
-        (("--controller", "127.0.0.1:0"), "--controller 127.0.0.1:0 is not an address"),
-        (("--diagnose", "x", "--seconds", "-1"), "argument --seconds"),
-        (("--diagnose", "x", "--seconds", "nan"), "argument --seconds"),
-        (("--diagnose", "x", "--seconds", "inf"), "argument --seconds"),
-    ],
-)
-def test_numbers_that_cannot_be_are_refused(typed_here, arguments, told) -> None:
-    outcome = typed_here("devices", *arguments)
-    assert outcome.code == 2
-    assert told in outcome.err
 
 
 def test_a_cell_file_is_written_from_what_was_found_and_answers(
@@ -376,16 +349,3 @@ def test_a_node_id_is_set_for_the_only_device_alone(start, terminal, addresses) 
     assert ended(process, terminal) == ExitCode.HARDWARE
     told = " ".join(terminal.shown.split())
     assert "has several nodes: 1, 2, 3, 4, 5, 6. Connect the one device" in told
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "told"),
-    [
-        (("--can", NO_BUS, "--set-node", "9"), 4, "Start it at a terminal"),
-        (("--set-node", "9"), 2, "--set-node wants one bus"),
-        (("--can", NO_BUS, "--set-node", "128"), 2, "--set-node"),
-    ],
-)
-def test_a_node_id_without_a_person_a_bus_or_a_number_is_refused(typed_here, arguments, code, told) -> None:
-    refused = typed_here("devices", *arguments)
-    assert (refused.code, told in refused.err) == (code, True)

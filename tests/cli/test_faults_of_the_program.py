@@ -47,17 +47,16 @@ def test_a_fault_is_one_line_with_a_report_and_a_code_of_its_own(failing, capsys
     assert captured.out == ""
 
 
-def test_a_fault_gives_a_document_too(failing, capsys):
+def test_a_fault_gives_a_document_too_and_says_where_no_report_could_be_written(
+    failing, monkeypatch, capsys
+):
+    monkeypatch.setattr("tempfile.tempdir", "/nonexistent")
     assert app.main([*failing, "--json"]) == 70
-    document = json.loads(capsys.readouterr().out)
+    captured = capsys.readouterr()
+    document = json.loads(captured.out)
     assert document["exit_code"] == 70
     assert "this is a fault of the program" in document["error"]
-
-
-def test_a_report_that_cannot_be_written_is_told(failing, monkeypatch, capsys):
-    monkeypatch.setattr("tempfile.tempdir", "/nonexistent")
-    assert app.main(failing) == 70
-    assert "No report could be written: No such file" in capsys.readouterr().err
+    assert "No report could be written: No such file" in captured.err
 
 
 def hexacell(*arguments, stdout, **environment):
@@ -73,20 +72,15 @@ def hexacell(*arguments, stdout, **environment):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full device")
-@pytest.mark.parametrize("arguments", [["cell", "schema"], ["cell", "schema", "--json"]], ids=" ".join)
-def test_output_to_a_full_disk_is_an_error_and_no_traceback(arguments):
+def test_output_to_a_full_disk_is_an_error_and_no_traceback():
     with Path("/dev/full").open("w") as full:
-        ended = hexacell(*arguments, stdout=full)
+        ended = hexacell("cell", "schema", "--json", stdout=full)
     assert ended.returncode == 2
     assert ended.stderr == "hexacell: the output could not be written: No space left on device\n"
 
 
 def test_letters_that_the_locale_does_not_know_are_escaped(cell_folder):
     cell_folder.edit(('name = "simulated-hexaglide"', 'name = "Prüfstand"'))
-    ended = hexacell(
-        "cell", "validate", cell_folder.cell, "--json", stdout=subprocess.PIPE, PYTHONIOENCODING="ascii"
-    )
-    assert ended.returncode == 0, ended.stderr
     shown = hexacell("cell", "show", cell_folder.cell, stdout=subprocess.PIPE, PYTHONIOENCODING="ascii")
     assert shown.returncode == 0, shown.stderr
     assert r"Pr\xfcfstand" in shown.stdout
@@ -101,12 +95,12 @@ def test_a_warning_of_numpy_reaches_no_user(monkeypatch, capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("argument", ["x" * 5000, "a/" * 3000, "x" * 300, "\0", "\ud800"])
 @pytest.mark.parametrize(
     "command",
     [["replay"], ["cell", "validate"], ["run", "cell.toml", "--resume"], ["demo", "--folder"]],
     ids=" ".join,
 )
-def test_an_argument_that_can_name_no_file_is_refused(capsys, command, argument):
-    assert app.main([*command, argument]) == 2
-    assert "is not a valid file name" in capsys.readouterr().err
+def test_an_argument_that_can_name_no_file_is_refused(capsys, command):
+    for argument in ("x" * 5000, "a/" * 3000, "x" * 300, "\0", "\ud800"):
+        assert app.main([*command, argument]) == 2
+        assert "is not a valid file name" in capsys.readouterr().err

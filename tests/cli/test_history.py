@@ -68,15 +68,12 @@ def test_a_run_is_told_in_lines(cell, typed_here) -> None:
     assert typed_here("history", cell.path, "--show", "never").code == 2
 
 
-def test_an_archive_that_is_not_there_is_warned_about(cell, typed_here, tmp_path) -> None:
+def test_an_archive_that_cannot_be_used(cell, typed_here, tmp_path) -> None:
     propose_run(cell)
     listed = typed_here("history", cell.path, "--archive", f"postgresql://nobody@/none?host={tmp_path}")
     assert (listed.code, len(listed.out.splitlines())) == (0, 2)
     assert "warning" in listed.err
     assert "read from their folders" in listed.err
-
-
-def test_passwords_are_refused_in_the_address_of_an_archive(cell, typed_here) -> None:
     for url in ("postgresql://me:secret@host/cells", "postgresql://me@host/cells?password=secret"):
         refused = typed_here("history", cell.path, "--archive", url)
         assert (refused.code, "secret" in refused.err, ".pgpass" in refused.err) == (2, False, True)
@@ -111,9 +108,8 @@ def test_old_runs_are_listed_and_deleted_if_asked_for(cell, typed_here) -> None:
     document = typed_here("history", cell.path, "--keep", "30", "--delete", "--json").document
     assert (document["deleted"], document["runs"], document["kept"]) == (True, [str(folder.path)], [])
     assert not folder.path.exists()
-    assert typed_here("history", cell.path, "--delete").code == 2
-    assert typed_here("history", cell.path, "--keep", "-1").code == 2
-    assert typed_here("history", cell.path, "--keep", "nan").code == 2
+    for wrong in (("--delete",), ("--keep", "-1"), ("--keep", "nan")):
+        assert typed_here("history", cell.path, *wrong).code == 2
 
 
 def test_every_write_into_the_config_is_listed(cell, typed_here) -> None:
@@ -145,11 +141,8 @@ def test_a_damaged_record_is_warned_about(cell, typed_here) -> None:
     with (run.folder.siblings / RECORDS).open("ab") as stream:
         stream.write(b'{"version":1,"at":"2026')
     listed = typed_here("history", cell.path, "--changes")
-    assert (listed.code, "applied" in listed.out, "line 2: this record is torn" in listed.err) == (
-        0,
-        True,
-        True,
-    )
+    assert (listed.code, "applied" in listed.out) == (0, True)
+    assert "line 2: this record is torn" in listed.err
 
 
 def test_a_write_without_a_record_is_told_in_a_line(cell, typed_here) -> None:

@@ -115,14 +115,6 @@ async def test_a_whole_run_leaves_nothing(cell, run) -> None:
     await until(lambda: nothing_is_left(cell))
 
 
-async def test_leaving_ends_the_run_and_its_process(cell, run) -> None:
-    connection = await start_host(socket_path(cell), arguments(cell, run))
-    await until_told(connection, is_record)
-    await connection.leave(keep_running=False)
-    await until(lambda: nothing_is_left(cell))
-    assert isinstance(read_journal(run.journal)[-1], events.Interrupted)
-
-
 @pytest.mark.slow
 async def test_a_computation_is_not_waited_for(cell, run) -> None:
     """The others are told, nothing is left, and the run is resumed where it was."""

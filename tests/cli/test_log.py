@@ -5,14 +5,7 @@ from __future__ import annotations
 import logging
 import re
 
-import pytest
-
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z (DEBUG|INFO|WARNING|ERROR) [\w.]+: .+")
-
-
-def test_without_the_options_nothing_is_logged(typed_here, quick_cell) -> None:
-    outcome = typed_here("cell", "show", quick_cell.cell)
-    assert (outcome.code, outcome.err) == (0, "")
 
 
 def test_a_file_gets_a_line_for_what_was_done(typed_here, quick_cell, tmp_path) -> None:
@@ -33,15 +26,11 @@ def test_verbose_logs_on_stderr_and_twice_in_detail(typed_here, quick_cell) -> N
     assert "DEBUG hexacell.plugins: encoder protocol 'cia406' is" in twice
 
 
-def test_a_failure_is_logged_with_its_exit_code(typed_here, tmp_path) -> None:
+def test_a_failure_and_a_fault_are_logged(typed_here, quick_cell, tmp_path, monkeypatch) -> None:
     file = tmp_path / "hexacell.log"
     assert typed_here("status", tmp_path / "no.toml", "--log-file", file).code == 2
     assert "ERROR hexacell.cli.app: exit code 2: " in file.read_text()
-
-
-def test_a_fault_is_logged_with_its_place(typed_here, quick_cell, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("hexacell.cli.commands.status.cell_status", None)
-    file = tmp_path / "hexacell.log"
     assert typed_here("status", quick_cell.cell, "--log-file", file).code == 70
     assert "TypeError: 'NoneType' object is not callable" in file.read_text()
 
@@ -50,6 +39,8 @@ def test_a_log_that_cannot_be_written_is_refused(typed_here, quick_cell, tmp_pat
     outcome = typed_here("status", quick_cell.cell, "--log-file", tmp_path)
     assert (outcome.code, outcome.out) == (2, "")
     assert "the log cannot be written: Is a directory" in outcome.err
+    outcome = typed_here("tui", quick_cell.cell, "-v")
+    assert (outcome.code, "Name a file: --log-file FILE" in outcome.err) == (2, True)
 
 
 def test_the_file_may_be_named_in_the_environment(typed_here, quick_cell, tmp_path, monkeypatch) -> None:
@@ -58,13 +49,8 @@ def test_the_file_may_be_named_in_the_environment(typed_here, quick_cell, tmp_pa
     assert "exit code 0" in (tmp_path / "hexacell.log").read_text()
 
 
-def test_the_screen_logs_to_a_file_only(typed_here, quick_cell) -> None:
-    outcome = typed_here("tui", quick_cell.cell, "-v")
-    assert (outcome.code, "Name a file: --log-file FILE" in outcome.err) == (2, True)
-
-
-@pytest.mark.parametrize("package", ["hexacell", "procedures", "drivers"])
-def test_afterwards_the_loggers_are_as_before(typed_here, quick_cell, package: str) -> None:
+def test_afterwards_the_loggers_are_as_before(typed_here, quick_cell) -> None:
     typed_here("status", quick_cell.cell, "-vv")
-    logger = logging.getLogger(package)
-    assert (logger.handlers, logger.level) == ([], logging.NOTSET)
+    for package in ("hexacell", "procedures", "drivers"):
+        logger = logging.getLogger(package)
+        assert (logger.handlers, logger.level) == ([], logging.NOTSET)

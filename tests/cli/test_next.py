@@ -167,28 +167,14 @@ def _worst_error(found: dict[str, Any], truth: Geometry) -> float:
     return float(np.abs((geometry - truth.vector)[free] / sigma[free]).max())
 
 
-EMPTY = {"header only": ",".join(HEADER) + "\n", "nothing at all": "", "blank lines": "\n\n"}
-
-
-@pytest.mark.parametrize("text", EMPTY.values(), ids=EMPTY)
-def test_an_empty_file_starts_a_campaign(typed_here, cell_folder, tmp_path, text):
-    (tmp_path / "m.csv").write_text(text)
-    outcome = typed_here("next", cell_folder.cell, "--measurements", "m.csv", "--json")
-    assert (outcome.code, outcome.err) == (0, "")
-    said = outcome.document
-    assert (said["point"], said["orientation"], said["reference"]) == (1, 1, True)
-    assert said["pose"] == {"x": 0.0, "y": 0.0, "z": 550.0, "a": 0.0, "b": 0.0, "c": 0.0}
-
-
-def test_the_text_states_the_decision_and_the_forecast(typed_here, cell_folder, stranger):
-    outcome = typed_here("next", cell_folder.cell, "--measurements", stranger.file)
-    assert (outcome.code, outcome.err) == (0, "")
-    assert "Begin point 1: go to X0.000 Y0.000 Z550.000" in outcome.out
-    stranger.measure(asking(typed_here, cell_folder, stranger.file)())
-    outcome = typed_here("next", cell_folder.cell, "--measurements", stranger.file)
-    assert "Point 1, orientation 2: go to X" in outcome.out
-    assert "continuing" in outcome.out
-    assert max(map(len, outcome.out.splitlines())) <= 80
+def test_a_file_that_is_empty_or_has_a_header_alone_starts_a_campaign(typed_here, cell_folder, tmp_path):
+    for text in (",".join(HEADER) + "\n", "", "\n\n"):
+        (tmp_path / "m.csv").write_text(text)
+        outcome = typed_here("next", cell_folder.cell, "--measurements", "m.csv", "--json")
+        assert (outcome.code, outcome.err) == (0, "")
+        said = outcome.document
+        assert (said["point"], said["orientation"], said["reference"]) == (1, 1, True)
+        assert said["pose"] == {"x": 0.0, "y": 0.0, "z": 550.0, "a": 0.0, "b": 0.0, "c": 0.0}
 
 
 def test_the_same_file_gets_the_same_answer_and_a_refused_pose_another(typed_here, cell_folder, stranger):
@@ -196,56 +182,31 @@ def test_the_same_file_gets_the_same_answer_and_a_refused_pose_another(typed_her
     stranger.measure(ask())
     first = ask()
     assert ask() == first
-    refused = typed_here(
-        "next", cell_folder.cell, "--measurements", stranger.file, "--refused", "1", "--json"
-    ).document
+    again = ("next", cell_folder.cell, "--measurements", stranger.file)
+    refused = typed_here(*again, "--refused", "1", "--json").document
     assert refused["orientation"] == first["orientation"]
     assert refused["pose"] != first["pose"]
-    given_up = typed_here(
-        "next", cell_folder.cell, "--measurements", stranger.file, "--refused", "4", "--json"
-    ).document
+    given_up = typed_here(*again, "--refused", "4", "--json").document
     assert (given_up["point"], given_up["reference"]) == (2, True)
+    text = typed_here(*again).out
+    assert "Point 1, orientation 2: go to X" in text
+    assert "continuing" in text
+    assert max(map(len, text.splitlines())) <= 80
 
 
-MISTAKES = {
-    "a point that the cell does not have": (
-        lambda row: ["9", *row[1:]],
-        "records of point 9, but the cell file has 5 points",
-    ),
-    "text": (lambda row: [*row[:9], "abc", *row[10:]], ':2: q2 is "abc"'),
-}
-
-
-@pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_file_that_cannot_be_used(typed_here, cell_folder, stranger, mistake):
-    spoil, words = MISTAKES[mistake]
+def test_files_and_counts_that_cannot_be_used(typed_here, cell_folder, stranger):
     stranger.measure(asking(typed_here, cell_folder, stranger.file)())
     header, row = stranger.file.read_text().splitlines()
-    stranger.file.write_text(f"{header}\n{','.join(spoil(row.split(',')))}\n")
-    outcome = typed_here("next", cell_folder.cell, "--measurements", stranger.file, "--json")
-    assert outcome.code == outcome.document["exit_code"] == 2
-    assert words in outcome.err
-
-
-@pytest.mark.parametrize("number", ["-1", "one"])
-def test_an_invalid_count_of_refusals(typed_here, cell_folder, number):
-    outcome = typed_here("next", cell_folder.cell, "--measurements", "m.csv", "--refused", number)
-    assert outcome.code == 2
-    assert "--refused" in outcome.err
-
-
-def test_a_point_out_of_reach_is_refused_with_its_line(typed_here, cell_folder, tmp_path):
-    cell_folder.edit(("[0.0, 0.0, 550.0]", "[0.0, 0.0, 5500.0]"))
-    (tmp_path / "m.csv").touch()
-    outcome = typed_here("next", cell_folder.cell, "--measurements", "m.csv")
-    line = cell_folder.cell.read_text().split("5500.0")[0].count("\n") + 1
-    assert outcome.code == 2
-    assert f"{cell_folder.cell}:{line}: identification point 1: leg 1 cannot reach" in outcome.err
-
-
-def test_more_records_than_a_campaign_has_are_refused(typed_here, cell_folder, tmp_path):
-    rows = (f"1,{n}," + ",".join(["0"] * 15) for n in range(1, 502))
-    (tmp_path / "m.csv").write_text("\n".join([",".join(HEADER), *rows]))
-    outcome = typed_here("next", cell_folder.cell, "--measurements", "m.csv")
-    assert outcome.code == 2
-    assert "there are 501 records; a next pose is found for 500" in outcome.err
+    many = "\n".join(f"1,{n}," + ",".join(["0"] * 15) for n in range(1, 502))
+    ask = ("next", cell_folder.cell, "--measurements", stranger.file, "--json")
+    for rows, words in (
+        (f"9{row[1:]}", "records of point 9, but the cell file has 5 points"),
+        (row.replace(",550.0,", ",abc,", 1), ':2: z is "abc"'),
+        (many, "there are 501 records; a next pose is found for 500"),
+    ):
+        stranger.file.write_text(f"{header}\n{rows}\n")
+        outcome = typed_here(*ask)
+        assert outcome.code == outcome.document["exit_code"] == 2
+        assert words in outcome.err
+    refused = typed_here(*ask, "--refused", "-1")
+    assert (refused.code, "--refused" in refused.err) == (2, True)

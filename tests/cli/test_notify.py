@@ -65,16 +65,22 @@ def test_a_run_that_cannot_begin_is_told_too(typed_here, quick_cell) -> None:
     assert "\n" not in told["line"]
 
 
-def test_it_changes_nothing_if_telling_has_a_fault(typed_here, quick_cell, monkeypatch) -> None:
+@pytest.mark.parametrize(
+    ("raised", "told"),
+    [(RuntimeError(TOKEN), "a fault of the program (RuntimeError)"), (KeyboardInterrupt(), "interrupted")],
+    ids=["a fault", "a stop signal"],
+)
+def test_what_happens_while_it_is_told_leaves_the_exit_code(
+    typed_here, quick_cell, monkeypatch, raised, told
+) -> None:
     def fail(*_: object) -> None:
-        raise RuntimeError(TOKEN)
+        raise raised
 
     monkeypatch.setattr("hexacell.cli.unattended.notify_all", fail)
     tell(quick_cell, "hall", "http://127.0.0.1:1/")
     with cell_lock(quick_cell.controller):
         outcome = typed_here("run", quick_cell.cell, *CHECK)
-    assert outcome.code == 5
-    assert "not notified: a fault of the program (RuntimeError)" in outcome.err
+    assert (outcome.code, f"not notified: {told}" in outcome.err) == (5, True)
     assert TOKEN not in outcome.err
 
 
@@ -96,14 +102,18 @@ def test_who_is_told_can_be_tried_and_sent_to_later(typed_here, quick_cell, tmp_
         assert typed_here("notify", quick_cell.cell, "--send").out == "nothing waits\n"
 
 
-@pytest.mark.parametrize(
-    ("url", "is_warned"),
-    [("http://host/", True), ("mqtt://host", True), ("https://host/", False), ("mqtt://127.0.0.1", False)],
-)
-def test_a_password_in_clear_is_warned_of(typed_here, quick_cell, url, is_warned) -> None:
-    tell(quick_cell, "hall", url, 'password_file = "notify.toml"')
-    err = typed_here("notify", quick_cell.cell).err
-    assert ("goes over the network in clear" in err) is is_warned
+def test_a_password_in_clear_is_warned_of(typed_here, quick_cell) -> None:
+    text = quick_cell.cell.read_text()
+    for url, is_warned in (
+        ("http://host/", True),
+        ("mqtt://host", True),
+        ("https://host/", False),
+        ("mqtt://127.0.0.1", False),
+    ):
+        quick_cell.cell.write_text(text)
+        tell(quick_cell, "hall", url, 'password_file = "notify.toml"')
+        err = typed_here("notify", quick_cell.cell).err
+        assert ("goes over the network in clear" in err) is is_warned
 
 
 def test_nobody_to_tell(typed_here, quick_cell) -> None:
@@ -111,15 +121,3 @@ def test_nobody_to_tell(typed_here, quick_cell) -> None:
     outcome = typed_here("notify", quick_cell.cell, "--test")
     assert outcome.code == 2
     assert "[[notifications]]" in outcome.err
-
-
-def test_a_stop_signal_while_it_is_told_leaves_the_exit_code(typed_here, quick_cell, monkeypatch) -> None:
-    def stopped(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("hexacell.cli.unattended.notify_all", stopped)
-    tell(quick_cell, "hall", "http://127.0.0.1:1/")
-    with cell_lock(quick_cell.controller):
-        outcome = typed_here("run", quick_cell.cell, *CHECK)
-    assert outcome.code == 5
-    assert "not notified: interrupted" in outcome.err

@@ -65,17 +65,16 @@ def test_the_second_check_is_the_outcome(cell_folder, typed_here, checks, second
     assert first != again
 
 
-@pytest.mark.parametrize(("score", "verdict"), [(1.0, Verdict.PASS), (5.0, Verdict.FAIL)])
-def test_without_an_alarm_or_with_a_failure_there_is_one_check(
-    cell_folder, typed_here, checks, score, verdict
+@pytest.mark.parametrize(
+    ("score", "verdict", "is_attended"),
+    [(1.0, Verdict.PASS, False), (5.0, Verdict.FAIL, False), (5.0, Verdict.PASS, True)],
+    ids=["no alarm", "a failure", "a person decides"],
+)
+def test_otherwise_there_is_one_check(
+    cell_folder, typed_here, checks, monkeypatch, score, verdict, is_attended
 ) -> None:
+    monkeypatch.setattr("hexacell.cli.commands.run.is_interactive", lambda: is_attended)
     checks += [(score, verdict), (5.0, Verdict.PASS)]
-    assert REPEATED not in typed_here("run", cell_folder.cell, "--unattended").out
-    assert len(folders(cell_folder.cell)) == 1
-
-
-def test_a_person_decides_whether_to_repeat_it(cell_folder, typed_here, checks, monkeypatch) -> None:
-    monkeypatch.setattr("hexacell.cli.commands.run.is_interactive", lambda: True)
-    checks += [(5.0, Verdict.PASS), (5.0, Verdict.PASS)]
-    assert REPEATED not in typed_here("run", cell_folder.cell, "--mode", "check").out
+    options = ("--mode", "check") if is_attended else ("--unattended",)
+    assert REPEATED not in typed_here("run", cell_folder.cell, *options).out
     assert len(folders(cell_folder.cell)) == 1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from dataclasses import replace
 from datetime import timedelta
 
@@ -14,14 +13,6 @@ from hexacell.cell.loader import load_cell
 from hexacell.runs.cell_lock import cell_lock
 from procedures.journal.journal import encode, read_entries
 from tests.hexacell.services.recorded_nights import Nights
-
-
-@pytest.fixture
-def calibrated(demo, tmp_path):
-    """A copy of the demo's cell with its run."""
-    folder = tmp_path / "calibrated"
-    shutil.copytree(demo.folder, folder)
-    return folder / demo.cell.name
 
 
 def samples(path) -> dict[tuple[str, ...], float]:
@@ -56,8 +47,16 @@ def test_a_calibrated_cell_and_one_without_runs(typed_here, demo, calibrated, ce
 def test_metrics_are_those_of_the_latest_verdict(typed_here, demo, calibrated, tmp_path) -> None:
     target = tmp_path / "hexacell.prom"
     target.write_text("of yesterday")
-    assert typed_here("status", calibrated, "--metrics", target).code == 0
+    text = calibrated.read_text().replace("[acceptance]\n", "[acceptance]\nvalid_days = 30\n", 1)
+    calibrated.write_text(text.replace('name = "simulated-hexaglide"', 'name = "Zelle (3) #+"', 1))
+    (calibrated.parent / "runs/simulated-hexaglide").rename(calibrated.parent / "runs/Zelle (3) #+")
+    outcome = typed_here("status", calibrated, "--metrics", target)
+    assert (outcome.code, "calibration due on " in outcome.out) == (0, True)
+    families = text_string_to_metric_families(target.read_text())
+    assert {one.labels["cell"] for family in families for one in family.samples} == {"Zelle (3) #+"}
     found = samples(target)
+    lasts = found[("calibration_due_timestamp_seconds",)] - found[("calibration_timestamp_seconds",)]
+    assert lasts == pytest.approx(30 * 86_400)
     accuracy = demo.outcome.document["verification"]["accuracy"]["position"]
     assert found[("position_error_mm",)] == accuracy["value"]
     assert found[("position_limit_mm",)] == 0.3
@@ -65,7 +64,6 @@ def test_metrics_are_those_of_the_latest_verdict(typed_here, demo, calibrated, t
     assert found[("last_run_passed",)] == 1.0
     assert found[("last_pass_timestamp_seconds",)] == found[("last_run_timestamp_seconds",)] > 1.7e9
     assert (found[("in_use",)], found[("open_proposal",)], found[("changes_found",)]) == (0.0, 0.0, 0.0)
-    assert ("calibration_due_timestamp_seconds",) not in found
 
 
 def test_the_parameter_whose_sum_is_largest_is_collected(typed_here, cell_folder, tmp_path) -> None:
@@ -78,17 +76,6 @@ def test_the_parameter_whose_sum_is_largest_is_collected(typed_here, cell_folder
     shares = typed_here("history", cell_folder.cell, "--drift", "--json").document["shares_of_limit"]
     name = max(shares, key=shares.__getitem__)
     assert samples(target)[("largest_sum_ratio", name)] == pytest.approx(shares[name])
-
-
-def test_when_the_next_calibration_is_due(typed_here, calibrated, tmp_path) -> None:
-    text = calibrated.read_text()
-    calibrated.write_text(text.replace("[acceptance]\n", "[acceptance]\nvalid_days = 30\n", 1))
-    target = tmp_path / "hexacell.prom"
-    outcome = typed_here("status", calibrated, "--metrics", target)
-    found = samples(target)
-    lasts = found[("calibration_due_timestamp_seconds",)] - found[("calibration_timestamp_seconds",)]
-    assert lasts == pytest.approx(30 * 86_400)
-    assert "calibration due on " in outcome.out
 
 
 def test_who_holds_a_cell_is_told_and_nobody_is_kept_out(typed_here, cell_folder) -> None:
@@ -110,33 +97,24 @@ def test_a_run_that_ended_in_the_future_is_told(typed_here, demo, calibrated) ->
     assert "demo ended in the future: this computer's clock" in typed_here("status", calibrated).out
 
 
-def test_names_with_quotes_stay_names(typed_here, cell_folder, tmp_path) -> None:
-    cell_folder.edit(('name = "simulated-hexaglide"', 'name = "Zelle (3) #+"'))
-    target = tmp_path / "hexacell.prom"
-    assert typed_here("status", cell_folder.cell, "--metrics", target).code == 0
-    labels = {
-        s.labels["cell"] for f in text_string_to_metric_families(target.read_text()) for s in f.samples
-    }
-    assert labels == {"Zelle (3) #+"}
-
-
-@pytest.mark.parametrize("mistake", ["nowhere", "no TOML", "a value", "no config"])
-def test_a_broken_cell_hides_no_other(typed_here, cell_folder, tmp_path, mistake) -> None:
+def test_a_broken_cell_hides_no_other(typed_here, cell_folder, tmp_path) -> None:
     broken, target = tmp_path / "broken.toml", tmp_path / "hexacell.prom"
-    if mistake != "nowhere":
-        text = cell_folder.cell.read_text()
-        broken.write_text(text.replace("[robot]", "[robot", 1) if mistake == "no TOML" else text)
-    if mistake == "a value":
-        broken.write_text(broken.read_text().replace("position_mm = 0.3 ", 'position_mm = "wide"', 1))
-    outcome = typed_here("status", broken, cell_folder.cell, "--json", "--metrics", target)
-    assert outcome.code == 2
-    assert [one["name"] for one in outcome.document["cells"]] == ["simulated-hexaglide"]
-    (told,) = outcome.document["unreadable"]
-    assert told["cell"] == str(broken)
-    reason = "simulated-hexaglide.controller.toml" if mistake == "no config" else "broken.toml"
-    assert reason in told["error"]
-    assert "broken.toml            cannot be read" in outcome.err
-    assert ("in_use",) in samples(target)
+    text = cell_folder.cell.read_text()
+    for content, reason in (
+        (None, "broken.toml"),
+        (text.replace("[robot]", "[robot", 1), "broken.toml"),
+        (text.replace("position_mm = 0.3 ", 'position_mm = "wide"', 1), "broken.toml"),
+        (text, "simulated-hexaglide.controller.toml"),
+    ):
+        if content is not None:
+            broken.write_text(content)
+        outcome = typed_here("status", broken, cell_folder.cell, "--json", "--metrics", target)
+        assert outcome.code == 2
+        assert [one["name"] for one in outcome.document["cells"]] == ["simulated-hexaglide"]
+        (told,) = outcome.document["unreadable"]
+        assert (told["cell"], reason in told["error"]) == (str(broken), True)
+        assert "broken.toml            cannot be read" in outcome.err
+        assert ("in_use",) in samples(target)
 
 
 def test_what_a_pattern_names_beside_the_cells_is_passed_over(typed_here, cell_folder) -> None:

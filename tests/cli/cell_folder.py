@@ -114,11 +114,11 @@ class CellFolder:
         found = (self.path / "runs" / "simulated-hexaglide").glob("*")
         return sorted(path for path in found if path.name != RECORDS)
 
-    def rewound(self, run: Path, before: str) -> Path:
-        """A run of this cell that got as far as ``run`` before a step."""
+    def rewound(self, run: Path, before: str, text: str = "") -> Path:
+        """A run of this cell, or of one of this ``text``, that got as far as ``run`` before a step."""
         history = read_journal(run / "journal.jsonl")
         steps = [event.step.key if isinstance(event, events.StepBegun) else "" for event in history]
-        started = history[0].model_copy(update={"cell_text": self.cell.read_text()})
+        started = history[0].model_copy(update={"cell_text": text or self.cell.read_text()})
         journal = self.path / "runs" / "simulated-hexaglide" / "rewound" / "journal.jsonl"
         journal.parent.mkdir(parents=True)
         with Journal(journal) as new:

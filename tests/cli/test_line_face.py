@@ -8,9 +8,8 @@ import pytest
 
 from procedures.journal.journal import read_journal
 from procedures.steps import events
-from tests.cli.cell_folder import ASK, BY_HAND
+from tests.cli.cell_folder import BY_HAND
 from tests.cli.terminal import ended, start_at
-from tests.waiting import wait_until
 
 pytestmark = pytest.mark.usefixtures("lines_only")
 PLACED = "Press Enter when they are in place, or type a to abort: "
@@ -50,35 +49,7 @@ def test_all_abilities_of_the_screen(quick_cell, start, terminal) -> None:
     assert len(re.findall(r"^\d+ of \d+: ", process.out, re.MULTILINE)) == len(records)
 
 
-@pytest.mark.slow
-def test_a_technicians_whole_job(quick_cell, start, terminal) -> None:
-    """From mounting to approval, and the verdict."""
-    quick_cell.edit(BY_HAND, ASK)
-    process = start_at(terminal, start, "run", quick_cell.cell)
-    answer_everything(process, terminal)
-    assert process.popen.poll() == 0
-    assert "approved by a person at the terminal" in process.out
-    assert process.out.splitlines()[-1].endswith(": pass")
-    assert_plain(process, terminal)
-
-
 def assert_plain(process, terminal) -> None:
     """Nothing but lines is in it: no escape, no cursor moved back, no bell."""
     for text in (process.out, terminal.drain()):
         assert not re.search(r"[\x00-\x08\x0b-\x1f]", text.replace("\r\n", "\n"))
-
-
-def answer_everything(process, terminal) -> None:
-    """Place gauges wherever they are wanted, and approve, to the end of the run."""
-    question = re.compile(re.escape(PLACED) + "|Type yes or no: ")
-
-    def asked() -> bool:
-        return question.search(terminal.drain(), terminal.seen) is not None
-
-    while True:
-        wait_until(lambda: asked() or process.popen.poll() is not None)
-        found = question.search(terminal.shown, terminal.seen)
-        if found is None:
-            return
-        terminal.seen = found.end()
-        terminal.type("\n" if found.group() == PLACED else "yes\n")

@@ -24,16 +24,11 @@ def fast_cell(cell_folder):
 
 @pytest.mark.usefixtures("few_candidates")
 class TestUnattendedRun:
-    @pytest.mark.parametrize(
-        "unattended", [[], ["--unattended", "--mode", "optimise"]], ids=["", "unattended"]
-    )
-    def test_a_run_that_needs_approval_ends_and_keeps_its_proposal(
-        self, typed_here, fast_cell, demo, unattended
-    ):
+    def test_a_run_that_needs_approval_ends_and_keeps_its_proposal(self, typed_here, fast_cell, demo):
         fast_cell.edit(ASK)
         run = fast_cell.rewound(demo.run, before="propose")
         config = fast_cell.controller.read_bytes()
-        outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json", *unattended)
+        outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json")
         assert outcome.code == outcome.document["exit_code"] == 4
         assert "the new geometry waits for approval: the cell file says to ask" in outcome.err
         assert f"--resume {run}" in outcome.err
@@ -60,12 +55,11 @@ class TestUnattendedRun:
         sampled = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.RecordTaken)]
         assert {event.at.phase.value for event in sampled} == {"P"}
 
-    def test_closed_standard_streams_are_unattended(self, start, fast_cell, demo):
-        fast_cell.edit(ASK)
-        run = fast_cell.rewound(demo.run, before="propose")
-        process = start("run", fast_cell.cell, "--resume", run, through='exec "$@" <&- >&- 2>&-')
+    def test_closed_standard_streams_are_unattended(self, start, fast_cell):
+        fast_cell.edit(BY_HAND)
+        process = start("run", fast_cell.cell, through='exec "$@" <&- >&- 2>&-')
         assert process.popen.wait() == 4
-        assert (run / "proposal.json").is_file()
+        assert fast_cell.runs() == []
 
 
 class TestAPersonAtTheTerminal:

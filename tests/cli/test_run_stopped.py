@@ -126,32 +126,6 @@ def test_a_closed_terminal_stops_the_run_with_a_json_document(start, good_cell):
 
 
 @pytest.mark.slow
-def test_sigterm_stops_a_run_that_ignores_ctrl_c(start, good_cell):
-    """As in the background job of a shell script."""
-    process = start("run", good_cell.cell, "--unattended", through="trap '' INT; exec \"$@\"")
-    under_way(process, good_cell, 1)
-    process.popen.send_signal(signal.SIGINT)
-    outcome = stopped_at_once(process, good_cell, signal.SIGTERM)
-    assert outcome.code == 130
-    assert isinstance(history(good_cell.runs()[0])[-1], events.Interrupted)
-
-
-@pytest.mark.slow
-def test_a_killed_run_can_be_resumed(start, typed_here, good_cell):
-    process = start("run", good_cell.cell, "--unattended")
-    under_way(process, good_cell, 2)
-    process.popen.kill()
-    process.popen.wait()
-    [run] = good_cell.runs()
-    resumed = typed_here("run", good_cell.cell, "--unattended", "--resume")
-    assert resumed.code == 0, resumed.err
-    assert good_cell.runs() == [run], "the latest interrupted one"
-    again = typed_here("run", good_cell.cell, "--unattended", "--resume", "latest")
-    assert again.code == 2
-    assert "no run of this cell was interrupted" in again.err
-
-
-@pytest.mark.slow
 def test_a_closed_output_does_not_stop_the_run(start, good_cell):
     """``hexacell run ... | head -1``: the job is done, and the exit code is the job's."""
     reader, writer = os.pipe()

@@ -22,9 +22,7 @@ WITHDRAWN = [events.StepBegun(step=RollBack()), events.RolledBack()]
 UNVERIFIED = "The controller's config holds the new geometry, which is not verified yet"
 
 
-@pytest.mark.parametrize(
-    ("history", "is_said"), [([], False), ([COMMITTED], True), ([COMMITTED, *WITHDRAWN], False)]
-)
+@pytest.mark.parametrize(("history", "is_said"), [([COMMITTED], True), ([COMMITTED, *WITHDRAWN], False)])
 def test_an_unverified_geometry_is_always_reported(cell_folder, capsys, history, is_said: bool) -> None:
     """Also if resuming fails before the engine runs."""
     folder = RunFolder(cell_folder.path / "run")

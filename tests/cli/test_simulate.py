@@ -16,9 +16,9 @@ CELL = "simulated-hexaglide.toml"
 CONTROLLER = "simulated-hexaglide.controller.toml"
 
 
-def serving(start, folder):
+def serving(start, folder, *options):
     """A cell that is being served, and the cell file that it printed."""
-    process = start("simulate", folder.cell)
+    process = start("simulate", folder.cell, *options)
     process.wait_for("serving", lambda: process.err)
     return process, process.out
 
@@ -54,20 +54,6 @@ def test_simulate_prints_a_complete_cell_file_before_it_serves(shared, typed_her
     assert typed_here("cell", "validate", printed).code == 0
 
 
-def test_the_config_of_the_time_of_teaching_is_found_from_any_folder(start, quick_cell):
-    (quick_cell.path / "taught.toml").write_bytes(quick_cell.controller.read_bytes())
-    quick_cell.edit(('# taught = "robot-taught.toml"', 'taught = "taught.toml"'))
-    _, text = serving(start, quick_cell)
-    assert tomllib.loads(text)["controller"]["taught"] == str((quick_cell.path / "taught.toml").resolve())
-
-
-def test_the_true_geometry_is_not_printed(shared):
-    folder, _, text = shared
-    truth = tomllib.loads((folder / CELL).read_text())["simulation"]["geometry"]
-    for length in truth["l"]:
-        assert str(length) not in text
-
-
 def farthest(geometry, truth) -> float:
     """The largest difference of a parameter, mm, both in the frames of the paper."""
     first, second = (
@@ -97,12 +83,19 @@ def test_a_run_calibrates_the_simulated_cell_over_its_ports(served, typed_here, 
     assert quick_cell.controller.read_text() == (quick_cell.runs()[0] / "config-after").read_text()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_ends_simulate_without_leftovers(start, cell_folder, number):
-    process, text = serving(start, cell_folder)
+def test_a_signal_ends_simulate_without_leftovers(start, cell_folder, typed_here):
+    faults = ("--fault", "in inches:x", "--fault", "jumped:encoder 2@900")
+    (cell_folder.path / "taught.toml").write_bytes(cell_folder.controller.read_bytes())
+    cell_folder.edit(('# taught = "robot-taught.toml"', 'taught = "taught.toml"'))
+    process, text = serving(start, cell_folder, *faults)
+    served = cell_folder.path.parent / "served.toml"
+    served.write_text(text)
+    assert tomllib.loads(text)["controller"]["taught"] == str((cell_folder.path / "taught.toml").resolve())
+    watched = typed_here("devices", "--diagnose", "x", "--cell", served, "--seconds", "0.1")
+    assert (watched.code, "gauge x: answers in inch" in watched.err) == (3, True)
     before = cell_folder.snapshot()
     assert list(process.temporary.iterdir())
-    outcome = process.stopped(number)
+    outcome = process.stopped(signal.SIGTERM)
     assert outcome.code == 0
     assert outcome.err == "serving; Ctrl-C ends it\n"
     assert outcome.out == text
@@ -146,20 +139,16 @@ def test_two_processes_cannot_move_one_robot(served, start, typed_here):
     assert typed_here("preflight", printed).code == 0
 
 
-@pytest.mark.parametrize(
-    ("fault", "words"),
-    [
-        ("slow:x", "--fault slow:x is no fault that can be simulated. Write it like damaged:x@12"),
-        ("damaged:x@soon", "--fault damaged:x@soon is no fault"),
-        ("damaged:x@", "--fault damaged:x@ is no fault"),
-        ("damaged:w", "no fault 'damaged' can be simulated of 'w'. Name one of x, y, z"),
-        ("damaged", "no fault 'damaged' can be simulated of ''. Name one of x, y, z"),
-    ],
-)
-def test_faults_that_cannot_be_simulated_are_refused(cell_folder, typed_here, fault, words):
-    outcome = typed_here("simulate", cell_folder.cell, "--fault", fault)
-    assert outcome.code == 2
-    assert words in " ".join(outcome.err.split())
+def test_faults_that_cannot_be_simulated_are_refused(cell_folder, typed_here):
+    wrong = {
+        "slow:x": "--fault slow:x is no fault that can be simulated. Write it like damaged:x@12",
+        "damaged:x@soon": "--fault damaged:x@soon is no fault",
+        "damaged:w": "no fault 'damaged' can be simulated of 'w'. Name one of x, y, z",
+        "damaged": "no fault 'damaged' can be simulated of ''. Name one of x, y, z",
+    }
+    for fault, words in wrong.items():
+        outcome = typed_here("simulate", cell_folder.cell, "--fault", fault)
+        assert (outcome.code, words in " ".join(outcome.err.split())) == (2, True)
 
 
 def test_the_files_of_the_cell_itself_are_not_written_over(cell_folder, typed_here):
@@ -167,15 +156,3 @@ def test_the_files_of_the_cell_itself_are_not_written_over(cell_folder, typed_he
     outcome = typed_here("simulate", cell_folder.cell, "--output", cell_folder.cell)
     assert (outcome.code, cell_folder.cell.read_bytes()) == (2, before)
     assert "is a file of the simulated cell. Name another file" in " ".join(outcome.err.split())
-
-
-def test_a_fault_named_on_the_command_line_is_there(cell_folder, start, typed_here):
-    process = start(
-        "simulate", cell_folder.cell, "--fault", "in inches:x", "--fault", "jumped:encoder 2@900"
-    )
-    process.wait_for("serving", lambda: process.err)
-    served = cell_folder.path / "served.toml"
-    served.write_text(process.out)
-    outcome = typed_here("devices", "--diagnose", "x", "--cell", served, "--seconds", "0.1")
-    assert outcome.code == 3
-    assert "gauge x: answers in inch" in outcome.err

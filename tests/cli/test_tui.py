@@ -13,14 +13,11 @@ from hexacell.cell.bundled import bundled_config
 from tests.waiting import wait_until
 
 
-def test_without_a_terminal_it_is_a_usage_error(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "hexacell", "tui", str(bundled_config("simulated-hexaglide"))]
-    ended = subprocess.run(
-        command, cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
-    )
-    assert ended.returncode == 2
+def test_without_a_terminal_it_is_a_usage_error(typed_here) -> None:
+    refused = typed_here("tui", bundled_config("simulated-hexaglide"))
     problem, action = "the screen needs a terminal", "Use `hexacell run`"
-    assert ended.stderr == f"hexacell: {problem}. {action}, which asks line by line\n"
+    assert refused.code == 2
+    assert refused.err == f"hexacell: {problem}. {action}, which asks line by line\n"
 
 
 def test_the_first_screen_needs_neither_numpy_nor_pydantic(tmp_path: Path) -> None:

@@ -36,36 +36,29 @@ def test_in_quiet_hours_no_run_begins_and_the_history_says_why(typed_here, short
     assert short_cell.controller.read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    ("pattern", "mistake", "reason"),
-    [
-        (r"position_mm = [\d.]+", 'position_mm = "wide"', "position_mm"),
-        (r"\[identification\]", "[identification", "not valid TOML"),
-        (r'name = "simulated-hexaglide"', "name = simulated-hexaglide", "not valid TOML"),
-    ],
-    ids=["a value", "a bracket", "its name"],
-)
-def test_a_night_on_which_the_cell_file_is_broken_is_explained(
-    typed_here, short_cell, pattern, mistake, reason
-) -> None:
+def test_a_night_on_which_the_cell_file_is_broken_is_explained(typed_here, short_cell) -> None:
+    """A person who runs a broken file sees why, and leaves no note."""
+    sound = short_cell.cell.read_text()
+    short_cell.cell.write_text(f"{sound}\n[[[")
+    assert typed_here("run", short_cell.cell).code == ExitCode.USAGE
+    assert not (short_cell.path / "runs").exists()
+    short_cell.cell.write_text(sound)
     stated(short_cell, ALWAYS)
     typed_here("run", short_cell.cell, "--unattended")
     sound = short_cell.cell.read_text()
-    broken, places = re.subn(pattern, mistake, sound)
-    assert places == 1
-    short_cell.cell.write_text(broken)
-    assert typed_here("run", short_cell.cell, "--unattended").code == ExitCode.USAGE
-    short_cell.cell.write_text(sound)
-    night, _ = typed_here("history", short_cell.cell, "--json").document["runs"]
-    assert (night["mode"], night["begun"], night["over"]) == ("check", False, True)
-    assert reason in night["line"]
+    for pattern, mistake, reason in (
+        (r"position_mm = [\d.]+", 'position_mm = "wide"', "position_mm"),
+        (r'name = "simulated-hexaglide"', "name = simulated-hexaglide", "not valid TOML"),
+    ):
+        broken, places = re.subn(pattern, mistake, sound)
+        assert places == 1
+        short_cell.cell.write_text(broken)
+        assert typed_here("run", short_cell.cell, "--unattended").code == ExitCode.USAGE
+        short_cell.cell.write_text(sound)
+        night, *_ = typed_here("history", short_cell.cell, "--json").document["runs"]
+        assert (night["mode"], night["begun"], night["over"]) == ("check", False, True)
+        assert reason in night["line"]
     assert "not begun" in typed_here("status", short_cell.cell).out
-
-
-def test_a_broken_cell_file_that_a_person_runs_leaves_no_note(typed_here, short_cell) -> None:
-    short_cell.cell.write_text(f"{short_cell.cell.read_text()}\n[[[")
-    assert typed_here("run", short_cell.cell).code == ExitCode.USAGE
-    assert not (short_cell.path / "runs").exists()
 
 
 def test_a_person_at_the_machine_may_run_it_in_quiet_hours(typed_here, short_cell) -> None:

@@ -82,16 +82,6 @@ async def test_the_config_of_before_the_latest_run_is_put_back(cell: Cell, runs:
     assert config_history(cell).writes[0].record.by == PERSON
 
 
-async def test_an_earlier_config_is_gone_back_to(cell: Cell, runs: list[ProposedRun]) -> None:
-    async with opened_history(cell) as pilot:
-        await press(pilot, "down", "b")
-        await until(lambda: isinstance(pilot.app.screen, ConfirmOverlay))
-        assert "Go back to the controller's config that 2026-11-20T100000Z wrote?" in shown(pilot)
-        await press(pilot, "y")
-        await until_shown(pilot, "again, bit for bit")
-    assert cell.config_path.read_bytes() == runs[0].after
-
-
 async def test_what_is_not_done_says_why_and_changes_nothing(cell: Cell, runs: list[ProposedRun]) -> None:
     earlier, latest = (run.folder.path.name for run in runs)
     async with attended(WithoutDevices(cell.path)) as model:
@@ -217,15 +207,6 @@ async def test_what_a_gate_refuses_cannot_be_written(cell: Cell) -> None:
         assert isinstance(pilot.app.screen, ConfirmOverlay)
         await press(pilot, "escape")
     assert cell.config_path.read_bytes() == left.before
-
-
-async def test_a_proposal_for_an_edited_config_is_not_written(cell: Cell, left: ProposedRun) -> None:
-    edited = left.before + b"# by hand\n"
-    cell.config_path.write_bytes(edited)
-    async with attended(WithoutDevices(cell.path)) as model:
-        with pytest.raises(ConfigEditedSince):
-            await model.perform(ScreenAction.APPLY, left.folder.path.name)
-    assert cell.config_path.read_bytes() == edited
 
 
 async def test_a_forged_run_is_not_opened(cell: Cell, runs: list[ProposedRun]) -> None:

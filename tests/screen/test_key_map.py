@@ -27,21 +27,18 @@ def test_keys_and_theme_are_read(path: Path) -> None:
     assert read_preferences(path) == ScreenPreferences({"pause": "f5"}, "light")
 
 
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
+def test_a_mistake_in_the_file_is_named(path: Path) -> None:
+    for text, problem in (
         ('[keys]\npuase = "f5"', "there is no action 'puase'. Did you mean 'pause'?"),
         ('[keys]\npause = "u"', "the key 'u' is used twice. Choose another"),
         ("[keys]\npause = 5", "[keys] must name a key for each action"),
         ('theme = "pink"', "there is no theme 'pink'. Choose one of dark, light, monochrome"),
         ("[keys", "it cannot be read"),
-    ],
-)
-def test_a_mistake_in_the_file_is_named(text: str, problem: str, path: Path) -> None:
-    path.write_text(text)
-    with pytest.raises(FileError, match=r"screen\.toml") as caught:
-        read_preferences(path)
-    assert problem in str(caught.value)
+    ):
+        path.write_text(text)
+        with pytest.raises(FileError, match=r"screen\.toml") as caught:
+            read_preferences(path)
+        assert problem in str(caught.value)
 
 
 def test_the_file_is_where_configs_are(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from hexacell.text.screens.plot_lines import plot_lines
 from hexacell.text.screens.views import PlotView, Series
 
@@ -13,7 +11,9 @@ def view(**changes: object) -> PlotView:
     return PlotView(**{"title": "t", "x_label": "pose", "y_label": "mm", "series": (series,)} | changes)  # type: ignore[arg-type]
 
 
-def test_every_point_is_where_its_numbers_are() -> None:
+def test_every_point_is_where_its_numbers_are_and_a_level_is_a_line_below() -> None:
+    lines = plot_lines(view(level=2.0), 20, 9)
+    assert [line for line in lines if "----o" in line] == ["     2|------------o"]
     assert plot_lines(view(), 40, 9) == [
         "     3|  o                              ",
         "      |                                 ",
@@ -27,11 +27,6 @@ def test_every_point_is_where_its_numbers_are() -> None:
     ]
 
 
-def test_a_level_is_a_line_below_the_points() -> None:
-    lines = plot_lines(view(level=2.0), 20, 9)
-    assert [line for line in lines if "----o" in line] == ["     2|------------o"]
-
-
 def test_logarithms_have_round_numbers_at_both_ends() -> None:
     series = Series("", "o", (1.0, 2.0, 3.0), (36.4, 0.56, 0.062))
     lines = plot_lines(view(series=(series,), is_logarithmic=True), 30, 12)
@@ -39,13 +34,10 @@ def test_logarithms_have_round_numbers_at_both_ends() -> None:
     assert lines[9].startswith("  0.05|")
 
 
-@pytest.mark.parametrize(("columns", "rows"), [(15, 9), (40, 4)])
-def test_without_room_nothing_is_drawn(columns: int, rows: int) -> None:
-    assert plot_lines(view(), columns, rows) == []
-
-
-def test_without_points_nothing_is_drawn() -> None:
-    assert plot_lines(view(series=()), 40, 9) == []
+def test_without_room_nothing_is_drawn() -> None:
+    assert (
+        plot_lines(view(), 15, 9) == plot_lines(view(), 40, 4) == plot_lines(view(series=()), 40, 9) == []
+    )
 
 
 def test_one_point_has_axes_too() -> None:

@@ -107,25 +107,3 @@ def test_a_run_is_begun_left_and_stopped_at_the_screen(served: Path, terminal: T
     terminal.press("s")
     wait_until(terminal.is_over)
     wait_until(lambda: not socket_path(load_cell(served)).exists())
-
-
-def test_a_terminal_that_is_killed_leaves_a_paused_run(served: Path, terminal: Terminal) -> None:
-    tui = (sys.executable, "-m", "hexacell", "tui", str(served))
-    terminal.open(*tui)
-    terminal.wait_for(" mm  ")
-    terminal.press("2")
-    terminal.wait_for("What must hold before the robot moves")
-    terminal.wait_for("ok  encoders")
-    terminal.press("s")
-    terminal.wait_for("1/2 ")
-    terminal.kill()
-
-    terminal.open(*tui)
-    terminal.wait_for("paused: the robot stands still")
-    terminal.press("p")
-    terminal.wait_for("1/4 ")
-    terminal.press("a")
-    terminal.wait_for("The run ended early")
-    terminal.press("Enter", "q")
-    wait_until(terminal.is_over)
-    wait_until(lambda: not socket_path(load_cell(served)).exists())

@@ -40,16 +40,6 @@ def test_each_is_given_once_and_runs_are_read_only_after_a_change(cell, monkeypa
     assert (third.evaluation, third.state) == (ResultEvaluation.UNDEFINED, ResultState.ABORTED)
 
 
-def test_a_run_is_given_when_it_has_ended(cell) -> None:
-    journal = propose_run(cell, "2026-11-01T100000Z").folder.journal
-    whole = journal.read_bytes()
-    journal.write_bytes(b"".join(whole.splitlines(keepends=True)[:-1]))
-    results = NewResults(cell, pytest.fail)
-    assert results.fetch() == []
-    journal.write_bytes(whole)
-    assert len(results.fetch()) == 1
-
-
 def test_what_cannot_be_read_is_told_once(cell) -> None:
     runs_folder(cell).parent.mkdir()
     runs_folder(cell).write_text("no folder")

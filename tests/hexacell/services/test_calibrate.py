@@ -22,21 +22,21 @@ from hexacell.services.run.replay_run import replay
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Mode
 from procedures.devices.settling import trimmed_mean
-from procedures.journal.journal import Journal, read_journal
+from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase
 from procedures.run.state import fold
 from procedures.steps import events
 
 
-def test_a_calibration_passes(finished) -> None:
+def test_a_calibration_passes_and_listeners_get_the_events_of_the_journal(finished) -> None:
     assert finished.ended.exit_code == ExitCode.DONE
     assert "35 parameters, 24 records at 2 points; mean deviation at held-out poses" in finished.ended.line
-    judged = fold(finished.history).judged
-    assert judged
-    assert judged.verdict is Verdict.PASS
-
-
-def test_listeners_get_the_events_of_the_journal(finished) -> None:
+    state = fold(finished.history)
+    assert state.judged
+    assert state.judged.verdict is Verdict.PASS
+    before, after = (np.linalg.norm(state.held_out(phase), axis=1) for phase in (Phase.BEFORE, Phase.AFTER))
+    assert before.mean() > 1.0
+    assert after.mean() < 0.2
     assert finished.told == finished.history
 
 
@@ -48,9 +48,6 @@ def test_the_controllers_config_is_changed_in_its_numbers_only(finished) -> None
     for old, new in zip(before.splitlines(), after.splitlines(), strict=True):
         assert old == new or ("[" in old and "]" in old) or "# leg" in old
         assert old.partition("#")[2] == new.partition("#")[2]
-
-
-def test_the_receipt_and_the_backup_for_a_rollback_are_kept(finished) -> None:
     receipt = Receipt.of(finished.folder.path)
     assert receipt.backup() == (finished.config_before,)
     assert receipt.sha256_after == fingerprint(finished.cell.config_path)
@@ -88,33 +85,13 @@ def test_raw_readings_are_what_the_devices_sent(finished) -> None:
         assert all(len(answer) == 3 and all(answer) for answer in sample.reading.answers)
 
 
-def test_a_calibration_reduces_the_deviations_at_held_out_points(finished) -> None:
-    state = fold(finished.history)
-    before, after = (np.linalg.norm(state.held_out(phase), axis=1) for phase in (Phase.BEFORE, Phase.AFTER))
-    assert before.mean() > 1.0
-    assert after.mean() < 0.2
-
-
-async def test_a_run_that_is_over_is_not_resumed(finished) -> None:
+async def test_a_folder_with_a_run_takes_no_new_one_and_what_is_over_is_not_resumed(finished) -> None:
     before = finished.folder.journal.read_bytes()
     with pytest.raises(UsageError, match="is over: 35 parameters"):
         await calibrate(finished.order(resume=True))
-    assert finished.folder.journal.read_bytes() == before
-
-
-async def test_a_folder_with_a_run_takes_no_new_one(finished) -> None:
-    before = finished.folder.journal.read_bytes()
     with pytest.raises(UsageError, match="holds a run already"):
         await calibrate(finished.order())
     assert finished.folder.journal.read_bytes() == before
-
-
-async def test_a_cell_in_use_is_left_alone(make_site) -> None:
-    site = make_site()
-    with cell_lock(site.cell.config_path), pytest.raises(CellBusy) as refusal:
-        await site.calibrate()
-    assert refusal.value.exit_code is ExitCode.BUSY
-    assert not site.folder.path.exists()
 
 
 async def test_the_cell_is_held_while_it_runs_and_free_afterwards(make_site, finished) -> None:
@@ -128,6 +105,9 @@ async def test_the_cell_is_held_while_it_runs_and_free_afterwards(make_site, fin
                 pass
             busy.append(True)
 
+    with cell_lock(site.cell.config_path), pytest.raises(CellBusy) as refusal:
+        await site.calibrate(resume=True)
+    assert refusal.value.exit_code is ExitCode.BUSY
     await site.calibrate(listener, resume=True)
     assert busy == [True]
     with cell_lock(site.cell.config_path):
@@ -191,36 +171,13 @@ async def test_a_run_is_resumed_with_the_cell_file_it_began_with(make_site, fini
         await site.calibrate(resume=True)
 
 
-@pytest.mark.parametrize(
-    ("wanted", "words"),
-    [
-        ({"mode": Mode.CHECK}, "begun in the mode optimise"),
-        ({"length_check": True}, "begun without a length check"),
-    ],
-)
-async def test_a_run_is_resumed_as_what_it_was_begun(make_site, finished, wanted, words: str) -> None:
+async def test_a_run_is_resumed_as_what_it_was_begun(make_site, finished) -> None:
     site = make_site()
     site.write(finished.until(events.RecordTaken), finished)
-    with pytest.raises(UsageError, match=words):
-        await site.calibrate(resume=True, **wanted)
-
-
-async def test_a_damaged_journal_is_not_resumed(make_site, finished) -> None:
-    site = make_site()
-    site.write(finished.until(events.RecordTaken), finished)
-    site.folder.journal.write_bytes(site.folder.journal.read_bytes().replace(b'"P"', b'"Q"', 1))
-    with pytest.raises(FileError, match="damaged"):
-        await site.calibrate(resume=True)
-
-
-async def test_a_run_whose_journal_is_open_elsewhere_is_not_resumed(make_site, finished) -> None:
-    site = make_site()
-    site.write(finished.until(events.Proposed), finished)
-    before = site.folder.journal.read_bytes()
-    with Journal(site.folder.journal), pytest.raises(CellBusy):
-        await site.calibrate(resume=True)
-    assert site.folder.journal.read_bytes() == before
-    assert site.config == finished.config_before
+    with pytest.raises(UsageError, match="begun in the mode optimise"):
+        await site.calibrate(resume=True, mode=Mode.CHECK)
+    with pytest.raises(UsageError, match="begun without a length check"):
+        await site.calibrate(resume=True, length_check=True)
 
 
 async def test_a_cancelled_run_stops_in_place_and_can_be_resumed(make_site, finished) -> None:

@@ -30,10 +30,6 @@ def kept(cell, name: str, *devices: DeviceIdentity) -> RunFolder:
     return folder
 
 
-def test_without_a_run_before_there_is_nothing_to_tell(cell) -> None:
-    assert [one.remark for one in with_changes(cell, (GAUGE, ENCODER))] == ["", ""]
-
-
 def test_an_encoder_that_was_set_since_the_last_run_is_told(cell) -> None:
     kept(cell, "2026-11-01T000000Z", GAUGE, replace(ENCODER, settings="preset 7"))
     kept(cell, "2026-11-02T000000Z", GAUGE, ENCODER)
@@ -53,7 +49,8 @@ def test_an_exchanged_device_and_another_port_are_told(cell) -> None:
     assert encoder.remark.endswith("serial number 9, which was 503")
 
 
-def test_what_a_run_of_before_did_not_tell_is_no_change(cell) -> None:
+def test_what_no_run_told_is_no_change(cell) -> None:
+    assert [one.remark for one in with_changes(cell, (GAUGE, ENCODER))] == ["", ""]
     kept(cell, "2026-11-02T000000Z", replace(GAUGE, port=""), replace(ENCODER, settings=""))
     assert [one.remark for one in with_changes(cell, (GAUGE, ENCODER))] == ["", ""]
 

@@ -40,7 +40,7 @@ async def test_connected_devices_answer_and_their_traffic_is_kept(make_site) -> 
     assert cell_now.clock.factor == 500.0
 
 
-async def test_if_one_device_cannot_be_opened_all_are_closed(make_site) -> None:
+async def test_if_one_device_cannot_be_opened_or_something_fails_all_are_closed(make_site) -> None:
     """The test harness finds open descriptors; afterwards all devices can be opened again."""
     site = make_site()
     site.simulated.gauges.indicators["y"].inch = True
@@ -48,24 +48,11 @@ async def test_if_one_device_cannot_be_opened_all_are_closed(make_site) -> None:
         async with open_devices(site.simulated.settings):
             pytest.fail("was connected")
     site.simulated.gauges.indicators["y"].inch = False
-    async with open_devices(site.simulated.settings):
-        pass
-
-
-async def test_all_devices_are_closed_after_an_error_inside_the_context(make_site) -> None:
-    site = make_site()
     with pytest.raises(ZeroDivisionError):
         async with open_devices(site.simulated.settings):
             raise ZeroDivisionError
     async with open_devices(site.simulated.settings):
         pass
-
-
-def test_a_real_cell_is_not_simulated(make_site) -> None:
-    site = make_site()
-    cell = replace(site.cell, settings=site.simulated.settings)
-    with device_addresses(cell) as settings:
-        assert settings is site.simulated.settings
 
 
 def test_a_simulated_cell_is_served_while_the_context_lasts(make_cell) -> None:
@@ -76,3 +63,6 @@ def test_a_simulated_cell_is_served_while_the_context_lasts(make_cell) -> None:
         assert (settings.encoders.bus or {})["interface"] == "virtual"
     with device_addresses(cell, other_processes=True) as settings:
         assert (settings.encoders.bus or {})["interface"] == "slcan"
+        real = replace(cell, settings=settings)
+        with device_addresses(real) as found:
+            assert found is settings

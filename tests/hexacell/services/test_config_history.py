@@ -46,6 +46,7 @@ def kinds(cell: Cell) -> list[WriteKind]:
 async def test_applied_and_rolled_back_by_hand(cell) -> None:
     run = propose_run(cell)
     assert await apply(run, "  the fixture was exchanged ") == ""
+    assert await apply(run, "what writes nothing leaves no record") == ""
     assert roll_back_config(cell, reason="it hums").unrecorded == ""
     back, applied = config_history(cell).writes
     assert (applied.record.kind, applied.record.run) == (WriteKind.APPLIED, run.folder.path.name)
@@ -66,14 +67,9 @@ async def test_applied_and_rolled_back_by_hand(cell) -> None:
     )
     assert back.record.sha256_after == run.change.sha256_before
     assert back.verdict is None
-
-
-async def test_what_writes_nothing_leaves_no_record(cell, records) -> None:
-    run = propose_run(cell)
-    await apply(run)
-    await apply(run)
-    roll_back_config(cell, run.folder.path.name)
-    assert kinds(cell) == [WriteKind.APPLIED]
+    shutil.rmtree(run.folder.path)
+    _, left = config_history(cell).writes
+    assert (left.record, left.is_recorded, left.verdict) == (applied.record, True, None)
 
 
 async def test_a_reason_of_several_lines_is_refused_before_anything_is_written(cell) -> None:
@@ -87,14 +83,6 @@ async def test_a_reason_of_several_lines_is_refused_before_anything_is_written(c
     assert cell.config_path.read_bytes() == run.after
 
 
-async def test_the_records_outlive_the_runs(cell) -> None:
-    run = propose_run(cell)
-    await apply(run)
-    shutil.rmtree(run.folder.path)
-    (left,) = config_history(cell).writes
-    assert (left.record.run, left.is_recorded, left.verdict) == (run.folder.path.name, True, None)
-
-
 async def test_a_torn_last_line_costs_no_other(cell, records) -> None:
     run = propose_run(cell)
     await apply(run)
@@ -104,46 +92,44 @@ async def test_a_torn_last_line_costs_no_other(cell, records) -> None:
     found = config_history(cell)
     assert ([one.record.kind for one in found.writes], found.damaged) == ([WriteKind.APPLIED], (2,))
     roll_back_config(cell, run.folder.path.name)
+    with records.open("ab") as stream:
+        stream.write(b'{"version": 2, "novelty": 1}\n')  # of a newer program
     found = config_history(cell)
     assert [one.record.kind for one in found.writes] == [WriteKind.ROLLED_BACK, WriteKind.APPLIED]
-    assert found.damaged == (2,)
+    assert found.damaged == (2, 4)
 
 
-async def test_a_write_that_cannot_be_recorded_stays_and_is_told(cell, records) -> None:
-    records.mkdir(parents=True)
+@pytest.mark.parametrize("obstacle", ["a folder", "a full disk", "a link"])
+async def test_a_write_that_cannot_be_recorded_stays_and_is_told(
+    cell, records, tmp_path, monkeypatch, obstacle: str
+) -> None:
     run = propose_run(cell)
-    told = await apply(run)
-    assert cell.config_path.read_bytes() == run.after
-    assert told.startswith("The config is written, but the history has no record of it: ")
-    assert RECORDS in told
-    done = roll_back_config(cell)
-    assert cell.config_path.read_bytes() == run.before
-    assert done.unrecorded.startswith("The config is written, but the history has no record of it: ")
-    records.rmdir()
-    (known,) = config_history(cell).writes
-    assert (known.record.kind, known.record.by, known.is_recorded) == (WriteKind.APPLIED, COMMAND, False)
-
-
-async def test_a_full_disk_leaves_no_part_of_a_record(cell, records, monkeypatch) -> None:
-    run = propose_run(cell)
-    await apply(run)
-    before = records.read_bytes()
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.write_bytes(b"precious")
 
     def full(descriptor: int, data: bytes) -> int:
         raise OSError(28, os.strerror(28))
 
-    monkeypatch.setattr("hexacell.config.write_record.os.write", full)
-    assert "the disk is full" in roll_back_config(cell).unrecorded
-    assert (cell.config_path.read_bytes(), records.read_bytes()) == (run.before, before)
-
-
-async def test_a_link_is_not_followed(cell, records, tmp_path) -> None:
-    run = propose_run(cell)
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.write_bytes(b"precious")
-    records.symlink_to(elsewhere)
-    assert await apply(run)
-    assert elsewhere.read_bytes() == b"precious"
+    if obstacle == "a folder":
+        records.mkdir(parents=True)
+    elif obstacle == "a link":
+        records.symlink_to(elsewhere)
+    else:
+        monkeypatch.setattr("hexacell.config.write_record.os.write", full)
+    told = [await apply(run)]
+    assert cell.config_path.read_bytes() == run.after
+    told.append(roll_back_config(cell).unrecorded)
+    for one in told:
+        assert one.startswith("The config is written, but the history has no record of it: ")
+        assert RECORDS in one
+    assert (cell.config_path.read_bytes(), elsewhere.read_bytes()) == (run.before, b"precious")
+    if obstacle == "a full disk":
+        assert records.read_bytes() == b"", "no part of a record"
+    if obstacle == "a folder":
+        records.rmdir()
+        (known,) = config_history(cell).writes
+        assert (known.record.kind, known.record.by) == (WriteKind.APPLIED, COMMAND)
+        assert not known.is_recorded
 
 
 def journalled(run: ProposedRun, *more: events.Event) -> None:
@@ -179,14 +165,11 @@ def test_folders_of_before_are_told_by_their_journals(cell) -> None:
     assert (back.record.kind, back.record.why) == (WriteKind.TAKEN_BACK, "0.3 mm: fail (worse than before)")
 
 
-@pytest.mark.parametrize("recorded_after_us", [0, 900])
-def test_writes_within_a_millisecond_stay_in_their_order_and_are_told_once(
-    cell, monkeypatch, recorded_after_us: int
-) -> None:
+def test_writes_within_a_millisecond_stay_in_their_order_and_are_told_once(cell, monkeypatch) -> None:
     """Journals have milliseconds, records of writes microseconds: a fast computer does all that in one."""
     run = propose_run(cell, verdict=None)
     at = datetime(2026, 11, 20, 10, 5, tzinfo=UTC)
-    record_time = Mock(now=lambda zone: at.replace(microsecond=recorded_after_us))
+    record_time = Mock(now=lambda zone: at.replace(microsecond=900))
     monkeypatch.setattr(write_record, "datetime", record_time)
     monkeypatch.setattr(journals, "now", lambda: (at.replace(microsecond=999), 1.0))
     cause = WriteCause(WriteKind.RESULT, "a tester", run.folder.name, "")
@@ -195,10 +178,3 @@ def test_writes_within_a_millisecond_stay_in_their_order_and_are_told_once(
     judged = events.ResultValidated(verdict=Verdict.FAIL, line="0.3 mm: fail (worse than before)")
     journalled(run, events.Committed(approved_by="a tester"), judged, events.RolledBack())
     assert kinds(cell) == [WriteKind.TAKEN_BACK, WriteKind.RESULT]
-
-
-def test_records_of_a_newer_program_are_left_out_and_numbered(cell, records) -> None:
-    records.parent.mkdir(parents=True)
-    records.write_bytes(b'{"version": 2, "novelty": 1}\n')
-    found = config_history(cell)
-    assert (found.writes, found.damaged) == ((), (1,))

@@ -74,6 +74,13 @@ def cluster(tmp_path: Path) -> Iterator[DaskProcesses]:
         yield processes
 
 
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskProcesses]:
+    """Two workers for tests that leave them as they were."""
+    with dask_processes(tmp_path_factory.mktemp("shared"), 2) as processes:
+        yield processes
+
+
 @pytest.mark.parametrize(
     "settings",
     [{}, pytest.param(GIVEN_UP_AT_ONCE, marks=pytest.mark.slow)],
@@ -88,10 +95,10 @@ def test_tasks_of_a_killed_worker_are_done_again(tmp_path: Path, settings: dict[
     assert dict(found) == {key: number**2 for key, number in SQUARES.items()}
 
 
-def test_what_a_task_raises_ends_the_study_and_leaves_the_cluster_in_use(cluster) -> None:
+def test_what_a_task_raises_ends_the_study_and_leaves_the_cluster_in_use(shared) -> None:
     with pytest.raises(ValueError, match="0"):
-        list(results_of({"0": 0}, fail, dask_cluster(cluster.address, patience_s=LATE_S)))
-    assert dict(results_of({"3": 3}, square, dask_cluster(cluster.address, patience_s=LATE_S))) == {"3": 9}
+        list(results_of({"0": 0}, fail, dask_cluster(shared.address, patience_s=LATE_S)))
+    assert dict(results_of({"3": 3}, square, dask_cluster(shared.address, patience_s=LATE_S))) == {"3": 9}
 
 
 def test_a_scheduler_that_goes_away_is_named_and_what_was_done_is_told(cluster, tmp_path: Path) -> None:
@@ -124,32 +131,17 @@ def test_workers_that_all_leave_are_missed(tmp_path: Path, settings: dict[str, s
             list(found)
 
 
-def test_a_scheduler_without_workers_says_how_to_start_some(tmp_path: Path) -> None:
-    with (
-        dask_processes(tmp_path, 0) as cluster,
-        pytest.raises(ClusterError, match=NO_WORKERS.format(cluster.address)),
-    ):
-        dask_cluster(cluster.address, patience_s=SOON_S)()
-
-
-def test_a_study_that_is_given_up_waits_for_no_task(cluster, tmp_path: Path) -> None:
+def test_a_study_that_is_given_up_waits_for_no_task(shared, tmp_path: Path) -> None:
     """As Ctrl-C does it: the workers are held still when this ends."""
     found = results_of(
         SQUARES,
         partial(square_until_held, folder=tmp_path),
-        dask_cluster(cluster.address, patience_s=LATE_S),
+        dask_cluster(shared.address, patience_s=LATE_S),
     )
     next(found)
     wait_until((tmp_path / "held").exists)
     found.close()  # type: ignore[attr-defined]
     (tmp_path / "go").touch()
-
-
-def test_nobody_at_the_address() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        address = "tcp://{}:{}".format(*free.getsockname())
-    with pytest.raises(ClusterError, match=NO_SCHEDULER.format(address)):
-        dask_cluster(address, patience_s=SOON_S)()
 
 
 def test_something_else_at_the_address() -> None:
@@ -175,16 +167,19 @@ def test_something_else_at_the_address() -> None:
     ],
 )
 def test_a_worker_with_another_version_is_named(tmp_path: Path, content: str, words: str) -> None:
+    """Before it is there, a scheduler without workers says how to start some."""
     (tmp_path / "other" / "hexacell").mkdir(parents=True)
     (tmp_path / "other" / "hexacell" / "__init__.py").write_text(content)
     with dask_processes(tmp_path, 0) as cluster:
+        with pytest.raises(ClusterError, match=NO_WORKERS.format(cluster.address)):
+            dask_cluster(cluster.address, patience_s=0.5)()
         cluster.start_worker(PYTHONPATH=str(tmp_path / "other"))
         with pytest.raises(ClusterError, match=rf"tcp://127.0.0.1:\d+: .*{words}"):
             dask_cluster(cluster.address, patience_s=LATE_S)()
 
 
-def test_a_worker_that_comes_later_with_another_version_is_named(cluster, monkeypatch) -> None:
-    executor = dask_cluster(cluster.address, patience_s=LATE_S)()
+def test_a_worker_that_comes_later_with_another_version_is_named(shared, monkeypatch) -> None:
+    executor = dask_cluster(shared.address, patience_s=LATE_S)()
     monkeypatch.setattr("hexacell.study.dask_cluster.__version__", "9.9")
     with (
         executor,
@@ -193,7 +188,7 @@ def test_a_worker_that_comes_later_with_another_version_is_named(cluster, monkey
         executor.submit(square, 3).result()
 
 
-@pytest.mark.parametrize("address", ["", "here", "127.0.0.1:8786", "tcp://127.0.0.1", "tcp://:port"])
-def test_what_is_no_address_is_refused(address: str) -> None:
-    with pytest.raises(UsageError, match="is not an address of a Dask scheduler"):
-        dask_cluster(address)
+def test_what_is_no_address_is_refused() -> None:
+    for address in ("", "here", "127.0.0.1:8786", "tcp://127.0.0.1", "tcp://:port"):
+        with pytest.raises(UsageError, match="is not an address of a Dask scheduler"):
+            dask_cluster(address)

@@ -67,24 +67,19 @@ def tilt_deg(pose: Any) -> float:
     return float(Pose(*pose[:3]).angle_to(Pose(*pose)) * 57.29577951308232)
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("[[exclusions]]\npoint = 2\n", "1 of 2 points would be left"),
-        ("[[exclusions]]\npoint = 9\n", "there is no point 9"),
-        ("[[exclusions]]\n", "an exclusion is of a point or of a pose"),
-        ("[[exclusions]]\npose = [100.0, -100.0, 500.0, 4.0, 0.0, 0.0]\n", "the reference of a point"),
-    ],
-)
-def test_what_leaves_too_little_is_refused_with_its_line(
-    make_cell: Callable[..., Cell], text: str, said: str
-) -> None:
+def test_what_leaves_too_little_is_refused_with_its_line(make_cell: Callable[..., Cell]) -> None:
     cell = make_cell(identification__points=THREE_POINTS[::2])
     line = cell.text.count("\n") + 2
-    cell.path.write_text(f"{cell.text}\n{text}")
-    with pytest.raises(FileError, match=said) as refused:
-        load_cell(cell.path)
-    assert refused.value.line == line
+    for text, said in (
+        ("point = 2\n", "1 of 2 points would be left"),
+        ("point = 9\n", "there is no point 9"),
+        ("", "an exclusion is of a point or of a pose"),
+        ("pose = [100.0, -100.0, 500.0, 4.0, 0.0, 0.0]\n", "the reference of a point"),
+    ):
+        cell.path.write_text(f"{cell.text}\n[[exclusions]]\n{text}")
+        with pytest.raises(FileError, match=said) as refused:
+            load_cell(cell.path)
+        assert refused.value.line == line
 
 
 def test_of_a_list_the_pose_itself_is_left_out_and_no_other(
@@ -140,24 +135,15 @@ def test_a_key_excludes_and_removes_and_keeps_the_rest_of_the_file(cell: Cell) -
     assert not three.settings.excluded_commands.commands
     toggle_exclusion(three, "e1", PLANNED)
     assert cell.path.read_text() == before
-
-
-def test_nothing_near_a_reference_is_excluded(cell: Cell) -> None:
     near = [(1, 1, Pose(*THREE_POINTS[0])), (1, 2, Pose(*THREE_POINTS[0], 4.0))]
     [refused] = toggle_exclusion(cell, "1.2", near).settings.excluded_commands.commands
-    assert refused.within_deg == pytest.approx(2.0, abs=1e-3)
+    assert refused.within_deg == pytest.approx(2.0, abs=1e-3), "nothing near a reference is excluded"
 
 
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [("9", "there is no 9"), ("1.9", "there is no 1.9"), ("1.1", "is the reference"), ("e1", "no e1")],
-)
-def test_what_is_not_there_cannot_be_excluded(cell: Cell, name: str, said: str) -> None:
-    with pytest.raises(UsageError, match=said):
-        toggle_exclusion(cell, name, PLANNED)
-
-
-def test_a_file_that_somebody_has_changed_meanwhile_is_not_written(cell: Cell) -> None:
+def test_what_is_not_there_or_changed_meanwhile_cannot_be_excluded(cell: Cell) -> None:
+    for name, said in (("9", "there is no 9"), ("1.1", "is the reference"), ("e1", "no e1")):
+        with pytest.raises(UsageError, match=said):
+            toggle_exclusion(cell, name, PLANNED)
     cell.path.write_text(f"{cell.text}# mine\n")
     with pytest.raises(FileError):
         toggle_exclusion(cell, "3", PLANNED)

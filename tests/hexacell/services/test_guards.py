@@ -89,24 +89,6 @@ async def test_a_fault_during_a_move_stops_the_robot_and_trips_its_guard(
         assert site.simulated.physics._motion.end_s < struck_s[0] + 20.0, "a second on the wall"
 
 
-@pytest.mark.slow
-async def test_a_run_resumes_after_the_cable_is_plugged_in_again(make_site) -> None:
-    site = make_site(**SLOW, guards__stale_s=0.4)
-    with pytest.raises(GuardTripped):
-        await site.calibrate(striking(site, IN_A_SET, "unplugged", "x"))
-    site.simulated.faults.clear("unplugged", "x")
-
-    class Enough(Exception):
-        pass
-
-    def enough(event: events.Event, _: object) -> None:
-        if isinstance(event, events.RecordTaken) and event.orientation == 2:
-            raise Enough
-
-    with pytest.raises(Enough):
-        await site.calibrate(enough, resume=True)
-
-
 async def test_preflight_fails_while_the_stop_file_exists(make_cell) -> None:
     cell = make_cell(guards__stop_file="stop")
     (cell.path.parent / "stop").touch()
@@ -120,13 +102,3 @@ async def test_preflight_fails_without_free_disk_space(make_cell) -> None:
     cell = make_cell(guards__free_disk_mb=1e12)
     with pytest.raises(HexacellError, match=r"MB are free where the run is kept, less than 1e\+12 MB"):
         await preflight(cell, Mode.OPTIMISE, unattended=True)
-
-
-async def test_a_fault_planned_in_the_cell_file_trips_its_guard(make_cell, make_site) -> None:
-    fault = SimulatedFault.model_validate(
-        {"kind": "stop line", "at_move": 2, "after_s": 5.0, "lasts_s": 1e6}
-    )
-    site = make_site(**SLOW, simulation__faults=(fault,))
-    with pytest.raises(GuardTripped, match="motion is forbidden"):
-        await site.calibrate()
-    assert [event.step.key for event in site.happened(events.StepBegun)][-1] == IN_A_SET

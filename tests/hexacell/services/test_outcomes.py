@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,22 +11,16 @@ import pytest
 
 from hexacell.cell.fields import CertificateSettings
 from hexacell.cell.simulation import SimulatedFault
-from hexacell.config.change import ConfigChange
-from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, FileError, LimitError, WriteBackUndone
+from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.robot.model import robot_of
 from hexacell.services.run.calibration_run import run_started
-from hexacell.verdict.acceptance_gates import AcceptanceGate
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Calibration, Mode
-from procedures.run.keys import Phase
 from procedures.steps import events
 from tests.geometries import hexaglide_geometry
 from tests.small_cell import FEW_CHOICES
-
-DOUBTFUL = AcceptanceGate(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
-FORBIDDEN = AcceptanceGate(name="within tolerance", passed=False, sentence="Beyond: l3 (-13.00 mm).")
 
 
 def at(kind: type[Any], action: Callable[[], Any]) -> Any:
@@ -44,14 +37,11 @@ def at(kind: type[Any], action: Callable[[], Any]) -> Any:
 
 @pytest.fixture
 def proposed(finished, make_site) -> Callable[..., Any]:
-    """A site whose run has come to its proposal, with these gates or those that it had."""
+    """A site whose run has come to its proposal."""
 
-    def make(gates: Sequence[AcceptanceGate] | None = None, **changes: Any) -> Any:
+    def make(**changes: Any) -> Any:
         site = make_site(**changes)
-        history = list(finished.until(events.Proposed))
-        if gates is not None:
-            history[-1] = history[-1].model_copy(update={"gates": tuple(gates)})
-        site.write(history, finished)
+        site.write(finished.until(events.Proposed), finished)
         return site
 
     return make
@@ -63,54 +53,25 @@ async def test_a_run_resumed_from_its_proposal_writes_the_config(proposed, finis
     assert site.config == finished.cell.config_path.read_bytes()
 
 
-async def test_a_forbidding_gate_refuses_the_proposal(proposed, finished) -> None:
-    site = proposed([FORBIDDEN])
-    with pytest.raises(LimitError, match="refused: Beyond: l3") as refusal:
-        await site.calibrate(resume=True)
-    assert refusal.value.exit_code is ExitCode.OUT_OF_LIMITS
-    assert site.config == finished.config_before
-
-
-async def test_a_gate_that_requires_approval_ends_an_unattended_run(proposed, finished) -> None:
-    site = proposed([DOUBTFUL])
-    with pytest.raises(AnswerNeeded, match="It is 20 mm") as refusal:
-        await site.calibrate(resume=True)
-    assert refusal.value.exit_code is ExitCode.ANSWER_NEEDED
-    assert site.config == finished.config_before
-    assert (
-        ConfigChange.load(site.folder.proposal).text_after.encode()
-        == finished.cell.config_path.read_bytes()
-    )
-
-
-async def test_a_gate_that_requires_approval_is_approved_by_the_operator(proposed, approver) -> None:
-    site = proposed([DOUBTFUL])
-    assert (await site.calibrate(resume=True, operator=approver)).exit_code == ExitCode.DONE
-    assert site.happened(events.Committed) == [events.Committed(approved_by="a tester")]
-
-
 async def test_what_rests_on_an_expired_certificate_needs_a_person(finished, make_site) -> None:
     first, *others = finished.cell.settings.gauges
-    certified = first.model_copy(update={"certificate": CertificateSettings(number="17", due="2020-01-01")})
-    site = make_site(gauges=(certified, *others))
+
+    def certified(due: str) -> tuple[Any, ...]:
+        stated = CertificateSettings(number="17", due=due)
+        return (first.model_copy(update={"certificate": stated}), *others)
+
+    for due, expired in (("2020-01-01", ("gauge x",)), ("2999-12-31", ())):
+        settings = finished.cell.settings.model_copy(update={"gauges": certified(due)})
+        cell = replace(finished.cell, settings=settings)
+        calibration = Calibration(settings, robot_of(finished.cell), Mode.OPTIMISE, effort=FEW_CHOICES)
+        assert run_started(cell, calibration, ()).expired == expired
+    site = make_site(gauges=certified("2020-01-01"))
     history = list(finished.until(events.Proposed))[:-2]
     history[0] = history[0].model_copy(update={"expired": ("gauge x",)})
     site.write(history, finished)
     with pytest.raises(AnswerNeeded, match="The certificate has expired: gauge x"):
         await site.calibrate(resume=True)
     assert site.config == finished.config_before
-
-
-def test_a_run_notes_which_certificates_have_expired_when_it_begins(finished) -> None:
-    first, *others = finished.cell.settings.gauges
-    stated = {"2020-01-01": ("gauge x",), "2999-12-31": ()}
-    for due, expired in stated.items():
-        certificate = CertificateSettings(number="17", due=due)
-        gauges = (first.model_copy(update={"certificate": certificate}), *others)
-        settings = finished.cell.settings.model_copy(update={"gauges": gauges})
-        cell = replace(finished.cell, settings=settings)
-        calibration = Calibration(settings, robot_of(finished.cell), Mode.OPTIMISE, effort=FEW_CHOICES)
-        assert run_started(cell, calibration, ()).expired == expired
 
 
 def bend(site: Any, millimetres: float) -> None:
@@ -161,50 +122,21 @@ async def test_a_failed_reload_restores_the_config_and_the_controller(proposed, 
     assert not site.happened(events.Committed)
 
 
-async def test_a_controller_that_never_reloads_must_be_restarted(proposed, finished) -> None:
-    site = proposed(controller__reload_command=("false",))
-    with pytest.raises(WriteBackUndone, match="Restart the controller before it moves"):
-        await site.calibrate(resume=True)
-    assert site.config == finished.config_before
-
-
-@pytest.mark.parametrize("is_before", [True, False], ids=["before resuming", "during the run"])
-async def test_an_edited_config_is_not_overwritten(proposed, is_before: bool) -> None:
-    site = proposed()
-    edited = site.config + b"# somebody was here\n"
-    edit = partial(site.cell.config_path.write_bytes, edited)
-    if is_before:
-        edit()
-    with pytest.raises(FileError, match="changed since the run began") as refusal:
-        await site.calibrate(at(events.StepBegun, edit), resume=True)
-    assert refusal.value.exit_code is ExitCode.USAGE
-    assert site.config == edited
-
-
-async def test_a_gauge_set_to_inches_stops_the_run(make_site) -> None:
-    site = make_site()
-    indicator = site.simulated.gauges.indicators["z"]
-    fault = at(events.RecordTaken, lambda: setattr(indicator, "inch", True))
-    with pytest.raises(DeviceError, match=r"gauge z: answers in inch\. Press its in/mm key") as refusal:
-        await site.calibrate(fault)
-    assert refusal.value.exit_code is ExitCode.HARDWARE
-    (interrupted,) = site.happened(events.Interrupted)
-    assert interrupted.exit_code == ExitCode.HARDWARE
-    assert "answers in inch" in interrupted.reason
-    assert b"z" in site.folder.wire.read_bytes()
-
-
-async def test_two_gauges_that_fail_at_once_are_both_named(make_site) -> None:
+async def test_gauges_set_to_inches_stop_the_run_and_are_all_named(make_site) -> None:
     site = make_site()
 
     def press_both_keys() -> None:
         for name in "xz":
             site.simulated.gauges.indicators[name].inch = True
 
-    with pytest.raises(DeviceError, match=r"(?s)gauge x: .*gauge z: "):
+    both = r"(?s)gauge x: .*gauge z: answers in inch\. Press its in/mm key"
+    with pytest.raises(DeviceError, match=both) as refusal:
         await site.calibrate(at(events.RecordTaken, press_both_keys))
+    assert refusal.value.exit_code is ExitCode.HARDWARE
     (interrupted,) = site.happened(events.Interrupted)
     assert interrupted.exit_code == ExitCode.HARDWARE
+    assert "answers in inch" in interrupted.reason
+    assert b"z" in site.folder.wire.read_bytes()
 
 
 async def test_an_emergency_stop_during_a_move_stops_the_run_and_is_not_reset(make_site) -> None:
@@ -235,18 +167,3 @@ async def test_unattended_a_controller_is_not_homed_without_the_word_of_the_cell
     assert site.simulated.controller.state.enabled
     assert not site.simulated.controller.state.homed
     assert site.simulated.schedule.move_count == 0
-
-
-async def test_a_gauge_moved_away_while_measuring_gives_rejected_records(make_site) -> None:
-    """Its plunger is at an end: the record is rejected, the run continues, and the drift ends the run."""
-    site = make_site(acceptance__drift_mm=0.05)
-
-    def push() -> None:
-        site.simulated.physics.gauges.station += np.array([0.0, 8.0, 0.0])
-
-    with pytest.raises((LimitError, DeviceError)):
-        await site.calibrate(at(events.RecordTaken, push))
-    refused = site.happened(events.RecordRejected)
-    assert refused
-    assert {event.at.phase for event in refused} == {Phase.IDENTIFY}
-    assert all("gauge y" in event.reason for event in refused)

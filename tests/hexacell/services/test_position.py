@@ -112,9 +112,12 @@ async def test_an_offset_of_the_controller_is_found_by_preflight_before_it_is_ho
     assert state.estop
 
 
-async def test_a_controller_that_counts_in_inches_is_calibrated(make_site) -> None:
+async def test_a_controller_that_counts_in_inches_measures_with_the_new_geometry(
+    finished, make_site
+) -> None:
     site = make_site(**{"controller.unit_mm": 25.4})
-    assert (await site.calibrate()).exit_code == ExitCode.DONE
+    site.write(finished.until(events.Proposed), finished)
+    assert (await site.calibrate(resume=True)).exit_code == ExitCode.DONE
     located = site.happened(events.Located)[-1]
     assert located.joints == pytest.approx(located.encoders, abs=0.1)
 
@@ -144,7 +147,7 @@ async def test_joints_that_include_the_zeros_agree_before_and_after_the_geometry
         await preflight(replace(cell, settings=plain), Mode.OPTIMISE, unattended=True)
 
 
-@pytest.mark.parametrize("includes_zeros", [False, True])
+@pytest.mark.parametrize("includes_zeros", [pytest.param(False, marks=pytest.mark.slow), True])
 async def test_encoders_that_the_controller_reads_need_not_be_homed_before_a_run(
     make_site, includes_zeros
 ) -> None:

@@ -25,16 +25,15 @@ async def check(site, *, unattended: bool = True):
 async def test_a_ready_cell_gives_its_devices_and_nothing_moves(make_site) -> None:
     site = make_site()
     before = site.simulated.machine.joints()
+    site.simulated.physics.gauges.station += np.array([9.0, -9.0, 0.0])  # which is seen to when it runs
     identities = await check(site)
     names = [identity.name for identity in identities]
     assert names[:3] == ["x", "y", "z"]
     assert len(names) == 10
     assert site.simulated.machine.joints() == before
     assert not site.simulated.controller.state.enabled, "not even switched on"
-
-
-async def test_a_cell_that_serves_itself_is_checked_too(make_cell) -> None:
-    assert len(await preflight(make_cell(), Mode.CHECK, unattended=True)) == 10
+    with cell_lock(site.cell.config_path), pytest.raises(CellBusy):
+        await check(site)
 
 
 async def test_every_failure_is_reported_at_once(make_site) -> None:
@@ -110,20 +109,8 @@ async def test_devices_that_open_but_cannot_be_read_are_reported(make_site, monk
     assert issubclass(kinds[1], DeviceError)
 
 
-async def test_gauges_away_from_the_ball_are_no_preflight_failure(make_site) -> None:
-    site = make_site()
-    site.simulated.physics.gauges.station += np.array([9.0, -9.0, 0.0])
-    assert len(await check(site)) == 10
-
-
 async def test_a_single_failure_is_raised_as_it_is(make_site) -> None:
     site = make_site(stations__placement="by-hand")
     with pytest.raises(AnswerNeeded):
         await check(site)
     assert len(await check(site, unattended=False)) == 10
-
-
-async def test_preflight_of_a_cell_in_use_is_refused(make_site) -> None:
-    site = make_site()
-    with cell_lock(site.cell.config_path), pytest.raises(CellBusy):
-        await check(site)

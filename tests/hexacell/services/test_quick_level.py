@@ -13,7 +13,7 @@ import pytest
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
 from hexacell.config.layout import fingerprint
-from hexacell.errors import ExitCode, OutOfTime
+from hexacell.errors import ExitCode
 from hexacell.identification.estimator import identify
 from hexacell.results.result import AcceptedResult
 from hexacell.robot.model import robot_of
@@ -23,7 +23,6 @@ from hexacell.services.run.calibration_run import calibrate
 from hexacell.services.run.replay_run import replay
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Calibration, Mode
-from procedures.engine.commands import CommandQueue, EndAtReference
 from procedures.journal.journal import read_journal
 from procedures.run.state import RunState, fold
 from procedures.steps import events
@@ -123,27 +122,6 @@ async def test_the_next_check_starts_from_it(corrected) -> None:
     assert state.judged.check is not None
     assert state.judged.check.drift_scale == 1.0
     assert state.judged.check.earlier_run == str(corrected.folder.path)
-
-
-@pytest.mark.slow
-async def test_one_that_was_ended_in_its_midst_is_resumed(drifted) -> None:
-    """With the same prior and budget: what it started from is in its journal."""
-    folder, queue, counted = RunFolder(runs_folder(drifted) / "quick"), CommandQueue(), 0
-
-    def end(event: events.Event, _: object) -> None:
-        nonlocal counted
-        counted += isinstance(event, events.RecordTaken)
-        if counted == 7:
-            queue.put(EndAtReference("quiet hours begin at 05:30"))
-
-    request = order_of(drifted, folder, mode=Mode.QUICK)
-    with pytest.raises(OutOfTime):
-        await calibrate(request, [end], queue)
-    ended = await calibrate(replace(request, resume=True))
-    assert ended.exit_code == ExitCode.DONE
-    state = fold(read_journal(folder.journal))
-    assert len(state.measurements()) <= BUDGET
-    assert (await replay(folder.path)).differences == []
 
 
 def test_what_effects_did_to_the_result_before_counts(corrected) -> None:

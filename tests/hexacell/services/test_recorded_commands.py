@@ -84,13 +84,6 @@ def test_they_are_those_of_the_journal_in_the_frames_of_the_run(tmp_path, paper)
         np.testing.assert_allclose(one.frames.origin, ON_FLOOR.inverse().origin, atol=1e-9)
 
 
-def test_a_folder_without_a_run_tells_nothing(tmp_path):
-    settings = load_cell(bundled_config("simulated-hexaglide")).settings
-    assert commanding_geometries(RunFolder(tmp_path), settings) == ()
-    RunFolder(tmp_path).journal.write_text("no journal\n")
-    assert commanding_geometries(RunFolder(tmp_path), settings) == ()
-
-
 def measured_noise(*gauges_mm: float) -> events.NoiseMeasured:
     gauges = [InstrumentNoise(name="a gauge", stated=0.01, record=one) for one in gauges_mm]
     encoder = InstrumentNoise(name="an encoder", stated=0.01, record=0.01)
@@ -112,7 +105,9 @@ def test_records_in_a_run_folder_are_weighted_by_the_noise_that_the_run_measured
     assert "noise                    gauges" not in identification_report(alone)
     assert alone.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.01, 0.01])
     assert assessed.found.goodness.ratio < alone.found.goodness.ratio
-    assert noise_of_run(RunFolder(tmp_path / "nothing"), cell.settings) is None
+    nothing = RunFolder(tmp_path / "nothing")
+    assert noise_of_run(nothing, cell.settings) is None
+    assert commanding_geometries(nothing, cell.settings) == ()
 
 
 def test_records_in_a_run_folder_are_fitted_after_the_controller_got_other_frames(

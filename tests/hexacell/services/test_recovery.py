@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.cell.recovery import Action
 from hexacell.cell.simulation import FaultKind
-from hexacell.errors import DeviceError, ExitCode
+from hexacell.errors import ExitCode
 from procedures.devices.reconnection import DeviceReplaced
 from procedures.run.trips import RobotNotStopped
 from procedures.steps import events
@@ -57,20 +57,6 @@ async def test_an_unplugged_device_that_is_plugged_in_again_is_recovered(
     assert all(failure.action is not Action.ABORT for failure in failures)
     voided = [str(event.at) for event in site.happened(events.SetInvalidated)]
     assert ("P2" in voided) == voids, "what was opened again has lost its zero"
-
-
-async def test_a_device_left_unplugged_ends_the_run_after_three_attempts(at_second_point) -> None:
-    site = at_second_point
-    site.simulated.faults.check(UNPLUGGED, "y")
-
-    def pull(event: events.Event, _: object) -> None:
-        if isinstance(event, events.StepBegun) and event.step.key == "P2/o03/sample":
-            site.simulated.faults.inject(UNPLUGGED, "y")
-
-    with pytest.raises(DeviceError, match="gauge y"):
-        await site.calibrate(pull, resume=True)
-    attempts = [failure.attempt for failure in site.happened(events.Failed)]
-    assert attempts == [1, 2, 3]
 
 
 async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(at_second_point) -> None:

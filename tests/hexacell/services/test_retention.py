@@ -65,25 +65,18 @@ def test_only_what_nobody_needs_may_go(cell) -> None:
     assert "applied stays: it wrote the controller's config" in text
 
 
-def test_a_run_that_wrote_the_config_stays_when_another_one_has_replaced_it(cell) -> None:
-    newer = propose_run(cell, "newer", shift_mm=0.5)
-    commit(newer.change, newer.folder.path)
-    delete_runs(cell, past_runs(cell))
-    assert names(cell) >= {"applied", "newer"}
-
-
 def test_deleting_takes_the_folders_and_what_a_power_cut_left(cell) -> None:
     rest = runs_folder(cell) / f"{LEAVING}half"
     rest.mkdir()
     assert ".leaving-half" not in names(cell)
+    with cell_lock(cell.config_path), pytest.raises(CellBusy):
+        delete_runs(cell, retention(cell, 30.0).leaving)
+    assert len(names(cell)) == 5
+    assert retention(cell, 36500.0).leaving == ()
     delete_runs(cell, retention(cell, 30.0).leaving)
     assert names(cell) == {"proposed", "applied", "interrupted", "damaged"}
     assert not rest.exists()
     assert retention(cell, 30.0).leaving == ()
-
-
-def test_young_runs_stay(cell) -> None:
-    assert retention(cell, 36500.0).leaving == ()
 
 
 def test_what_was_applied_meanwhile_stays(cell) -> None:
@@ -92,9 +85,7 @@ def test_what_was_applied_meanwhile_stays(cell) -> None:
     (run.folder.path / "applied.json").write_text("{}")
     delete_runs(cell, listed)
     assert run.name in names(cell)
-
-
-def test_nothing_is_deleted_while_a_run_goes_on(cell) -> None:
-    with cell_lock(cell.config_path), pytest.raises(CellBusy):
-        delete_runs(cell, retention(cell, 30.0).leaving)
-    assert len(names(cell)) == 5
+    newer = propose_run(cell, "newer", shift_mm=0.5)
+    commit(newer.change, newer.folder.path)
+    delete_runs(cell, past_runs(cell))
+    assert names(cell) >= {"applied", "newer"}, "replaced by another one, and kept"

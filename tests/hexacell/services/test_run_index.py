@@ -47,17 +47,12 @@ def names(runs: tuple[PastRun, ...]) -> list[str]:
     return [run.name for run in runs]
 
 
-def test_folders_are_read_once(cell, opened) -> None:
+def test_folders_are_read_once_and_again_when_they_change(cell, opened) -> None:
     first = past_runs(cell)
     assert (names(first), sorted(opened)) == (["b", "a"], ["a", "b"])
     opened.clear()
     assert past_runs(cell) == first
     assert opened == []
-
-
-def test_only_what_changed_is_read_again(cell, opened) -> None:
-    past_runs(cell)
-    opened.clear()
     with Journal(RunFolder(runs_folder(cell) / "a").journal) as journal:
         journal.append(events.Interrupted(reason="later", exit_code=3))
     past_runs(cell)
@@ -82,20 +77,16 @@ def test_a_run_that_is_gone_is_forgotten(cell) -> None:
 
 def test_a_damaged_index_is_made_anew(cell, opened) -> None:
     first = past_runs(cell)
+    with closing(Archive(runs_folder(cell), cell.settings.name)) as archive:
+        stamp = archive.documents(SUMMARY)["a"].stamp
+        archive.store(SUMMARY, {"a": StampedDocument(stamp, b'{"mode": 3}')})
+    assert past_runs(cell) == first, "a damaged document is read from its folder"
     path = runs_folder(cell) / INDEX
     path.write_bytes(b"rubbish" * 1000)
     assert past_runs(cell) == first
     opened.clear()
     assert past_runs(cell) == first
     assert opened == []
-
-
-def test_a_damaged_document_is_read_from_its_folder(cell) -> None:
-    first = past_runs(cell)
-    with closing(Archive(runs_folder(cell), cell.settings.name)) as archive:
-        stamp = archive.documents(SUMMARY)["a"].stamp
-        archive.store(SUMMARY, {"a": StampedDocument(stamp, b'{"mode": 3}')})
-    assert past_runs(cell) == first
 
 
 def test_without_an_archive_the_folders_are_read_with_a_warning(cell, tmp_path) -> None:

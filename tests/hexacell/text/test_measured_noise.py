@@ -43,21 +43,10 @@ def test_a_quiet_cell_is_told_in_short() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("changed", "said_of_records", "said_at_rest"),
-    [
-        (
-            {"reading": 0.004, "record": 0.02},
-            "gauges 10 to 20, encoders 10 um a record",
-            "gauges 1 to 4, enc",
-        ),
-        ({"reading": 0.1234, "record": 1.5}, "gauges 10 to 1500, enc", "gauges 1 to 123, encoders 1 um"),
-    ],
-)
-def test_the_ranges_of_unlike_instruments_are_told(changed, said_of_records, said_at_rest) -> None:
-    text = said(measured(instrument("gauge y", **changed)))
-    assert said_of_records in text
-    assert f"readings at rest: {said_at_rest}" in text
+def test_the_ranges_of_unlike_instruments_are_told() -> None:
+    text = said(measured(instrument("gauge y", reading=0.004, record=0.02)))
+    assert "gauges 10 to 20, encoders 10 um a record" in text
+    assert "readings at rest: gauges 1 to 4, enc" in text
     assert "at rest" not in said(measured(instrument("gauge x", reading=None)))
 
 
@@ -74,37 +63,28 @@ def test_a_noisy_instrument_is_named_with_what_to_do(name: str, action: str) -> 
     assert "scatter by" not in said(measured(instrument(name, reading=0.113)))
 
 
-@pytest.mark.parametrize(
-    ("name", "changed", "told"),
-    [
+def test_drift_and_false_readings_are_told_where_they_matter() -> None:
+    for name, changed, told in (
         ("gauge z", {"drift": -0.03}, "it drifted by -30 um within the series: let it warm up"),
         ("encoder 2", {"drift": 0.03}, "it drifted by +30 um within the series: see whether it slides"),
         ("gauge x", {"outliers": 1}, "a reading was false, and left out."),
         ("gauge x", {"outliers": 2}, "2 readings were false"),
-    ],
-)
-def test_drift_and_false_readings_are_told_where_they_matter(name, changed, told) -> None:
-    assert f"{name}: {told}" in said(measured(instrument(name, **changed)))
-    assert "drifted" not in said(measured(instrument(name, drift=-0.002)))
+    ):
+        assert f"{name}: {told}" in said(measured(instrument(name, **changed)))
+    assert "drifted" not in said(measured(instrument("gauge z", drift=-0.002)))
 
 
-@pytest.mark.parametrize(
-    ("source", "what", "action"),
-    [
+def test_what_does_not_repeat_is_named_with_what_to_do() -> None:
+    for source, what, action in (
         (ScatterSource.JOINTS, "the joints stop 49 um beside what their encoders show", "Look for play"),
-        (ScatterSource.ENCODERS, "encoders: 49 um beside where the joints are", "reading heads"),
         (ScatterSource.ENCODER_3, "encoder 3: 49 um beside where the joints are", "reading heads"),
         (ScatterSource.GAUGE_Z, "gauge z shows 49 um more or less at the same place", "its plunger"),
-    ],
-)
-def test_what_does_not_repeat_is_named_with_what_to_do(
-    source: ScatterSource, what: str, action: str
-) -> None:
-    text = said(measured(approaches=visits(4.2, source, 0.049)))
-    assert "7 visits of one pose scatter 4.2 times as much as the stated noise explains" in text
-    assert what in text
-    assert action in text
-    assert "agree with what is stated" not in text
+    ):
+        text = said(measured(approaches=visits(4.2, source, 0.049)))
+        assert "7 visits of one pose scatter 4.2 times as much as the stated noise explains" in text
+        assert what in text
+        assert action in text
+        assert "agree with what is stated" not in text
 
 
 def forecasts(*errors: float) -> tuple[AveragingForecast, ...]:

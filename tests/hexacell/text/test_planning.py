@@ -61,27 +61,16 @@ def test_a_forecast_says_what_records_gain_and_u_where_the_effects_are_known():
     assert text.endswith("continuing gains 0.250 mm, U 0.200 mm then in 24 records, about 12 minutes.")
 
 
-@pytest.mark.parametrize(
-    ("changes", "rest"),
-    [
+def test_a_run_states_what_the_remaining_records_gain():
+    for changes, rest in (
         ({}, "0.290 mm; in 12 minutes 0.060"),
         ({"records": 1}, "0.290 mm"),
         ({"systematic_mm": 0.08}, "0.290 mm, U 0.602; in 12 minutes 0.060, U 0.200"),
         ({"systematic_mm": 0.08, "records": 1}, "0.290 mm, U 0.602"),
-    ],
-)
-def test_a_run_states_what_the_remaining_records_gain(changes, rest):
-    line = run_forecast_line(FORECAST.model_copy(update=changes))
-    assert line == f"  predicted error at the task {rest}"
-    assert len(line) <= 80
-
-
-@pytest.mark.parametrize(
-    ("minutes", "text"),
-    [(0.4, "24 seconds"), (1.4, "84 seconds"), (1.6, "2 minutes"), (61.2, "61 minutes")],
-)
-def test_durations_are_rounded_to_seconds_or_minutes(minutes, text):
-    assert duration(minutes) == text
+    ):
+        line = run_forecast_line(FORECAST.model_copy(update=changes))
+        assert line == f"  predicted error at the task {rest}"
+    assert [duration(minutes) for minutes in (1.4, 1.6)] == ["84 seconds", "2 minutes"]
 
 
 def lines(target_mm=None, **changes):
@@ -100,13 +89,12 @@ def lines(target_mm=None, **changes):
 
 
 def test_the_text_of_a_predicted_plan():
-    first, *rest = lines(drawn=2)
+    first, second = lines(drawn=2)
     assert first == (
         "55 records at 5 points will give about 0.021 mm at the worst of your task poses (one sigma), "
         "in about 40 minutes."
     )
-    assert len(rest) == 1
-    assert rest[0].startswith("Point 2: 6% of the robots within the tolerances cannot reach it")
+    assert second.startswith("Point 2: 6% of the robots within the tolerances cannot reach it")
 
 
 def test_the_verdicts_on_healthy_machines_and_the_part_of_the_encoders_are_told():

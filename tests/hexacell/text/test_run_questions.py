@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from drivers.interfaces import StartupAction
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
@@ -39,18 +37,15 @@ def placement(phase: Phase) -> Question:
     return ask_placement(SetKey(phase=phase, point=3), Pose(1.0, 2.0, 3.0))
 
 
-@pytest.mark.parametrize(
-    ("phase", "beginning"),
-    [
+def test_placing_gauges_names_the_point_and_the_pose() -> None:
+    for phase, beginning in (
         (Phase.IDENTIFY, "\nPoint 3: the robot is at X1.000 "),
         (Phase.BEFORE, "\nHeld-out point 3: "),
         (Phase.AFTER, "\nHeld-out point 3 with the new geometry: "),
-    ],
-)
-def test_placing_gauges_names_the_point_and_the_pose(phase: Phase, beginning: str) -> None:
-    text = question_text(placement(phase))
-    assert text.startswith(beginning)
-    assert text.endswith("Press Enter when they are in place, or type a to abort: ")
+    ):
+        text = question_text(placement(phase))
+        assert text.startswith(beginning)
+        assert text.endswith("Press Enter when they are in place, or type a to abort: ")
 
 
 def test_an_approval_shows_the_change_then_every_gate() -> None:
@@ -84,36 +79,26 @@ def test_a_failure_names_the_choices() -> None:
     assert request_text(FAILURE) == "Type one of retry, measure-again, redo-set, abort: "
 
 
-@pytest.mark.parametrize(
-    ("question", "typed", "answer"),
-    [
-        (placement(Phase.IDENTIFY), "\n", TypedAnswer("placed")),
-        (FAILURE, "redo\n", TypedAnswer("redo-set")),
-        (FAILURE, "Measure again\n", TypedAnswer("measure-again")),
-        (FAILURE, "a", TypedAnswer("abort")),
-        (APPROVAL, "yes\n", TypedAnswer("somebody")),
-        (APPROVAL, "Y\n", TypedAnswer("somebody")),
-        (APPROVAL, "no\n", TypedAnswer(None)),
-        (APPROVAL, "N", TypedAnswer(None)),
-        (GRAVE, "bench\n", TypedAnswer("somebody")),
-        (GRAVE, "no\n", TypedAnswer(None)),
-    ],
-)
-def test_what_a_question_offers_is_an_answer(question: Question, typed: str, answer: TypedAnswer) -> None:
-    assert typed_answer(typed, question, "somebody") == answer
-
-
-@pytest.mark.parametrize(
-    ("question", "typed"),
-    [
-        *((placement(Phase.IDENTIFY), typed) for typed in ("a\n", "m\n", "yes\n", "no\n", "placed\n")),
-        *((APPROVAL, typed) for typed in ("\n", "a\n", "yess\n", "bench\n", "ok\n")),
-        *((GRAVE, typed) for typed in ("\n", "yes\n", "y\n", "benc\n")),
-        *((FAILURE, typed) for typed in ("re", "\n", "leave")),
-    ],
-)
-def test_nothing_else_is_an_answer(question: Question, typed: str) -> None:
-    assert typed_answer(typed, question, "somebody") is None
+def test_what_a_question_offers_is_an_answer_and_nothing_else() -> None:
+    offered: list[tuple[Question, dict[str, str | None], tuple[str, ...]]] = [
+        (placement(Phase.IDENTIFY), {"\n": "placed"}, ("a\n", "m\n", "yes\n", "no\n", "placed\n")),
+        (
+            FAILURE,
+            {"redo\n": "redo-set", "Measure again\n": "measure-again", "a": "abort"},
+            ("re", "\n", "leave"),
+        ),
+        (
+            APPROVAL,
+            {"yes\n": "somebody", "Y\n": "somebody", "no\n": None, "N": None},
+            ("\n", "a\n", "yess\n", "bench\n", "ok\n"),
+        ),
+        (GRAVE, {"bench\n": "somebody", "no\n": None}, ("\n", "yes\n", "y\n", "benc\n")),
+    ]
+    for question, answers, others in offered:
+        for typed, answer in answers.items():
+            assert typed_answer(typed, question, "somebody") == TypedAnswer(answer)
+        for typed in others:
+            assert typed_answer(typed, question, "somebody") is None
 
 
 def test_the_controller_is_made_ready_on_an_explicit_yes_only() -> None:

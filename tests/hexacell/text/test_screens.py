@@ -5,8 +5,6 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-import pytest
-
 from drivers.interfaces import StartupAction
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.checks.check_result import CheckResult, ParameterChange
@@ -67,9 +65,8 @@ def recorded(event: events.Event, number: int = 1) -> EventRecorded:
     return EventRecorded(sequence=number, at=at, event=event)
 
 
-@pytest.mark.parametrize(
-    ("changes", "advice"),
-    [
+def test_a_gauge_says_how_it_is_to_be_moved() -> None:
+    moves: list[tuple[dict[str, object], str]] = [
         ({"shown_mm": -1.2}, "move the x gauge 1.2 mm in (along -x)"),
         ({"shown_mm": 1.2}, "move the x gauge 1.2 mm out (along +x)"),
         ({"shown_mm": 1.2, "sign": -1}, "move the x gauge 1.2 mm out (along -x)"),
@@ -78,24 +75,17 @@ def recorded(event: events.Event, number: int = 1) -> EventRecorded:
         ({"middle_mm": None}, "set the x plunger to mid travel by eye"),
         ({"shown_mm": None}, "the x gauge does not answer"),
         ({"problem": "silent"}, "the x gauge does not answer"),
-    ],
-)
-def test_a_gauge_says_how_it_is_to_be_moved(changes: dict[str, object], advice: str) -> None:
-    assert mounting_advice(gauge(**changes), 1.0) == advice
+    ]
+    assert [mounting_advice(gauge(**changes), 1.0) for changes, _ in moves] == [said for _, said in moves]
 
 
-@pytest.mark.parametrize(
-    ("place", "bar"),
-    [
-        (0.0, "[--------O--------]"),
-        (-6.25, "[O-------+--------]"),
-        (6.25, "[--------+-------O]"),
-        (99.0, "[--------+-------O]"),
-        (None, "[--------+--------]"),
-    ],
-)
-def test_a_plunger_is_shown_in_its_travel(place: float | None, bar: str) -> None:
-    assert travel_bar(place, 6.25) == bar
+def test_a_plunger_is_shown_in_its_travel() -> None:
+    assert [travel_bar(place, 6.25) for place in (0.0, -6.25, 99.0, None)] == [
+        "[--------O--------]",
+        "[O-------+--------]",
+        "[--------+-------O]",
+        "[--------+--------]",
+    ]
 
 
 def test_a_device_that_is_silent_gets_older_by_itself() -> None:
@@ -121,16 +111,8 @@ def test_what_is_urgent_is_said_in_words_too() -> None:
     ]
 
 
-def test_a_line_of_a_gauge_fits_a_narrow_terminal() -> None:
-    assert device_lines(None) == [("No device is connected.", Urgency.CALM)]
-    snapshot = LiveSnapshot(gauges=(gauge(shown_mm=-12.3456, noise_mm=0.0123, travel_mm=25.0),))
-    line, _ = device_lines(snapshot, 12.0, (1.0, 1.0, 1.0))[0]
-    assert len(line) <= 78
-
-
-@pytest.mark.parametrize(
-    ("question", "words", "labels"),
-    [
+def test_a_question_says_what_it_is_about_and_what_each_answer_does() -> None:
+    asked: list[tuple[Question, tuple[str, ...], list[str]]] = [
         (
             ask_mounting(2, 2, Pose(0.0, 0.0, 500.0)),
             ("Mount the gauges in seat 2 of the fixture (mounting 2)", "Do not zero them, and leave"),
@@ -146,35 +128,25 @@ def test_a_line_of_a_gauge_fits_a_narrow_terminal() -> None:
             ("The result did not pass.", "Without your word the old one is restored."),
             ["yes, keep it", "no, restore the old config"],
         ),
-    ],
-    ids=["mounting", "emergency stop", "result"],
-)
-def test_a_question_says_what_it_is_about_and_what_each_answer_does(
-    question: Question, words: tuple[str, ...], labels: list[str]
-) -> None:
-    view = question_view(question, None)
-    said = "\n".join((view.title, *view.paragraphs))
-    assert [text for text in words if text not in said] == []
-    assert [choice.label for choice in view.choices] == labels
+    ]
+    for question, words, labels in asked:
+        view = question_view(question, None)
+        said = "\n".join((view.title, *view.paragraphs))
+        assert [text for text in words if text not in said] == []
+        assert [choice.label for choice in view.choices] == labels
 
 
-@pytest.mark.parametrize(
-    ("messages", "now"),
-    [
+def test_guidance_says_what_happens_now() -> None:
+    refused = events.CommandRejected(command="Undo", reason="there is no record")
+    failed = HostFailed(problem="its disk is full", exit_code=3)
+    said: list[tuple[tuple[HostMessage, ...], str]] = [
         ((StatusChanged(status=Status.PAUSED),), "paused: the robot stands still"),
         ((StatusChanged(status=Status.PAUSING),), "choosing the next pose, then it pauses"),
-        (
-            (recorded(events.CommandRejected(command="Undo", reason="there is no record")),),
-            "Undo was refused: there is no record",
-        ),
-        (
-            (HostFailed(problem="its disk is full", exit_code=3), StatusChanged(status=Status.ENDED)),
-            "ended early: its disk is full",
-        ),
-    ],
-)
-def test_guidance_says_what_happens_now(messages: tuple[HostMessage, ...], now: str) -> None:
-    assert guidance(pictured(described(), *messages), None)["Now"] == now
+        ((recorded(refused),), "Undo was refused: there is no record"),
+        ((failed, StatusChanged(status=Status.ENDED)), "ended early: its disk is full"),
+    ]
+    for messages, now in said:
+        assert guidance(pictured(described(), *messages), None)["Now"] == now
     assert guidance(RunPicture(), None)["Now"] == "no run is being measured here"
 
 
@@ -215,9 +187,8 @@ def test_going_back_in_a_recorded_run_forgets_what_came_later() -> None:
     assert record_lines(pictured(*told, described(is_recorded=True))) == ()
 
 
-@pytest.mark.parametrize(
-    ("setback", "title", "action"),
-    [
+def test_a_fault_has_its_cause_and_the_next_action() -> None:
+    setbacks: list[tuple[Setback, str, str]] = [
         *(
             (
                 events.Tripped(guard=guard, device="gauge y", problem="why", action="Mend it"),
@@ -235,12 +206,11 @@ def test_going_back_in_a_recorded_run_forgets_what_came_later() -> None:
             for kind in FailureKind
         ),
         (HostFailed(problem="why", action="Wait", exit_code=5), "The run could not go on", "Wait"),
-    ],
-)
-def test_a_fault_has_its_cause_and_the_next_action(setback: Setback, title: str, action: str) -> None:
-    view = fault_view(setback)
-    assert (view.title, view.action) == (title, action)
-    assert view.cause.endswith("why")
+    ]
+    for setback, title, action in setbacks:
+        view = fault_view(setback)
+        assert (view.title, view.action) == (title, action)
+        assert view.cause.endswith("why")
 
 
 def test_a_check_shows_what_has_changed() -> None:
@@ -256,25 +226,21 @@ def test_a_check_shows_what_has_changed() -> None:
     )
 
 
-@pytest.mark.parametrize("verdict", Verdict)
-def test_every_verdict_is_said_in_words_with_its_scope(verdict: Verdict) -> None:
-    judged = events.ResultValidated(verdict=verdict, line="what came of it")
-    shown = review_texts(pictured(described(), recorded(judged)), None)
-    assert shown["verdict"].lower().startswith(f"{verdict.value}: ")
-    assert shown["scope"] == "what came of it"
+def test_every_verdict_is_said_in_words_with_its_scope() -> None:
+    for verdict in Verdict:
+        judged = events.ResultValidated(verdict=verdict, line="what came of it")
+        shown = review_texts(pictured(described(), recorded(judged)), None)
+        assert shown["verdict"].lower().startswith(f"{verdict.value}: ")
+        assert shown["scope"] == "what came of it"
 
 
-@pytest.mark.parametrize(
-    ("told", "approval"),
-    [
+def test_the_approval_says_how_it_stands() -> None:
+    failed = events.ResultValidated(verdict=Verdict.FAIL, line="")
+    stands: list[tuple[tuple[events.Event, ...], str]] = [
         ((), "Approving is not possible yet: the geometry is not identified."),
-        (
-            (events.ResultValidated(verdict=Verdict.FAIL, line=""), events.RolledBack()),
-            "The old config was restored.",
-        ),
+        ((failed, events.RolledBack()), "The old config was restored."),
         ((events.Committed(approved_by="ada"),), "Written to the controller, approved by ada."),
-    ],
-)
-def test_the_approval_says_how_it_stands(told: tuple[events.Event, ...], approval: str) -> None:
-    picture = pictured(described(), *map(recorded, told))
-    assert review_texts(picture, None)["approval"] == approval
+    ]
+    for told, approval in stands:
+        picture = pictured(described(), *map(recorded, told))
+        assert review_texts(picture, None)["approval"] == approval

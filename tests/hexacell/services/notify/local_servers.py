@@ -7,7 +7,6 @@ import socketserver
 import ssl
 import struct
 import threading
-from base64 import b64encode
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -170,58 +169,6 @@ def _login(body: bytes) -> tuple[str, str] | None:
         texts.append(body[position + 2 : position + 2 + length].decode())
         position += 2 + length
     return (texts[-2], texts[-1]) if flags & 0xC0 == 0xC0 else None
-
-
-@dataclass
-class Postbox:
-    """A mail server that takes mail of one who knows the password."""
-
-    port: int = 0
-    login: tuple[str, str] | None = None
-    mails: list[bytes] = field(default_factory=list)
-
-
-@contextmanager
-def mail_server(login: tuple[str, str] | None = None) -> Iterator[Postbox]:
-    """The part of SMTP (RFC 5321) with AUTH (RFC 4954) that who sends a mail sees."""
-
-    class Handler(socketserver.StreamRequestHandler):
-        is_known = login is None
-
-        def handle(self) -> None:
-            self.say("220 loopback")
-            for line in self.rfile:
-                words = line.decode().split()
-                if not self.answer(words[0].upper(), words[1:]):
-                    return
-
-        def say(self, text: str) -> None:
-            self.wfile.write(f"{text}\r\n".encode())
-
-        def answer(self, verb: str, words: list[str]) -> bool:
-            if verb == "EHLO":
-                self.say("250-loopback\r\n250 AUTH PLAIN")
-            elif verb == "AUTH":
-                self.is_known = login is not None and words[1:] == [_plain(login)]
-                self.say("235 welcome" if self.is_known else "535 wrong password")
-            elif verb == "DATA" and self.is_known:
-                self.say("354 go on")
-                box.mails.append(b"".join(iter(self.rfile.readline, b".\r\n")))
-                self.say("250 taken")
-            elif verb == "QUIT":
-                self.say("221 bye")
-            else:
-                self.say("250 ok" if self.is_known else "530 log in first")
-            return verb != "QUIT"
-
-    server = socketserver.ThreadingTCPServer((LOOPBACK, 0), Handler)
-    box = Postbox(server.server_address[1], login)
-    with _serving(server):
-        yield box
-
-
-def _plain(login: tuple[str, str]) -> str:
-    return b64encode("\0{}\0{}".format(*login).encode()).decode()
 
 
 @contextmanager

@@ -24,13 +24,6 @@ def quiet(*spans: str, **changes: object) -> UnattendedSettings:
     return UnattendedSettings.model_validate({"quiet_hours": spans, **changes})
 
 
-@pytest.mark.parametrize(
-    ("now", "until"), [("05:29", None), ("05:30", at("22:00")), ("21:59", at("22:00")), ("22:00", None)]
-)
-def test_the_day_shift_is_quiet(now, until) -> None:
-    assert quiet_until(quiet("05:30-22:00"), at(now)) == until
-
-
 def test_a_span_may_go_past_midnight() -> None:
     nights = quiet("22:00-06:00")
     assert quiet_until(nights, at("23:30")) == at("06:00", 1)
@@ -68,7 +61,7 @@ def test_they_end_at_their_end_and_begin_at_their_begin(begin, length, minute) -
     assert following - now == (timedelta(0) if since < length else timedelta(minutes=1440 - since))
 
 
-@pytest.mark.parametrize("span", ["5:30-22:00", "05:30-24:00", "05:30", "05:30-05:30", "at night"])
-def test_what_is_no_span_is_refused(span) -> None:
-    with pytest.raises(ValidationError, match="is no span of a day"):
-        quiet(span)
+def test_what_is_no_span_is_refused() -> None:
+    for span in ("5:30-22:00", "05:30-24:00", "05:30", "05:30-05:30", "at night"):
+        with pytest.raises(ValidationError, match="is no span of a day"):
+            quiet(span)

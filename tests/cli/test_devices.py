@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-import socket
-import threading
 import tomllib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
@@ -137,40 +134,6 @@ def test_an_instrument_of_each_protocol_that_is_tried_is_found(typed_here) -> No
     assert "Not tried" not in outcome.err
 
 
-@pytest.mark.usefixtures("hasty")
-def test_what_no_protocol_understands_is_told(typed_here) -> None:
-    """As of a gauge at another baud rate."""
-    with answering(lambda received: bytes(byte ^ 0x55 for byte in received) + b"\r") as port:
-        outcome = typed_here("devices", port, "--controller", NOBODY)
-    said = " ".join(outcome.out.split())
-    assert "what comes is in no protocol that is tried: answers b" in said
-    assert "Its baud rate or parity may be another" in said
-    assert "nothing answers; is the gauge on" not in said
-
-
-@contextmanager
-def answering(answer: Callable[[bytes], bytes]) -> Iterator[str]:
-    """A port that answers whatever comes."""
-    listener = socket.create_server(("127.0.0.1", 0))
-
-    def serve() -> None:
-        with suppress(OSError):
-            while True:
-                client, _ = listener.accept()
-                with client:
-                    while received := client.recv(1024):
-                        client.sendall(answer(received))
-
-    thread = threading.Thread(target=serve, daemon=True)
-    thread.start()
-    try:
-        yield f"socket://127.0.0.1:{listener.getsockname()[1]}"
-    finally:
-        listener.shutdown(socket.SHUT_RDWR)
-        listener.close()
-        thread.join()
-
-
 @pytest.fixture
 def streams() -> Iterator[SimulatedGaugeBank]:
     """Two U-WAVE transmitters behind one receiver, and a gauge that the cell file would describe."""
@@ -280,14 +243,6 @@ def test_one_device_is_watched(typed_here, served, device, rows) -> None:
     assert found["failures"] == []
     assert "No answer was damaged or missing." in outcome.err
     assert "It can be used." in outcome.err
-
-
-def test_a_gauge_in_inches_is_watched_and_named(typed_here, cell_folder) -> None:
-    with cell_folder.cell.open("a") as cell:
-        cell.write('\n[[simulation.faults]]\nkind = "in inches"\ndevice = "x"\n')
-    outcome = typed_here("devices", "--diagnose", "x", "--cell", cell_folder.cell, "--seconds", "0.1")
-    assert outcome.code == 3
-    assert "gauge x: answers in inch" in outcome.err
 
 
 @pytest.mark.parametrize(

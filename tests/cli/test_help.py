@@ -11,39 +11,12 @@ import pytest
 from hexacell import __version__
 from hexacell.cli.app import main
 from hexacell.cli.parser import make_parser
+from tests.cli.test_completion import commands_of
 
 SLOW_TO_IMPORT = {"numpy", "scipy", "textual", "matplotlib", "pydantic", "rich", "asyncio"}
 UNNEEDED_AT_START = {"sqlalchemy", "matplotlib", "textual", "scipy"}
-COMMANDS = (
-    "demo",
-    "run",
-    "tui",
-    "length",
-    "preflight",
-    "simulate",
-    "next",
-    "fit",
-    "replay",
-    "apply",
-    "rollback",
-    "history",
-    "report",
-    "devices",
-    "schedule",
-    "status",
-    "notify",
-    "serve",
-    "cell",
-    "completion",
-    "study",
-)
-PAGES = [
-    [],
-    *([command] for command in COMMANDS),
-    *(["cell", action] for action in ("validate", "schema", "show")),
-    ["study", "paper"],
-    ["study", "experiment"],
-]
+PAGES = [path for path, _ in commands_of(make_parser())]
+COMMANDS = [path[0] for path in PAGES if len(path) == 1]
 
 
 def imported(folder: Path, *arguments: str) -> set[str]:
@@ -87,7 +60,7 @@ def test_help_names_every_command_in_one_line_each_and_every_exit_code(capsys, m
         main(["--help"])
     lines = capsys.readouterr().out.splitlines()
     begun = lines.index("  COMMAND [...]") + 1
-    assert [line.split()[0] for line in lines[begun : begun + len(COMMANDS)]] == list(COMMANDS)
+    assert [line.split()[0] for line in lines[begun : begun + len(COMMANDS)]] == COMMANDS
     codes = " ".join(lines[lines.index("exit codes:") :])
     assert all(f" {code} " in codes for code in (0, 1, 2, 3, 4, 5, 6, 7, 70, 130))
 

@@ -106,16 +106,6 @@ async def attached(cell: Cell) -> HostConnection:
 
 
 @pytest.mark.slow
-async def test_a_whole_run_leaves_nothing(cell, run) -> None:
-    connection = await start_host(socket_path(cell), arguments(cell, run))
-    assert len(hosts_of(cell)) == 1
-    told = [one.event async for one in connection.messages() if isinstance(one, EventRecorded)]
-    assert told == list(read_journal(run.journal))
-    assert isinstance(told[-1], events.Ended)
-    await until(lambda: nothing_is_left(cell))
-
-
-@pytest.mark.slow
 async def test_a_computation_is_not_waited_for(cell, run) -> None:
     """The others are told, nothing is left, and the run is resumed where it was."""
     connection = await start_host(socket_path(cell), arguments(cell, run))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +13,6 @@ import pytest
 
 from hexacell.design.search_effort import SearchEffort
 from hexacell.kinematics.forward import continue_solution
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -138,33 +136,6 @@ def test_a_campaign_by_next_ends_with_all_points_measured(typed_here, short_cell
     fit = typed_here("fit", short_cell.cell, "--measurements", stranger.file, "--json")
     assert fit.code in {0, 1}
     assert fit.document["records"] == 14
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(600)
-def test_a_campaign_by_next_reaches_the_accuracy_of_a_run(typed, cell_folder, stranger, demo):
-    """Every call is a process of its own; the demo ran the same cell on its own devices."""
-    said = stranger.continue_solution(asking(typed, cell_folder, stranger.file))
-    assert len(said) == 56
-    assert stranger.farthest < TRAVEL_MM
-    fit = typed("fit", cell_folder.cell, "--measurements", stranger.file, "--json")
-    assert fit.code == 0
-    run = json.loads((demo.run / "result.json").read_text())
-    promised = [found["accuracy"]["after"]["position_largest_mm"] for found in (fit.document, run)]
-    assert promised[0] < 1.25 * promised[1]
-    truth, _ = Hexaglide().normalize_frames(stranger.truth)
-    # Without pilot poses some parameters are known less well, and by as much as is said.
-    assert max(_worst_error(found, truth) for found in (fit.document, run)) < 4.5
-
-
-def _worst_error(found: dict[str, Any], truth: Geometry) -> float:
-    """The largest error of a parameter, in its standard deviations."""
-    geometry, sigma = (
-        hexaglide_geometry(one["S"], one["B"], one["l"]).vector
-        for one in (found["geometry"], found["sigma"])
-    )
-    free = sigma > 0.0
-    return float(np.abs((geometry - truth.vector)[free] / sigma[free]).max())
 
 
 def test_a_file_that_is_empty_or_has_a_header_alone_starts_a_campaign(typed_here, cell_folder, tmp_path):

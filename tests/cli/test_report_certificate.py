@@ -23,39 +23,24 @@ authorised_by = "The head of the laboratory"
 """
 
 SEQUENCES = {
-    "digitalCalibrationCertificate": ["administrativeData", "measurementResults"],
-    "coreData": [
-        "countryCodeISO3166_1",
-        "usedLangCodeISO639_1",
-        "mandatoryLangCodeISO639_1",
-        "uniqueIdentifier",
-        "beginPerformanceDate",
-        "endPerformanceDate",
-        "performanceLocation",
-        "issueDate",
-    ],
-    "item": ["name", "description", "identifications"],
-    "identification": ["issuer", "value", "name"],
-    "software": ["name", "release"],
-    "respPerson": ["person", "mainSigner"],
-    "statement": ["name", "description", "norm", "declaration", "conformity"],
-    "measurementResult": [
-        "name",
-        "usedMethods",
-        "usedSoftware",
-        "measuringEquipments",
-        "influenceConditions",
-        "results",
-    ],
-    "usedMethod": ["name", "description", "norm", "norm"],
-    "measuringEquipment": ["name", "description", "identifications", "measuringEquipmentQuantities"],
-    "influenceCondition": ["name", "data"],
-    "result": ["name", "data"],
-    "quantity": ["name", "real"],
-    "real": ["value", "unit", "measurementUncertaintyUnivariate"],
-    "expandedMU": ["valueExpandedMU", "coverageFactor", "coverageProbability"],
-    "contact": ["name", "location"],
-    "customer": ["name", "location"],
+    "digitalCalibrationCertificate": "administrativeData measurementResults",
+    "coreData": "countryCodeISO3166_1 usedLangCodeISO639_1 mandatoryLangCodeISO639_1 uniqueIdentifier "
+    "beginPerformanceDate endPerformanceDate performanceLocation issueDate",
+    "item": "name description identifications",
+    "identification": "issuer value name",
+    "software": "name release",
+    "respPerson": "person mainSigner",
+    "statement": "name description norm declaration conformity",
+    "measurementResult": "name usedMethods usedSoftware measuringEquipments influenceConditions results",
+    "usedMethod": "name description norm norm",
+    "measuringEquipment": "name description identifications measuringEquipmentQuantities",
+    "influenceCondition": "name data",
+    "result": "name data",
+    "quantity": "name real",
+    "real": "value unit measurementUncertaintyUnivariate",
+    "expandedMU": "valueExpandedMU coverageFactor coverageProbability",
+    "contact": "name location",
+    "customer": "name location",
 }
 """The children of each, in this order; some may be absent."""
 
@@ -141,7 +126,7 @@ def test_children_stand_in_the_order_of_the_schema(certificate) -> None:
     root = ET.parse(certificate).getroot()
     checked = set()
     for element in root.iter():
-        order = list(SEQUENCES.get(local(element), ()))
+        order = SEQUENCES.get(local(element), "").split()
         if order:
             checked.add(local(element))
             for child in element:

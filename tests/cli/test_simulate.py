@@ -123,22 +123,6 @@ def names_below(folder: Path) -> set[str]:
     return {path.stem for path in folder.rglob("*")}
 
 
-@pytest.mark.slow
-def test_two_processes_cannot_move_one_robot(served, start, typed_here):
-    _, printed = served
-    first = start("run", printed)
-    first.wait_until(lambda: "journal" in names_below(printed.parent), "a journal")
-    runs = names_below(printed.parent / "runs")
-    for command in ("run", "preflight"):
-        outcome = typed_here(command, printed, "--json")
-        assert outcome.code == outcome.document["exit_code"] == 5
-        assert f"the cell is in use by process {first.popen.pid} of " in outcome.err
-    assert names_below(printed.parent / "runs") == runs
-    stopped = first.stopped(signal.SIGTERM)
-    assert stopped.code == 130
-    assert typed_here("preflight", printed).code == 0
-
-
 def test_faults_that_cannot_be_simulated_are_refused(cell_folder, typed_here):
     wrong = {
         "slow:x": "--fault slow:x is no fault that can be simulated. Write it like damaged:x@12",

@@ -34,17 +34,6 @@ def test_the_paper_is_repeated_and_what_is_known_is_not_computed_again(typed, tm
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1200)
-def test_results_do_not_depend_on_the_number_of_processes(typed, tmp_path: Path) -> None:
-    study = ("study", "experiment", "--draws", "1", "--json")
-    one = typed(*study, "--processes", "1", "--folder", "one")
-    three = typed(*study, "--processes", "3", "--folder", "three")
-    assert one.document == three.document
-    kept = [(tmp_path / folder / "experiment.jsonl").read_text() for folder in ("one", "three")]
-    assert sorted(kept[0].splitlines()) == sorted(kept[1].splitlines())
-
-
-@pytest.mark.slow
 def test_an_interrupted_study_goes_on_where_it_was(start, typed, tmp_path: Path) -> None:
     """Also after a power cut in the middle of a line."""
     process = start(*PAPER)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 from docs import draw, generated
 from hexacell.cell.loader import schema
 from hexacell.cli.parser import make_parser
@@ -38,20 +36,13 @@ def test_every_message_says_what_to_do():
     made = generated.messages((DOCS / "messages.md").read_text(encoding="utf-8"))
     assert [line for line in made.splitlines() if line.endswith("|  |")] == []
     assert len(generated.raised_messages()) > 400
-
-
-def test_messages_have_their_own_advice_and_gaps_for_what_differs():
-    made = generated.messages("")
-    assert "Free some space, then resume" in made
     assert "| the three gauges must measure x, y and z, one each | Correct their axis |" in made
 
 
-@pytest.mark.parametrize(
-    "page", ["commands.md", "cell-file.md", "messages.md", "journal.md", "device-faults.md"]
-)
-def test_each_page_gets_its_part(page):
-    text = (DOCS / page).read_text(encoding="utf-8")
-    assert len(generated.page_with_generated_parts(text)) > len(text) + 8000
+def test_each_page_gets_its_part():
+    for page in ("commands.md", "cell-file.md", "messages.md", "journal.md", "device-faults.md"):
+        text = (DOCS / page).read_text(encoding="utf-8")
+        assert len(generated.page_with_generated_parts(text)) > len(text) + 8000
 
 
 def test_the_drawing_is_the_one_that_is_made():

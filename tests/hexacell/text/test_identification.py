@@ -35,14 +35,11 @@ def fit(tmp_path, capsys):
     return run
 
 
-def test_the_report_has_its_parts_in_order_and_every_free_parameter(fit, clean):
+def test_the_report_has_every_free_parameter(fit, clean):
     text = fit(clean).out
     assert text.startswith(
         "Good: the records determine every parameter, and agree with the stated noise.\n"
     )
-    parts = ("Predicted error at 6 task poses", "drawing  identified", "Noise, mm")
-    places = [text.index(part) for part in parts]
-    assert places == sorted(places)
     lines = text.splitlines()
     named = [line.split()[0] for line in lines if line.endswith("sigma)")]
     fixed = {"S2x", "S2y", "S2z", "S3z"}

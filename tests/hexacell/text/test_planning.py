@@ -7,12 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.interfaces import DeviceIdentity
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.cell.bundled import bundled_config
 from hexacell.cli.app import main
 from hexacell.dry_run.campaign import DryRunResult
-from hexacell.dry_run.verdict_forecast import VerdictForecast
 from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.csv_file import write_measurements
@@ -20,15 +18,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import AveragingForecast
 from hexacell.services.offline import PlanTrial
 from hexacell.text.layout import duration
-from hexacell.text.planning import (
-    decision_text,
-    device_line,
-    forecast_text,
-    plan_trial_lines,
-    preflight_lines,
-    run_forecast_line,
-)
-from hexacell.verdict.decision import ErrorLimits, Verdict
+from hexacell.text.planning import decision_text, forecast_text, plan_trial_lines, run_forecast_line
 
 ZERO = (0.0,) * 6
 FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
@@ -97,13 +87,7 @@ def test_the_text_of_a_predicted_plan():
     assert second.startswith("Point 2: 6% of the robots within the tolerances cannot reach it")
 
 
-def test_the_verdicts_on_healthy_machines_and_the_part_of_the_encoders_are_told():
-    probabilities = dict.fromkeys(Verdict, 0.0) | {Verdict.PASS: 0.6, Verdict.CONDITIONAL_PASS: 0.4}
-    limits = ErrorLimits(0.15, 0.05)
-    verdicts = VerdictForecast(probabilities, limits, ErrorLimits(0.18, 0.02), "load at work", 0.05, 0.06)
-    told = lines(verdicts=verdicts)
-    assert told[1].startswith("A healthy machine of this cell passes with a probability of 60%")
-    assert "95% would pass position_mm = 0.18 in [acceptance]" in told[2]
+def test_the_part_of_the_encoders_is_told():
     forecasts = tuple(
         AveragingForecast(windows=windows, error_mm=0.2 / windows**0.5, minutes=0.5 * windows)
         for windows in (1, 2, 4)
@@ -123,16 +107,6 @@ def test_what_a_plan_may_miss_is_reported():
     assert "1 of 3 simulated robots could not be calibrated with this plan." in lines()
     assert lines(robots=0, drawn=6)[0].startswith("None of 6 robots drawn within the tolerances")
     assert "no accuracy is predicted" in lines(worst_sigma_mm=None)[0]
-
-
-def test_a_device_is_named_with_its_serial_number_and_a_preflight_names_every_device():
-    gauge = DeviceIdentity(name="x", protocol="sylvac", description="SY276")
-    encoder = DeviceIdentity(name="leg 1", protocol="cia406", description="linear", serial_number="1001")
-    assert device_line(gauge) == "x, sylvac: SY276"
-    assert device_line(encoder) == "leg 1, cia406, serial number 1001: linear"
-    *named, third, _ = preflight_lines([gauge, encoder])
-    assert named == [f"ok  {device_line(gauge)}", f"ok  {device_line(encoder)}"]
-    assert third.endswith("nothing was moved")
 
 
 @pytest.fixture

@@ -7,10 +7,8 @@ from datetime import UTC, datetime
 import pytest
 
 from hexacell.checks.check_result import CheckResult, ParameterChange, check_line
-from hexacell.results.result import AcceptedResult
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.verdict import (
-    check_start_text,
     check_text,
     not_checked,
     teaching_line,
@@ -73,12 +71,6 @@ def test_a_test_that_failed_is_told_in_the_place_of_agreement() -> None:
     assert "  Test 0." not in lines
 
 
-def test_a_check_says_what_it_starts_from() -> None:
-    accepted = AcceptedResult(run="runs/cell/first", at=WHEN, covariance=())
-    assert check_start_text(accepted) == "the check starts from the result of 2026-11-20, first"
-    assert check_start_text(None).endswith("the check starts from the drawing")
-
-
 @pytest.mark.parametrize(
     ("verdict", "change", "said"),
     [
@@ -100,26 +92,20 @@ def test_a_check_names_the_parameter_that_changed_most(
     assert lines[-1] == f"  {not_checked()}"
 
 
-@pytest.mark.parametrize(
-    ("verdict", "changes", "end"),
-    [
-        (Verdict.PASS, {}, "points; position error at the task poses 0.036 +- 0.040 mm (limit 0.15): pass"),
-        (Verdict.NOT_EVALUATED, {"further_records": 12}, "(about 12 more records would decide)"),
-        (Verdict.NOT_EVALUATED, {}, "(further records would not decide)"),
+def test_the_line_of_a_check_has_its_figures_or_why_it_decides_nothing() -> None:
+    open_ = Verdict.NOT_EVALUATED
+    for line, end in (
+        (check_line(result(Verdict.PASS)), "error at the task poses 0.036 +- 0.040 mm (limit 0.15): pass"),
+        (check_line(result(open_, further_records=12)), "(about 12 more records would decide)"),
+        (check_line(result(open_)), "(further records would not decide)"),
         (
-            Verdict.NOT_EVALUATED,
-            {"is_consistent": False},
+            check_line(result(open_, is_consistent=False)),
             "(the residuals are larger than the stated noise explains)",
         ),
-        (Verdict.NOT_EVALUATED, {"accuracy": None}, "(the robot can take none of the task poses)"),
-    ],
-)
-def test_the_line_of_a_check_has_its_figures_or_why_it_decides_nothing(
-    verdict: Verdict, changes: dict[str, object], end: str
-) -> None:
-    line = check_line(result(verdict, **changes))
-    assert line.startswith("check: ")
-    assert line.endswith(end)
+        (check_line(result(open_, accuracy=None)), "(the robot can take none of the task poses)"),
+    ):
+        assert line.startswith("check: ")
+        assert line.endswith(end)
 
 
 @pytest.mark.parametrize(

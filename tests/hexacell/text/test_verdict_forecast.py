@@ -15,13 +15,6 @@ def forecast(passed: float, part: str = NOISE, *, position: float = 0.2, orienta
     return VerdictForecast(probabilities, ErrorLimits(0.15, 0.05), passing, part, 0.064, 0.072)
 
 
-def test_limits_that_good_machines_pass_take_one_line() -> None:
-    (line,) = verdict_forecast_lines(forecast(0.97))
-    assert line == "A healthy machine of this cell passes with a probability of 97% (conditional pass 3%)."
-    (sure,) = verdict_forecast_lines(forecast(0.997))
-    assert sure == "A healthy machine of this cell passes with a probability of 99.7%."
-
-
 def test_limits_that_good_machines_fail_are_warned_of_with_what_would_do() -> None:
     first, warning = verdict_forecast_lines(forecast(0.62, "scale of each encoder", position=0.2031))
     assert "probability of 62% (conditional pass 38%)" in first
@@ -31,11 +24,6 @@ def test_limits_that_good_machines_fail_are_warned_of_with_what_would_do() -> No
         "encoder (0.064 of 0.072 mm): have it calibrated, or measure it, and state its size in "
         "[uncertainty]."
     )
-
-
-def test_against_noise_more_records_help() -> None:
-    _, warning = verdict_forecast_lines(forecast(0.5))
-    assert "noise of the readings (0.064 of 0.072 mm): more records, or means of more readings" in warning
 
 
 def test_only_limits_that_are_too_small_are_named() -> None:

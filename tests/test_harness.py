@@ -55,48 +55,6 @@ THREADS_END = """
         END.set()
 """
 
-CLEAN = """
-    def test_thread_on_its_way_out():
-        threading.Thread(target=time.sleep, args=(0.05,)).start()
-
-    async def test_cancelled_task():
-        asyncio.create_task(asyncio.Event().wait()).cancel()
-
-    async def test_work_in_a_thread():
-        await asyncio.to_thread(time.sleep, 0)
-
-    async def test_child_process():
-        await (await asyncio.create_subprocess_exec("true")).wait()
-
-    @pytest.fixture(scope="module")
-    def shared_line():
-        with socket.socket() as line:
-            yield line
-
-    def test_what_belongs_to_the_module(shared_line, capfd, tmp_path):
-        pass
-
-    @given(st.integers())
-    async def test_generated(number):
-        await asyncio.sleep(0)
-"""
-
-MARKED = """
-    @pytest.mark.sample("a-*", "b-2")
-    @pytest.mark.parametrize("number", [1, 2])
-    @pytest.mark.parametrize("letter", ["a", "b"])
-    def test_of_which_some_are_slow(letter, number, request):
-        is_slow = request.node.get_closest_marker("slow") is not None
-        assert is_slow == (letter == "b" and number == 1)
-
-    def test_profile():
-        assert settings.default.derandomize
-
-    @pytest.mark.timeout(0.2)
-    def test_hangs():
-        time.sleep(9)
-"""
-
 HEADER = """
     import asyncio, os, pty, signal, socket, threading, time, warnings
     import pytest
@@ -121,7 +79,7 @@ def run(suite: pytest.Pytester, *sources: str) -> pytest.RunResult:
     """Run tests of these sources in a process of its own, so that what they leave dies with it."""
     text = "\n".join(dedent(source) for source in (HEADER, *sources))
     (suite.path / "tests" / "test_inner.py").write_text(text)
-    return suite.runpytest_subprocess("tests", "-v")
+    return suite.runpytest_subprocess("tests")
 
 
 def test_a_leak_fails_its_test_and_no_other(suite: pytest.Pytester) -> None:
@@ -134,23 +92,3 @@ def test_a_leak_fails_its_test_and_no_other(suite: pytest.Pytester) -> None:
     errors = sum(line.startswith("ERROR") for line in LEAKS)
     failed = len(LEAKS) - errors
     result.assert_outcomes(passed=len(LEAKS) + errors + 1, errors=errors, failed=failed)
-
-
-def test_tests_that_clean_up_pass(suite: pytest.Pytester) -> None:
-    run(suite, CLEAN).assert_outcomes(passed=CLEAN.count("def test_"))
-
-
-def test_what_is_marked_is_slow_a_benchmark_or_ended(
-    suite: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("CI", "true")
-    suite.mkdir("tests/benchmarks")
-    speed = "def test_speed(request): assert request.node.get_closest_marker('benchmark')"
-    (suite.path / "tests/benchmarks/test_speed.py").write_text(speed)
-    result = run(suite, MARKED)
-    result.assert_outcomes(passed=6, failed=1)
-    result.stdout.fnmatch_lines(["FAILED *::test_hangs - *Timeout*"])
-    refused = run(suite, MARKED.replace("a-*", "c-*"))
-    refused.stderr.fnmatch_lines(
-        ["*these samples name no parameters of their tests: *test_of_which*, 'c-?'*"]
-    )

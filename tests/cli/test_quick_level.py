@@ -49,12 +49,8 @@ def test_from_a_calibration_on(typed_here, cell_folder) -> None:
     assert "quick" in typed_here("history", cell_folder.cell).out
     compared = typed_here("history", cell_folder.cell, "--compare", first["run"], latest["run"])
     assert compared.code == 2  # the one result contains the other
-    trends = typed_here("history", cell_folder.cell, "--drift", "--json").document
-    assert len(trends["runs"]) == 2
-    assert {len(one["values"]) for one in trends["parameters"]} <= {1}
-    assert (
-        typed_here("status", cell_folder.cell, "--json").document["cells"][0]["in_force"] == latest["run"]
-    )
+    [status] = typed_here("status", cell_folder.cell, "--json").document["cells"]
+    assert status["in_force"] == latest["run"]
     assert typed_here("replay", latest["run"], "--only", "identification").code == 0
 
     assert typed_here("report", latest["run"]).code == 0

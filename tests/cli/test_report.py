@@ -5,7 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections.abc import Callable
 from html import unescape
+from pathlib import Path
+from typing import Any
 
 from procedures.journal.journal import encode, read_entries
 from procedures.steps import events
@@ -79,13 +82,18 @@ def test_two_runs_are_compared(typed_here, demo, run, tmp_path) -> None:
     assert "The noise of both runs explains all changes together." in said
 
 
-def test_a_run_of_the_quick_level_is_not_compared(typed_here, demo, run) -> None:
-    """Its geometry has the errors of the result that it started from."""
+def forge(run: Path, change: Callable[[dict[str, Any]], None]) -> None:
+    """Change the event with which the run began; its checksum is right."""
     first, *others = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
     record = json.loads(first)
-    record["event"]["mode"] = "quick"
+    change(record["event"])
     del record["crc"]
     (run / "journal.jsonl").write_bytes(with_checksum(record) + b"".join(others))
+
+
+def test_a_run_of_the_quick_level_is_not_compared(typed_here, demo, run) -> None:
+    """Its geometry has the errors of the result that it started from."""
+    forge(run, lambda started: started.update(mode="quick"))
     outcome = typed_here("report", run, "--compare", demo.run)
     assert (outcome.code, "identified no geometry of its own" in outcome.err) == (2, True)
 
@@ -136,12 +144,8 @@ def test_a_damaged_result_is_told(typed_here, run) -> None:
 
 
 def test_a_forged_journal_is_told(typed_here, run) -> None:
-    """Its checksums are right, and its geometry is that of no robot."""
-    first, *others = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
-    record = json.loads(first)
-    record["event"]["controller"]["B"] = [[1.0], [2.0, 3.0]]
-    del record["crc"]
-    (run / "journal.jsonl").write_bytes(with_checksum(record) + b"".join(others))
+    """Its geometry is that of no robot."""
+    forge(run, lambda started: started["controller"].update(B=[[1.0], [2.0, 3.0]]))
     outcome = typed_here("report", run)
     assert outcome.code == 2
     said = " ".join(outcome.err.split())

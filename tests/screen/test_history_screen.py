@@ -176,26 +176,6 @@ async def test_a_run_that_is_looked_at_again_is_approved_from_its_review(
         assert "can still be written" not in shown(pilot)
 
 
-async def test_a_grave_change_needs_the_name_of_the_cell(cell: Cell) -> None:
-    grave = AcceptanceGate(
-        name="within tolerance",
-        passed=False,
-        sentence="It is 20 mm.",
-        needs_person=True,
-        needs_cell_name=True,
-    )
-    left = propose_run(cell, "2026-11-22T100000Z", gates=(grave,), verdict=None)
-    name = ["minus" if letter == "-" else letter for letter in cell.settings.name]
-    async with opened_history(cell) as pilot:
-        await pilot.press("w")
-        await until_asked(pilot)
-        await press(pilot, "y", "enter")
-        assert isinstance(pilot.app.screen, ConfirmOverlay)
-        assert cell.config_path.read_bytes() == left.before
-        await press(pilot, "backspace", *name, "enter")
-        await until(lambda: cell.config_path.read_bytes() == left.after)
-
-
 async def test_what_a_gate_refuses_cannot_be_written(cell: Cell) -> None:
     gate = AcceptanceGate(name="converged", passed=False, sentence="The solver ended badly.")
     left = propose_run(cell, "2026-11-22T100000Z", gates=(gate,), verdict=None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import string
-from pathlib import Path
 
 import pytest
 from textual.events import Paste
@@ -11,14 +10,12 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 
 from hexacell.cell.loader import Cell
-from hexacell.screen.app import TechnicianApp
-from hexacell.screen.further_screens import AssistantScreen
 from hexacell.screen.overlays import QuestionOverlay, QuitOverlay
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.run.questions import ask_approval
 from procedures.steps import events
 from tests.screen.conftest import Opened, settled
-from tests.screen.test_job import press, shown, until_shown, workplace_of
+from tests.screen.test_job import press, until_shown, workplace_of
 from tests.screen.test_plan_screen import tried
 from tests.screen.test_snapshots import idle
 from tests.screen.told_run import ToldRun
@@ -79,20 +76,6 @@ async def test_what_is_pasted_into_a_name_is_no_consent(
         field.post_message(Paste(f"{cell.settings.name}\n"))
         await press(pilot, "enter")
         await until(lambda: len(run.given) == 1)
-
-
-async def test_what_is_pasted_into_the_assistant_is_refused_with_a_reason(tmp_path: Path) -> None:
-    path = tmp_path / "cell.toml"
-    app = TechnicianApp(lambda: pytest.fail("there is no cell"), first_cell=path)
-    async with app.run_test(size=(80, 24)) as pilot:
-        await until(lambda: isinstance(app.screen, AssistantScreen))
-        await until_shown(pilot, "Question 1 of")
-        app.screen.query_one(Input).post_message(Paste("x" * 5000))
-        await pilot.press("enter")
-        await until_shown(pilot, "must be text of 64 letters or fewer")
-        for size in SIZES:
-            await pilot.resize_terminal(*size)
-        assert "Question 1 of" in shown(pilot)
 
 
 async def test_each_way_to_quit_asks_about_the_run(

@@ -88,11 +88,12 @@ async def test_from_mounting_to_approval(
         await until_shown(pilot, "ok, 0.1 mm from mid travel")
         await press(pilot, "escape", "1")  # a question may wait while one looks at the screens
         assert not isinstance(pilot.app.screen, QuestionOverlay)
-        await press(pilot, "w")
-        await press(pilot, "enter")
+        await press(pilot, "w", "enter")
         assert run.given == [Answer(PLACED)]
 
         run.close_question()
+        await until(lambda: not isinstance(pilot.app.screen, QuestionOverlay))
+        await press(pilot, "3")
         run.record(history[PLACED_AT:IDENTIFIED])
         await until_shown(pilot, "5/11")
         run.record(history[IDENTIFIED:PROPOSED])

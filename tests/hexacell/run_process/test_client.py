@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
-
-import pytest
 
 from hexacell.run_process.client import HostConnection
 from hexacell.run_process.messages import (
@@ -22,40 +19,28 @@ SOME_TURNS = 20
 """Turns of the loop in which a client that does not wait would be gone."""
 
 
-class SlowHost:
-    """It reads what a client says, and hangs up when told to."""
-
-    def __init__(self) -> None:
-        self.heard: asyncio.Queue[ClientMessage] = asyncio.Queue()
-        self.may_hang_up = asyncio.Event()
-
-    async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self.heard.put_nowait(client_message(await reader.readline()))
-        await self.may_hang_up.wait()
-        writer.write(message_line(StatusChanged(status=Status.RUNNING)))  # it was on its way
-        writer.close()
-
-
 async def everything(connection: HostConnection) -> list[HostMessage]:
     return [message async for message in connection.messages()]
 
 
-@pytest.fixture
-async def host(tmp_path) -> AsyncIterator[tuple[SlowHost, HostConnection]]:
-    slow = SlowHost()
-    async with await asyncio.start_unix_server(slow.serve, str(tmp_path / "s")):
-        reader, writer = await asyncio.open_unix_connection(str(tmp_path / "s"))
-        yield slow, HostConnection(reader, writer)
+async def test_a_client_stays_until_the_run_has_heard_that_it_is_to_go_on(tmp_path) -> None:
+    heard: asyncio.Queue[ClientMessage] = asyncio.Queue()
+    may_hang_up = asyncio.Event()
 
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        heard.put_nowait(client_message(await reader.readline()))
+        await may_hang_up.wait()
+        writer.write(message_line(StatusChanged(status=Status.RUNNING)))  # it was on its way
+        writer.close()
 
-async def test_a_client_stays_until_the_run_has_heard_that_it_is_to_go_on(host) -> None:
-    slow, connection = host
-    told = asyncio.ensure_future(everything(connection))
-    leaving = asyncio.ensure_future(connection.leave(keep_running=True))
-    assert await slow.heard.get() == Leave(keep_running=True)
-    for _ in range(SOME_TURNS):
-        await asyncio.sleep(0)
-    assert not leaving.done()
-    slow.may_hang_up.set()
-    await leaving
-    assert await told == [], "who has left is told nothing more"
+    async with await asyncio.start_unix_server(serve, str(tmp_path / "s")):
+        connection = HostConnection(*await asyncio.open_unix_connection(str(tmp_path / "s")))
+        told = asyncio.ensure_future(everything(connection))
+        leaving = asyncio.ensure_future(connection.leave(keep_running=True))
+        assert await heard.get() == Leave(keep_running=True)
+        for _ in range(SOME_TURNS):
+            await asyncio.sleep(0)
+        assert not leaving.done()
+        may_hang_up.set()
+        await leaving
+        assert await told == [], "who has left is told nothing more"

@@ -29,7 +29,7 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.services.run.calibration_run import RunRequest
 from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
-from procedures.engine.commands import Answer, CommandQueue, Pause, Resume
+from procedures.engine.commands import Answer, CommandQueue, Resume
 from procedures.journal.journal import read_entries, read_journal
 from procedures.run.questions import QuestionKind
 from procedures.steps import events
@@ -231,20 +231,6 @@ async def test_where_nobody_comes_back_it_ends_and_is_resumed(hosted) -> None:
             lambda one: told_of(events.RecordTaken)(one) and len(history_told(client)) > len(before)
         )
         assert history_told(client)[: len(before)] == list(before)
-        await client.connection.leave(keep_running=False)
-
-
-async def test_a_pause_is_not_ended_while_somebody_is_there(hosted) -> None:
-    async with hosted(away_s=0.0) as run:
-        client = await run.client()
-        await place(client)
-        await client.until(told_of(events.RecordTaken))
-        await client.connection.give(Pause())
-        await client.until(is_status(Status.PAUSED))
-        for _ in range(100):
-            await asyncio.sleep(0)
-        await client.connection.give(Resume())
-        await client.until(told_of(events.Resumed))
         await client.connection.leave(keep_running=False)
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
-import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from functools import partial
@@ -112,23 +110,17 @@ def test_a_scheduler_that_goes_away_is_named_and_what_was_done_is_told(cluster, 
     assert all(done[key] == int(key) ** 2 for key in done)
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [pytest.param({}, marks=pytest.mark.slow), GIVEN_UP_AT_ONCE],
-    ids=["nothing is told", "tasks are lost"],
-)
-def test_workers_that_all_leave_are_missed(tmp_path: Path, settings: dict[str, str]) -> None:
-    with dask_processes(tmp_path, 2, **settings) as cluster:
-        started = results_of({"3": 3}, square, dask_cluster(cluster.address, patience_s=LATE_S))
-        assert dict(started) == {"3": 9}
-        carry_out = partial(square_until_held, folder=tmp_path)
-        found = results_of(SQUARES, carry_out, dask_cluster(cluster.address, patience_s=SOON_S))
-        next(found)
-        wait_until((tmp_path / "held").exists)
-        for worker in cluster.workers:
-            worker.kill()
-        with pytest.raises(ClusterError, match=NO_WORKERS.format(cluster.address)):
-            list(found)
+def test_workers_that_all_leave_are_missed(cluster, tmp_path: Path) -> None:
+    started = results_of({"3": 3}, square, dask_cluster(cluster.address, patience_s=LATE_S))
+    assert dict(started) == {"3": 9}
+    carry_out = partial(square_until_held, folder=tmp_path)
+    found = results_of(SQUARES, carry_out, dask_cluster(cluster.address, patience_s=SOON_S))
+    next(found)
+    wait_until((tmp_path / "held").exists)
+    for worker in cluster.workers:
+        worker.kill()
+    with pytest.raises(ClusterError, match=NO_WORKERS.format(cluster.address)):
+        list(found)
 
 
 def test_a_study_that_is_given_up_waits_for_no_task(shared, tmp_path: Path) -> None:
@@ -142,21 +134,6 @@ def test_a_study_that_is_given_up_waits_for_no_task(shared, tmp_path: Path) -> N
     wait_until((tmp_path / "held").exists)
     found.close()  # type: ignore[attr-defined]
     (tmp_path / "go").touch()
-
-
-def test_something_else_at_the_address() -> None:
-    def speak() -> None:
-        connection, _ = server.accept()
-        with connection:
-            connection.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
-
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        address = "tcp://{}:{}".format(*server.getsockname())
-        speaker = threading.Thread(target=speak)
-        speaker.start()
-        with pytest.raises(ClusterError, match=NO_SCHEDULER.format(address)):
-            dask_cluster(address, patience_s=SOON_S)()
-        speaker.join()
 
 
 @pytest.mark.parametrize(

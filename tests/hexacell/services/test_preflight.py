@@ -71,15 +71,6 @@ async def test_every_failure_is_reported_at_once(make_site) -> None:
     assert site.simulated.machine.joints() == before
 
 
-async def test_a_run_begins_with_the_same_checks_and_leaves_no_folder(make_site) -> None:
-    good = (100.0, -100.0, 500.0)
-    site = make_site(verification__points=(FAR, good), **HASTY)
-    site.simulated.gauges.indicators["y"].inch = True
-    with pytest.raises(SeveralErrors, match=r"(?s)verification point 1.*gauge y: answers in inch"):
-        await site.calibrate()
-    assert not site.folder.path.exists()
-
-
 async def test_a_stop_during_the_checks_of_the_plan_leaves_nothing(make_site, monkeypatch) -> None:
     site = make_site()
     loop = asyncio.get_running_loop()
@@ -96,21 +87,3 @@ async def test_a_stop_during_the_checks_of_the_plan_leaves_nothing(make_site, mo
     assert not site.simulated.controller.state.enabled, "not even switched on"
     with cell_lock(site.cell.config_path):
         pass
-
-
-async def test_devices_that_open_but_cannot_be_read_are_reported(make_site, monkeypatch) -> None:
-    site = make_site(verification__points=(FAR, (100.0, -100.0, 500.0)), **HASTY)
-    site.simulated.faults.inject("silent", "encoder 2")
-    with pytest.raises(SeveralErrors) as refusal:
-        await check(site)
-    kinds = [type(error) for error in refusal.value.errors]
-    assert kinds[0] is ReachError
-    assert len(kinds) == 2
-    assert issubclass(kinds[1], DeviceError)
-
-
-async def test_a_single_failure_is_raised_as_it_is(make_site) -> None:
-    site = make_site(stations__placement="by-hand")
-    with pytest.raises(AnswerNeeded):
-        await check(site)
-    assert len(await check(site, unattended=False)) == 10

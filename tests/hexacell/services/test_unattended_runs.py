@@ -151,7 +151,7 @@ async def test_it_ends_at_its_reference_and_can_be_resumed(make_site, finished) 
     state = fold(read_journal(site.folder.journal))
     assert state.at_pose is None or state.at_pose[1] == 1
     assert site.happened(events.Arrived)[-1].orientation == 1
-    [interrupted] = site.happened(events.Interrupted)
+    interrupted = site.happened(events.Interrupted)[-1]
     assert interrupted.exit_code == ExitCode.OUT_OF_TIME
     assert site.config == before
     ended = await site.calibrate(resume=True)

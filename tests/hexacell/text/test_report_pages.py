@@ -96,10 +96,3 @@ def test_without_typst_the_way_to_it_is_told(monkeypatch) -> None:
     with pytest.raises(UsageError, match="a PDF needs the package typst") as refusal:
         pdf_of(report("x"))
     assert "hexacell[pdf]" in (refusal.value.action or "")
-
-
-def test_the_column_with_most_text_gets_the_room() -> None:
-    rows = (("x", "CDI or Starrett indicator, with RS-232", "17", ""), ("y", "", "18", ""))
-    table = Table(("Instrument", "kind", "serial number", "due"), rows, None)
-    page = Report("", "", date(2026, 11, 23), "", Tone.OPEN, (Chapter("", (table,)),))
-    assert "#table(columns: (auto, 1fr, auto, auto)" in typst_of(page)

@@ -155,7 +155,7 @@ def test_what_cannot_be_certified_is_not(typed_here, demo, certified, tmp_path) 
     def refused(run, *more) -> str:
         outcome = typed_here("report", run, "--output", tmp_path / "x.xml", *more)
         assert (outcome.code, (tmp_path / "x.xml").exists()) == (2, False)
-        return outcome.err
+        return str(outcome.err)
 
     assert "needs serial_number, laboratory, country, customer, authorised_by" in refused(demo.run)
     assert "a certificate compares nothing" in refused(certified, "--compare", demo.run)

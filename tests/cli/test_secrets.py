@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.cell_folder import ASK
+
 CLEAR = ("[controller]\n", '[controller]\nconnect_password = "hunter2"\nenable_password = "hunter3"\n')
 
 

@@ -142,7 +142,7 @@ async def test_questions_to_place_gauges_are_told(tmp_path) -> None:
 @pytest.mark.parametrize("restarted", [False, True])
 async def test_it_advances_by_itself_as_fast_as_wanted(tmp_path, restarted: bool) -> None:
     clock = ManualClock()
-    run = RecordedRun(recorded(tmp_path, 0.0, 10.0, 30.0, 86_400.0, restarted=restarted), 1, clock)
+    run = RecordedRun(recorded(tmp_path, 0.0, 10.0, 30.0, 900.0, restarted=restarted), 1, clock)
     messages = run.messages()
     await told(messages)
     run.set_speed(4.0)
@@ -152,7 +152,7 @@ async def test_it_advances_by_itself_as_fast_as_wanted(tmp_path, restarted: bool
     assert history(await told(messages)) == [HISTORY[2]]
     assert clock.time_s == 7.5
     await told(messages)
-    assert clock.time_s == 7.5 + LONGEST_WAIT_S, "a long interruption is not waited for"
+    assert clock.time_s == 7.5 + LONGEST_WAIT_S / 4.0, "a long interruption is not waited for"
     run.set_speed(0.0)
     assert cursor(await told(messages)).speed == 0.0
 

@@ -77,8 +77,8 @@ def test_what_may_pass_is_tried_again_while_its_window_is_open(refused) -> None:
     assert [refused(minutes=minutes) for minutes in (0, 40, 41)] == [1200.0, 1200.0, None]
     for error in (UNPLUGGED, CellBusy("in use"), OutOfTime("quiet hours")):
         assert refused(error) is not None
-    for error in (UsageError("no accepted result"), FileError("cannot be read")):
-        assert refused(error) is None
+    for mistake in (UsageError("no accepted result"), FileError("cannot be read")):
+        assert refused(mistake) is None
 
 
 def test_a_disk_that_takes_no_note_changes_nothing_else(refused, monkeypatch) -> None:

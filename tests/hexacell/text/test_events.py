@@ -57,7 +57,7 @@ def test_a_set_with_fewer_records_than_planned_says_why():
 
 
 def test_every_step_without_motion_says_what_it_does():
-    steps = [step for step in STEPS if issubclass(step, StepWithoutMotion)]
+    steps: list[Any] = [step for step in STEPS if issubclass(step, StepWithoutMotion)]
     assert steps
     assert all(activity(events.StepBegun(step=step())) for step in steps)
 

@@ -39,6 +39,23 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "hexacell", *map(str, arguments)]
 
 
+WITH_LITTLE_EFFORT = """
+import sys
+from hexacell.__main__ import main
+from hexacell.design.search_effort import SearchEffort
+from hexacell.services import search_effort
+search_effort.EFFORT = SearchEffort(
+    candidates=64, held_out_candidates=128, checked_candidates=8, checked_robots=4
+)
+sys.exit(main())
+"""
+"""A run whose poses are chosen among few; which are chosen is not under test."""
+
+
+def run_of_little_effort(*arguments: object) -> list[str]:
+    return [sys.executable, "-c", WITH_LITTLE_EFFORT, *map(str, arguments)]
+
+
 def surroundings(temporary: Path) -> dict[str, str]:
     """An environment with a folder of its own for temporary files, and help of the usual width."""
     temporary.mkdir()
@@ -107,40 +124,28 @@ Start = Callable[..., Process]
 
 @contextmanager
 def started_in(folder: Path) -> Iterator[Start]:
-    with_folder = Processes(folder)
-    try:
-        yield with_folder.start
-    finally:
-        with_folder.end()
+    """Starts commands in a folder, ``through`` a shell's script if there is one; kills them in the end."""
+    processes: list[Process] = []
 
-
-class Processes:
-    """Running commands in one folder."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._processes: list[Process] = []
-
-    def start(self, *arguments: object, through: str | None = None, **streams: int) -> Process:
-        """Start a command, ``through`` a shell's script if there is one."""
-        out, err, temporary = (
-            self._folder / f"{name}-{len(self._processes)}" for name in ("out", "err", "temporary")
-        )
+    def start(*arguments: object, through: str | None = None, **streams: int) -> Process:
+        out, err, temporary = (folder / f"{name}-{len(processes)}" for name in ("out", "err", "temporary"))
         with out.open("w") as to_out, err.open("w") as to_err, terminal_signals():
+            words = run_of_little_effort if arguments[0] == "run" else command
             popen = subprocess.Popen(
-                [*(["sh", "-c", through, "sh"] if through else []), *command(*arguments)],
-                cwd=self._folder,
+                [*(["sh", "-c", through, "sh"] if through else []), *words(*arguments)],
+                cwd=folder,
                 env=surroundings(temporary),
                 stdin=streams.get("stdin", subprocess.DEVNULL),
                 stdout=streams.get("stdout", to_out),
                 stderr=streams.get("stderr", to_err),
                 text=True,
             )
-        process = Process(popen, out, err, temporary)
-        self._processes.append(process)
-        return process
+        processes.append(Process(popen, out, err, temporary))
+        return processes[-1]
 
-    def end(self) -> None:
-        for process in self._processes:
+    try:
+        yield start
+    finally:
+        for process in processes:
             process.popen.kill()
             process.popen.wait()

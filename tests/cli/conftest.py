@@ -6,12 +6,12 @@ import os
 import pty
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 
+from drivers.simulated.robot import SimulatedMachine
 from hexacell.cli.app import main
 from hexacell.runs.archive import INDEX
 from hexacell.services import search_effort
@@ -90,14 +90,27 @@ def start(tmp_path: Path) -> Iterator[Start]:
 
 
 @pytest.fixture(scope="session")
-def processes() -> Callable[[Path], AbstractContextManager[Start]]:
-    """The same for any folder and scope; the folder gets a fresh short cell."""
+def served_cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The cell file that ``simulate`` prints of a short cell, which it serves in another process."""
+    folder = tmp_path_factory.mktemp("served")
+    cell = copy_cell(folder)
+    cell.edit(*SHORT)
+    with started_in(folder) as start:
+        process = start("simulate", cell.cell)
+        process.wait_for("serving", lambda: process.err)
+        served = folder / "served.toml"
+        served.write_text(process.out)
+        yield served
 
-    def with_cell(folder: Path) -> AbstractContextManager[Start]:
-        copy_cell(folder).edit(*SHORT)
-        return started_in(folder)
 
-    return with_cell
+@pytest.fixture
+def never_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails a test whose robot moves."""
+
+    def move(_machine: SimulatedMachine, pose: object) -> None:
+        pytest.fail(f"the robot was sent to {pose}")
+
+    monkeypatch.setattr(SimulatedMachine, "move", move)
 
 
 @dataclass(frozen=True)

@@ -33,22 +33,10 @@ NOBODY = "127.0.0.1:1"
 """A port where no server listens."""
 
 
-@pytest.fixture(scope="module")
-def served(tmp_path_factory, processes):
-    """A cell that another process serves: its folder, and the cell file that reaches it."""
-    folder = tmp_path_factory.mktemp("served")
-    with processes(folder) as start:
-        process = start("simulate", folder / CELL)
-        process.wait_for("serving", lambda: process.err)
-        cell = folder / "served.toml"
-        cell.write_text(process.out)
-        yield cell
-
-
 @pytest.fixture
-def addresses(served: Path):
+def addresses(served_cell: Path):
     """Where its devices are: the gauges' ports, the CAN adapter, and the controller."""
-    settings = tomllib.loads(served.read_text())
+    settings = tomllib.loads(served_cell.read_text())
     controller = settings["controller"]
     return (
         [gauge["port"] for gauge in settings["gauges"]],
@@ -97,7 +85,9 @@ def test_a_machine_without_devices_is_told_what_to_plug_in(typed_here) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("patient")
-def test_every_protocol_is_found_and_the_text_is_that_of_a_cell_file(typed_here, served, addresses) -> None:
+def test_every_protocol_is_found_and_the_text_is_that_of_a_cell_file(
+    typed_here, served_cell, addresses
+) -> None:
     gauges, adapter, controller = addresses
     outcome = typed_here("devices", *gauges, adapter, "--controller", controller, "--json")
     assert outcome.code == 0, outcome.err
@@ -109,7 +99,7 @@ def test_every_protocol_is_found_and_the_text_is_that_of_a_cell_file(typed_here,
         assert text in words
 
     told = tomllib.loads(found["cell"])
-    real = tomllib.loads(served.read_text())
+    real = tomllib.loads(served_cell.read_text())
     assert [gauge["port"] for gauge in told["gauges"]] == gauges
     assert [gauge["resolution_mm"] for gauge in told["gauges"]] == [0.001, 0.001, 0.0001]
     assert told["encoders"]["nodes"] == real["encoders"]["nodes"]
@@ -233,8 +223,10 @@ def test_what_cannot_be_is_refused(
 
 
 @pytest.mark.parametrize(("device", "rows"), [("x", 1), ("encoders", 6)])
-def test_one_device_is_watched(typed_here, served, device, rows) -> None:
-    outcome = typed_here("devices", "--diagnose", device, "--cell", served, "--seconds", "0.3", "--json")
+def test_one_device_is_watched(typed_here, served_cell, device, rows) -> None:
+    outcome = typed_here(
+        "devices", "--diagnose", device, "--cell", served_cell, "--seconds", "0.3", "--json"
+    )
     assert outcome.code == 0, outcome.err
     found = outcome.document
     assert found["readings"] > 0

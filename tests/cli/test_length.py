@@ -50,21 +50,6 @@ def test_a_run_and_the_command_find_the_same_scale_and_the_command_changes_nothi
     assert replayed.code == 0, replayed.out
 
 
-@pytest.mark.slow
-def test_a_check_afterwards_counts_with_the_scale_that_was_found(typed_here, calibrated) -> None:
-    """Its own records would show an error of some hundredths."""
-    cell, outcome = calibrated
-    found = outcome.document["verification"]["accuracy"]["length"]
-    checked = typed_here("run", cell.cell, "--unattended", "--mode", "check", "--json")
-    assert checked.code == 0, checked.err
-    accuracy = checked.document["check"]["accuracy"]
-    assert accuracy["length"] == found
-    assert accuracy["position"]["value"] > 0.1
-    assert f"length scale: as checked in that run: encoders read {found['long_um_m']:.0f}" in checked.err
-    *_, last = cell.runs()
-    assert typed_here("replay", last).code == 0
-
-
 NOTE = "not-begun.json"
 """What a run without a person leaves that did not begin: why, and nothing else."""
 

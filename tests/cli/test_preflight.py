@@ -8,12 +8,12 @@ import re
 import socket
 import tty
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, Self
 
 import pytest
 
 from drivers.simulated.cell import SimulatedCell
-from drivers.simulated.robot import SimulatedMachine
 from tests.drivers.simulated.encoders import faults
 
 COMMANDS = ["preflight", "run"]
@@ -22,35 +22,16 @@ pytestmark = pytest.mark.usefixtures("few_candidates")
 
 
 @pytest.fixture
-def never_moves(monkeypatch: pytest.MonkeyPatch) -> None:
-    def move(_machine: SimulatedMachine, pose: object) -> None:
-        pytest.fail(f"the robot was sent to {pose}")
-
-    monkeypatch.setattr(SimulatedMachine, "move", move)
-
-
-@pytest.fixture
 def cell_folder(short_cell: Any) -> Any:
     """A short cell: its failures are those of a cell with many points."""
     return short_cell
 
 
-@pytest.fixture(scope="module")
-def serving(tmp_path_factory: pytest.TempPathFactory, processes: Any) -> Iterator[str]:
-    """The cell file of a cell that ``simulate`` serves in another process."""
-    folder = tmp_path_factory.mktemp("serving")
-    with processes(folder) as start:
-        process = start("simulate", folder / "simulated-hexaglide.toml", "--output", folder / "served.toml")
-        process.wait_for("serving", lambda: process.err)
-        yield (folder / "served.toml").read_text()
-
-
 @pytest.fixture
-def served(serving: str, cell_folder: Any) -> Any:
-    """A folder whose cell file reaches the served cell; tests break it."""
-    cell_folder.cell.write_text(
-        re.sub(r"(?m)^config = .*$", f'config = "{cell_folder.controller.name}"', serving)
-    )
+def served(served_cell: Path, cell_folder: Any) -> Any:
+    """A folder whose cell file reaches a served cell; tests break it."""
+    config = f'config = "{cell_folder.controller.name}"'
+    cell_folder.cell.write_text(re.sub(r"(?m)^config = .*$", config, served_cell.read_text()))
     return cell_folder
 
 

@@ -8,18 +8,10 @@ from typing import Any
 
 import pytest
 
-from drivers.simulated.robot import SimulatedMachine
-
 P5 = "[-100.0, 100.0, 500.0],\n]\norientations = 11"
 
 
-@pytest.fixture(autouse=True)
-def never_moves(monkeypatch: pytest.MonkeyPatch) -> None:
-    def move(_machine: SimulatedMachine, pose: object) -> None:
-        pytest.fail(f"the robot was sent to {pose}")
-
-    monkeypatch.setattr(SimulatedMachine, "move", move)
-
+pytestmark = pytest.mark.usefixtures("never_moves")
 
 FREE = (
     ("turn_deg = 60.0", "turn_deg = 180.0"),

@@ -163,10 +163,3 @@ def test_what_cannot_be_certified_is_not(typed_here, demo, certified, tmp_path) 
     kept = [line for line in journal.read_bytes().splitlines(keepends=True) if b'"judged"' not in line]
     journal.write_bytes(b"".join(kept[: len(kept) // 2]))
     assert "nothing can be certified" in refused(certified)
-
-
-def test_it_keeps_the_rules_of_ptb(certificate) -> None:
-    """Their Schematron, which comes with dcclib: ``pip install dcclib``, 200 MB."""
-    validation = pytest.importorskip("dcclib.validation")
-    result = validation.SchematronValidator.for_dcc().validate_file(str(certificate))
-    assert (result.is_valid, result.failed_assertions) == (True, [])

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import os
-import re
 import shlex
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections import Counter
 
 import pytest
 
 from procedures.journal.journal import read_entries, read_journal
-from procedures.run.keys import Phase
 from procedures.steps import events
 from tests.signals import terminal_signals
 
@@ -81,31 +78,6 @@ def test_a_check_is_stopped_at_once_and_resumed_by_the_printed_command(start, ty
     assert resumed.out.splitlines()[-1].endswith(": pass")
     assert good_cell.runs() == [run]
     assert good_cell.controller.read_bytes() == config
-
-
-@pytest.mark.slow
-def test_a_calibration_is_stopped_and_finished(start, typed, quick_cell):
-    process = start("run", quick_cell.cell)
-    under_way(process, quick_cell, 5 + 3)
-    config = quick_cell.controller.read_bytes()
-    outcome = stopped_at_once(process, quick_cell, signal.SIGINT)
-    assert outcome.code == 130
-    assert quick_cell.controller.read_bytes() == config
-    [run] = quick_cell.runs()
-    resumed = typed("run", quick_cell.cell, "--resume", run.name, "--json")
-    assert resumed.code == 0, resumed.err
-    # The simulated cell began anew with the process: its gauges stand elsewhere now, and are seen to.
-    assert "point 2 is measured again: back at its reference the gauges show" in resumed.err
-    assert resumed.document["run"] == str(run)
-    assert re.match(r"35 parameters, 3[0-5] records at 5 points", resumed.document["line"])
-    assert quick_cell.controller.read_bytes() != config
-    measured = Counter(
-        event.at.point
-        for event in history(run)
-        if isinstance(event, events.RecordTaken) and event.at.phase is Phase.IDENTIFY
-    )
-    assert measured.pop(2) > 7
-    assert measured == {1: 7, 3: 7, 4: 7, 5: 7}  # what was finished is not measured again
 
 
 def test_a_stop_before_anything_was_measured_leaves_nothing_to_resume(start, good_cell):

@@ -62,11 +62,29 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "s" / "run.sock"
 
 
-class ScriptedRun:
+class Connected:
+    """What clients of a socket are connected to."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._clients: list[Client] = []
+
+    async def client(self) -> Client:
+        connection = await connect_to_run(self.path)
+        assert connection is not None
+        self._clients.append(Client(connection))
+        return self._clients[-1]
+
+    def close(self) -> None:
+        for client in self._clients:
+            client.connection._writer.close()
+
+
+class ScriptedRun(Connected):
     """An audience without an engine, and what it was asked for."""
 
     def __init__(self, path: Path, stuck_s: float) -> None:
-        self.path = path
+        super().__init__(path)
         self.calls: asyncio.Queue[Any] = asyncio.Queue()
         note = self.calls.put_nowait
         self.audience = Audience(
@@ -76,19 +94,6 @@ class ScriptedRun:
             on_leave=lambda leave: note("lost" if leave is None else ("left", leave.keep_running)),
             stuck_s=stuck_s,
         )
-
-        self._clients: list[Client] = []
-
-    async def client(self) -> Client:
-        connection = await connect_to_run(self.path)
-        assert connection is not None
-        self._clients.append(Client(connection))
-        return self._clients[-1]
-
-    async def close(self) -> None:
-        for client in self._clients:
-            client.connection._writer.close()
-        await self.audience.dismiss()
 
 
 MakeRun = Callable[..., AbstractAsyncContextManager[ScriptedRun]]
@@ -102,7 +107,8 @@ def scripted_run(path: Path) -> MakeRun:
             scripted = ScriptedRun(path, stuck_s)
             server = await audience_server(scripted.audience, listener)
             yield scripted
-            await scripted.close()
+            scripted.close()
+            await scripted.audience.dismiss()
             server.close()
             await server.wait_closed()
 

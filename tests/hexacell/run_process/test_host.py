@@ -12,7 +12,6 @@ import pytest
 
 from hexacell.cell.loader import Cell
 from hexacell.errors import ExitCode
-from hexacell.run_process.client import connect_to_run
 from hexacell.run_process.host import RemoteOperator, RunHost
 from hexacell.run_process.messages import (
     EventRecorded,
@@ -33,7 +32,7 @@ from procedures.engine.commands import Answer, CommandQueue, Resume
 from procedures.journal.journal import read_entries, read_journal
 from procedures.run.questions import QuestionKind
 from procedures.steps import events
-from tests.hexacell.run_process.conftest import Client
+from tests.hexacell.run_process.conftest import Client, Connected
 from tests.hexacell.services.conftest import maker
 from tests.small_cell import few_candidates
 from tests.waiting import until
@@ -50,31 +49,19 @@ def cell(tmp_path: Path) -> Cell:
     return maker(tmp_path)(stations__placement="by-hand")
 
 
-class HostedRun:
+class HostedRun(Connected):
     """A host in this process, and its clients."""
 
     def __init__(self, cell: Cell, path: Path, away_s: float | None, resume: bool) -> None:
+        super().__init__(path)
         self.folder = RunFolder(runs_folder(cell) / "run")
-        self.cell = cell
         request = RunRequest(cell, self.folder, Mode.OPTIMISE, RemoteOperator(), resume=resume)
         self.host = RunHost(request, CommandQueue(), away_s=away_s)
-        self._path = path
-        self._clients: list[Client] = []
         self.serving: asyncio.Future[ExitCode] = asyncio.get_running_loop().create_future()
-
-    async def client(self) -> Client:
-        connection = await connect_to_run(self._path)
-        assert connection is not None
-        self._clients.append(Client(connection))
-        return self._clients[-1]
 
     @property
     def history(self) -> tuple[events.Event, ...]:
         return read_journal(self.folder.journal)
-
-    def close(self) -> None:
-        for client in self._clients:
-            client.connection._writer.close()
 
 
 Hosted = Callable[..., AbstractAsyncContextManager[HostedRun]]

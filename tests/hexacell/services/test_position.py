@@ -133,20 +133,6 @@ async def test_a_controller_that_keeps_its_old_config_gets_the_file_back(finishe
     assert site.simulated.schedule.move_count == 0
 
 
-@pytest.mark.slow
-async def test_joints_that_include_the_zeros_agree_before_and_after_the_geometry_is_written(
-    make_site,
-) -> None:
-    site = make_site(**{"controller.joints_include_zeros": True})
-    assert (await site.calibrate()).exit_code == ExitCode.DONE
-    located = site.happened(events.Located)[-1]
-    assert located.joints == pytest.approx(located.encoders, abs=0.1)
-    cell = site.order().cell
-    plain = changed(cell.settings, {"controller.joints_include_zeros": False})
-    with pytest.raises(GuardTripped, match="where its pose has it at"):
-        await preflight(replace(cell, settings=plain), Mode.OPTIMISE, unattended=True)
-
-
 @pytest.mark.parametrize("includes_zeros", [pytest.param(False, marks=pytest.mark.slow), True])
 async def test_encoders_that_the_controller_reads_need_not_be_homed_before_a_run(
     make_site, includes_zeros
@@ -158,6 +144,8 @@ async def test_encoders_that_the_controller_reads_need_not_be_homed_before_a_run
     assert not site.simulated.controller.state.homed
     assert (await site.calibrate()).exit_code == ExitCode.DONE
     await preflight(cell, Mode.OPTIMISE, unattended=True)
+    located = site.happened(events.Located)[-1]
+    assert located.joints == pytest.approx(located.encoders, abs=0.1)
 
 
 async def test_zeros_that_the_controller_does_not_run_are_not_calibrated_with(make_site) -> None:

@@ -7,33 +7,19 @@ from dataclasses import replace
 
 import pytest
 
-from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.campaign.decisions import Forecast
 from hexacell.cell.bundled import bundled_config
 from hexacell.cli.app import main
 from hexacell.dry_run.campaign import DryRunResult
 from hexacell.errors import ExitCode
-from hexacell.kinematics.pose import Pose
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import AveragingForecast
 from hexacell.services.offline import PlanTrial
 from hexacell.text.layout import duration
-from hexacell.text.planning import decision_text, forecast_text, plan_trial_lines, run_forecast_line
+from hexacell.text.planning import forecast_text, plan_trial_lines, run_forecast_line
 
-ZERO = (0.0,) * 6
 FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
-MEASURE = MeasurePose(2, 7, Pose(1.0, 2.0, 3.0), ZERO, (0.1, -0.2, 0.0), (0.5, 0.6, 0.7), 1.8, None)
-
-
-def test_the_text_of_each_decision():
-    assert decision_text(Finished("all 5 points are measured")) == "Done: all 5 points are measured."
-    start = decision_text(StartPoint(2, Pose(0.0, -200.0, 550.0), ZERO))
-    assert start.startswith("Begin point 2: go to X0.000 Y-200.000 Z550.000 A0.000")
-    measure = decision_text(MEASURE)
-    assert measure.startswith("Point 2, orientation 7: go to X1.000 Y2.000 Z3.000")
-    assert "x +0.100 +- 0.500, y -0.200 +- 0.600, z +0.000 +- 0.700 mm" in measure
-    through = decision_text(replace(MEASURE, via=(Pose(4.0, 5.0, 6.0),)))
-    assert ": pass through X4.000 Y5.000 Z6.000" in through
 
 
 def test_a_forecast_says_what_records_gain_and_u_where_the_effects_are_known():

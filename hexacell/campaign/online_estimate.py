@@ -247,7 +247,7 @@ def _continued(problem: Problem, before: Identification) -> Identification:
         return estimate_online(problem)
     # While the records leave much open, undamped steps may diverge.
     options = INCREMENTAL if problem.is_determined else COARSE
-    return estimate_online(problem.starting_at(before.free, poses), options)
+    return estimate_online(problem.starting_at(before.free, poses, problem.has_start_pose), options)
 
 
 def _start_poses(problem: Problem, before: Identification) -> PoseBatch | None:

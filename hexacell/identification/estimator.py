@@ -12,6 +12,7 @@ from hexacell.identification.data_faults import messages
 from hexacell.identification.data_faults.hypotheses import OutlierStatistics
 from hexacell.identification.data_faults.stepwise_selection import (
     LARGEST_REJECTED_SHARE,
+    Selection,
     UncorrectableFaultError,
     select_faults,
 )
@@ -20,7 +21,6 @@ from hexacell.identification.solver.fit import (
     COARSE,
     INCREMENTAL,
     SolverOptions,
-    fit_regularized,
     solve_around_singularities,
 )
 from hexacell.identification.solver.result import GaugeFaultError, Identification
@@ -51,14 +51,11 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     """
     _require_enough_records(problem)
     _require_rotation_diversity(problem)
-    if find_outliers:
-        try:
-            selection = select_faults(problem)
-        except UncorrectableFaultError as refused:
-            raise GaugeFaultError(messages.refused(refused)) from None
-        found = replace(selection.selected.fit, data_faults=messages.left_out(selection))
-    else:
-        found = fit_regularized(problem)
+    try:
+        selection = select_faults(problem) if find_outliers else Selection.of_all(problem)
+    except UncorrectableFaultError as refused:
+        raise GaugeFaultError(messages.refused(refused)) from None
+    found = replace(selection.selected.fit, data_faults=messages.left_out(selection))
     _require_enough_records(found.problem)
     return found
 
@@ -154,8 +151,7 @@ def without_gross_errors(found: Identification) -> Iterator[Identification]:
         kept = np.arange(found.records) != int(np.argmax(ratio))
         if ratio.max() <= 1.0 or not found.problem.subset(kept).is_overdetermined:
             return
-        everywhere = np.ones(found.records, dtype=bool)
-        some = found.problem.starting_at(found.free, found.poses, everywhere).subset(kept)
+        some = found.problem.starting_at(found.free, found.poses).subset(kept)
         problem, solution = solve_around_singularities(some, found.active_prior, INCREMENTAL)
         found, rejected = Identification(problem, solution, found.active_prior), rejected + 1
         yield found

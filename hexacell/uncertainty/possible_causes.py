@@ -88,7 +88,7 @@ def _of_the_machine(test: ExcessTest) -> Iterator[PossibleCause]:
 def _of_the_records(test: ExcessTest) -> Iterator[PossibleCause]:
     """The most likely data fault of each kind, if it is significant."""
     kinds: set[type[FaultHypothesis]] = set()
-    for hypothesis in rank_hypotheses(test.found.linear_model, test.found.noise_test):
+    for hypothesis in rank_hypotheses(test.found.problem, test.found):
         if type(hypothesis) not in kinds:
             kinds.add(type(hypothesis))
             share = test.share_of_gain(hypothesis.gain, hypothesis.unknowns)

@@ -17,7 +17,7 @@ with M of :class:`.LinearizedModel`, of which only the blocks of the records con
 - a known change of the readings, with no unknown: a gauge fault. Readings d should have been T d, so that
   the residuals change by ``z = -(T - 1) d`` and the chi-square by ``2 z^T M r + z^T M z``.
 
-A record that was left out is compared with what the fit predicts of it (:func:`deletion_test`). If it
+A record that was left out is compared with what the fit predicts of it (:func:`deletion_tests`). If it
 disagrees, the simplest cause is looked for: a leg whose joint variable is off, a gauge fault, one wrong
 gauge, or several.
 
@@ -28,18 +28,19 @@ geodetic networks, 1968 (data snooping); Cook and Weisberg, Residuals and Influe
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import chain, zip_longest
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell.distributions import chi_square_limit, normal_limit
 from hexacell.identification.problem.commanded_poses import ACCEPTED_MM
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linear_model import LinearizedModel
-from hexacell.identification.solver.result import GAUGES, DataFaultKind
+from hexacell.identification.solver.measurement_model import predict
+from hexacell.identification.solver.result import GAUGES, DataFaultKind, Identification
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import Deviation, RecordId, deviation_of
 
@@ -58,11 +59,11 @@ FALSE_SHIFTS_PER_FILE = 1e-3
 SMALLEST_GAUGE_FAULT_GAIN = 25.0
 """A likelihood ratio of 270,000, for some dozens of gauge faults tested."""
 
+LONGEST_LIST = 3
+"""Hypotheses around the drawing, and around a solution that is not trusted, that are worth a refit."""
+
 SMALLEST_REDUNDANCY = 1e-3
 """Share of a record's information that the others must determine, or its residual is no evidence."""
-
-OUTLIER_PROBABILITY = 1e-4
-"""Probability that a good record counts as an outlier around the drawing."""
 
 MEDIAN_OF_CHI2_3 = 2.366
 SCATTER_OF_MEDIAN = 1.12
@@ -205,42 +206,99 @@ class GaugeFaultHypothesis(FaultHypothesis):
 ALL_IN_INCHES = GaugeFaultHypothesis(gain=0.0, unknowns=0, gauge_fault=GAUGE_FAULTS[-1], point=None)
 
 
-def rank_hypotheses(
-    model: LinearizedModel, goodness: ChiSquareTest, *, found_before: int = 0
-) -> list[FaultHypothesis]:
-    """The significant hypotheses on the residuals of a model, the most likely first.
+def _model_at(
+    problem: Problem, free: Array, active_prior: Array, among: Collection[RecordId] | None = None
+) -> LinearizedModel | None:
+    """The linear model around a geometry of the records that have poses there, clear of singularities.
 
     Args:
-        model: of the records, around a geometry.
-        goodness: the test of their residuals there.
-        found_before: how many gross errors were found before.
+        problem: the records.
+        free: parameters (p,) of the geometry, mm.
+        active_prior: precision (p, p), 1/mm^2, of the prior where it was not released.
+        among: the records that count; None: all.
+
+    Returns:
+        The model; None if no record is left.
     """
+    started = problem.started_at(free)
+    usable = started.has_start_pose if among is None else started.has_start_pose & problem.mask_of(among)
+    some = started.subset(usable)
+    prediction = predict(some, some.initial_parameters, some.start)
+    if prediction.singular.all():
+        return None
+    if prediction.singular.any():
+        some = some.subset(~prediction.singular)
+        prediction = predict(some, some.initial_parameters, some.start)
+    return LinearizedModel.around(some, prediction, active_prior)
+
+
+def rank_hypotheses(
+    problem: Problem, fit: Identification, *, found_before: int = 0, is_trusted: bool = True
+) -> list[FaultHypothesis]:
+    """What may significantly be wrong with the records of a problem, the most likely first.
+
+    Args:
+        problem: n records.
+        fit: of those of them that the solver could use.
+        found_before: how many gross errors were found before.
+        is_trusted: whether tests around the solution are valid. Where they are not, the most likely gauge
+            faults around the drawing come in turns with the hypotheses around the solution.
+    """
+    model, goodness = fit.linear_model, fit.noise_test
+    around_drawing: list[GaugeFaultHypothesis] = []
+    if not is_trusted:
+        drawing = _model_at(problem, problem.initial_parameters, problem.prior.precision)
+        around_drawing = _rank_gauge_faults(drawing) if drawing else []
+        # With the records that the solver left out, as far as they have poses at the solution.
+        model = _model_at(problem, fit.free, fit.active_prior) or model
+        goodness = ChiSquareTest(model.chi2, model.problem.coordinates)
     statistics = OutlierStatistics.of(model)
-    hypotheses: list[FaultHypothesis] = [*_outlier(model, statistics, found_before)]
+    likely: list[FaultHypothesis] = [*_outlier(model, statistics, found_before)]
     if goodness.probability < WORTH_TESTING:
-        hypotheses += _zero_shift(model, statistics.scale)
-        for hypothesis in rank_gauge_faults(model):
+        for hypothesis in _rank_gauge_faults(model):
             remaining = max(1.0, (goodness.chi2 - hypothesis.gain) / goodness.expected)
             if hypothesis.gain > SMALLEST_GAUGE_FAULT_GAIN * min(statistics.scale, remaining):
-                hypotheses.append(hypothesis)
-    return sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)
+                likely.append(hypothesis)
+        likely += _zero_shift(model, statistics.scale)
+    likely.sort(key=lambda hypothesis: hypothesis.cost)
+    in_turns = zip_longest(around_drawing[:LONGEST_LIST], likely)
+    at_all_points = (hypothesis for hypothesis in around_drawing if hypothesis.point is None)
+    return [*filter(None, chain(*in_turns)), *at_all_points]
 
 
-def rank_gauge_faults(model: LinearizedModel | None) -> list[GaugeFaultHypothesis]:
+def _rank_gauge_faults(model: LinearizedModel) -> list[GaugeFaultHypothesis]:
     """Every gauge fault, at all points and at each, the one with the largest gain first."""
-    if model is None:
-        return []
     problem = model.problem
     points = [None, *(int(problem.labels[row, 0]) for row in problem.first_rows)]
     hypotheses = []
     for fault in GAUGE_FAULTS:
         change = -problem.deviations @ (fault.in_base_frame(problem) - np.eye(3)).T
-        at_points, at_all = known_change_gains(model, change)
+        at_points, at_all = _known_change_gains(model, change)
         hypotheses += [
             GaugeFaultHypothesis(gain=gain, unknowns=0, gauge_fault=fault, point=point)
             for point, gain in zip(points, [at_all, *at_points.tolist()], strict=True)
         ]
     return sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)
+
+
+def _known_change_gains(model: LinearizedModel, change: Array) -> tuple[Array, float]:
+    """The decrease of the chi-square if the residuals change by ``change`` (n, 3), mm.
+
+    For the change at each point alone (m,), and at all of them together.
+    """
+    problem, weights = model.problem, model.weights
+    weighted = np.einsum("nij,nj->ni", weights, change)
+    constants = np.linalg.solve(problem.group_sums(weights), problem.group_sums(weighted)[..., None])[
+        ..., 0
+    ]
+    centred = change - problem.per_record(constants)
+    score = problem.group_sums(np.sum(change * model.scores, axis=-1))
+    squares = problem.group_sums(np.sum(centred * weighted, axis=-1))
+    by_parameters = problem.group_sums(np.einsum("nip,ni->np", model.jacobian, weighted))
+    taken = np.einsum("mp,pq,mq->m", by_parameters, model.covariance, by_parameters)
+    total = by_parameters.sum(axis=0)
+    all_squares = squares.sum() - total @ model.covariance @ total
+    return -(2.0 * score + squares - taken), -float(2.0 * score.sum() + all_squares)
 
 
 def _outlier(
@@ -259,22 +317,43 @@ def _outlier(
 
 
 def _zero_shift(model: LinearizedModel, scale: float) -> Iterator[ZeroShiftHypothesis]:
-    """The most significant shift of the gauges' zero."""
-    rows, gains, shifts = zero_shift_statistics(model)
+    """The most significant shift of the gauges' zero right before a record.
+
+    At least two records of the point must be before and after it: a single shifted record is a gross error.
+    """
+    problem, weights = model.problem, model.weights
+    later = _sums_from(problem, np.ones(problem.records))
+    before = problem.per_record(later[problem.first_rows]) - later
+    rows = np.flatnonzero((before >= 2) & (later >= 2))
     if not len(rows):
         return
+    score = _sums_from(problem, model.scores)[rows]
+    weight = _sums_from(problem, weights)[rows]
+    by_parameters = _sums_from(problem, weights @ model.jacobian)[rows]
+    station = np.linalg.inv(problem.per_record(problem.group_sums(weights))[rows])
+    taken = by_parameters @ model.covariance @ np.swapaxes(by_parameters, -1, -2)
+    information = weight - weight @ station @ weight - taken
+    changes = np.einsum("kij,kj->ki", np.linalg.pinv(information, hermitian=True), score)
+    gains = np.sum(score * changes, axis=-1)  # about 3 where there is no shift
     best = int(np.argmax(gains))
     gain = float(gains[best])
     if (significance := gain / scale / chi_square_limit(3, FALSE_SHIFTS_PER_FILE / len(rows))) > 1.0:
-        point, orientation = model.problem.labels[rows[best]].tolist()
+        point, orientation = problem.labels[rows[best]].tolist()
         yield ZeroShiftHypothesis(
             gain=gain,
             unknowns=3,
             point=point,
             orientation=orientation,
-            shift=shifts[best],
+            shift=-changes[best] @ problem.gauges,
             significance=significance,
         )
+
+
+def _sums_from(problem: Problem, values: Array) -> Array:
+    """Sums (n, ...) over each record and the later ones of its point."""
+    before = np.cumsum(values, axis=0) - values
+    in_point = before - problem.per_record(before[problem.first_rows])
+    return np.asarray(problem.per_record(problem.group_sums(values)) - in_point)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -308,13 +387,6 @@ class OutlierStatistics:
         is_larger = noise > 1.0 + 4.0 * SCATTER_OF_MEDIAN / np.sqrt(len(omnibus))
         return cls(along_gauges, omnibus, noise if is_larger else 1.0)
 
-    @property
-    def worst(self) -> int | None:
-        """The row of the record with the largest omnibus statistic; None if it is not significant."""
-        row = int(np.argmax(self.omnibus))
-        limit = chi_square_limit(3, OUTLIER_PROBABILITY) * self.scale
-        return row if self.omnibus[row] > limit else None
-
     def threshold_ratio(self, found_before: int = 0) -> Array:
         """The larger statistic (n,) of each record over its critical value.
 
@@ -332,56 +404,6 @@ def _squares_over(values: Array, variances: Array, smallest: Array) -> Array:
     """Squares over variances; zero where these are too small for a test."""
     testable = variances > smallest
     return np.asarray(np.where(testable, values**2 / np.where(testable, variances, 1.0), 0.0))
-
-
-def zero_shift_statistics(model: LinearizedModel) -> tuple[NDArray[np.intp], Array, Array]:
-    """Tests of a zero shift right before a record, with at least two records before and after it.
-
-    A single shifted record is a gross error.
-
-    Returns:
-        The first record (k,) after each testable shift; the decrease (k,) of the chi-square, about 3 where
-        there is no shift; and by how much (k, 3), mm, the gauges x, y and z then read too much.
-    """
-    problem, weights = model.problem, model.weights
-    later = _sums_from(problem, np.ones(problem.records))
-    before = problem.per_record(later[problem.first_rows]) - later
-    rows = np.flatnonzero((before >= 2) & (later >= 2))
-    score = _sums_from(problem, model.scores)[rows]
-    weight = _sums_from(problem, weights)[rows]
-    by_parameters = _sums_from(problem, weights @ model.jacobian)[rows]
-    station = np.linalg.inv(problem.per_record(problem.group_sums(weights))[rows])
-    taken = by_parameters @ model.covariance @ np.swapaxes(by_parameters, -1, -2)
-    information = weight - weight @ station @ weight - taken
-    shift = np.einsum("kij,kj->ki", np.linalg.pinv(information, hermitian=True), score)
-    return rows, np.sum(score * shift, axis=-1), -shift @ problem.gauges
-
-
-def _sums_from(problem: Problem, values: Array) -> Array:
-    """Sums (n, ...) over each record and the later ones of its point."""
-    before = np.cumsum(values, axis=0) - values
-    in_point = before - problem.per_record(before[problem.first_rows])
-    return np.asarray(problem.per_record(problem.group_sums(values)) - in_point)
-
-
-def known_change_gains(model: LinearizedModel, change: Array) -> tuple[Array, float]:
-    """The decrease of the chi-square if the residuals change by ``change`` (n, 3), mm.
-
-    For the change at each point alone (m,), and at all of them together.
-    """
-    problem, weights = model.problem, model.weights
-    weighted = np.einsum("nij,nj->ni", weights, change)
-    constants = np.linalg.solve(problem.group_sums(weights), problem.group_sums(weighted)[..., None])[
-        ..., 0
-    ]
-    centred = change - problem.per_record(constants)
-    score = problem.group_sums(np.sum(change * model.scores, axis=-1))
-    squares = problem.group_sums(np.sum(centred * weighted, axis=-1))
-    by_parameters = problem.group_sums(np.einsum("nip,ni->np", model.jacobian, weighted))
-    taken = np.einsum("mp,pq,mq->m", by_parameters, model.covariance, by_parameters)
-    total = by_parameters.sum(axis=0)
-    all_squares = squares.sum() - total @ model.covariance @ total
-    return -(2.0 * score + squares - taken), -float(2.0 * score.sum() + all_squares)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -423,14 +445,22 @@ class DeletionTest:
         return bool(self.statistics.threshold_ratio(found_before)[self.row] <= 1.0)
 
 
-def deletion_test(problem: Problem, record: RecordId, model: LinearizedModel | None) -> DeletionTest:
-    """Test one record of a problem against a fit that it took no part in.
+def deletion_tests(
+    problem: Problem, fit: Identification, without: Collection[RecordId]
+) -> dict[RecordId, DeletionTest]:
+    """Test each record of a problem that a fit does without, but for some others."""
+    used = fit.problem.record_ids
+    left_out = [record for record in problem.record_ids if record not in {*used, *without}]
+    return {
+        record: _deletion_test(
+            problem, record, _model_at(problem, fit.free, fit.active_prior, among={*used, record})
+        )
+        for record in left_out
+    }
 
-    Args:
-        problem: all records.
-        record: the one that is tested.
-        model: of the fit's records and this one, around the fit; None where this one has no pose there.
-    """
+
+def _deletion_test(problem: Problem, record: RecordId, model: LinearizedModel | None) -> DeletionTest:
+    """The test of one record, by the model of the fit's records and this one around the fit."""
     leg = _inconsistent_leg(problem, record)
     if model is None or record not in model.problem.record_ids:
         return DeletionTest(record, DataFaultKind.MISMATCHED_JOINTS if leg else DataFaultKind.SINGULAR, leg)

@@ -22,12 +22,11 @@ First-order tests around a wrong solution are unreliable. The drawing is a bette
 within millimetres of the truth, whatever the gauges read. What is tried by refits, in this order
 (:func:`_candidates`):
 
-1. the most likely gauge fault around the drawing, and the most likely hypotheses of all kinds around the
-   solution, and around the solution with the records that the solver left out;
-2. greedy deletion: the most likely fault is left out, with a refit after each (:func:`_greedy_deletion`);
-3. deletion around the drawing: all outliers there at once (:func:`_outliers_at_start`);
-4. gauge faults around the fit without the deleted records, which they may have in common;
-5. the second and third of the lists of 1, and every gauge fault at all points.
+1. without the records that the solver left out, if they are few;
+2. the most likely gauge fault around the drawing, and the most likely hypothesis around the solution;
+3. greedy deletion: the most likely fault is left out, with a refit after each (:func:`_greedy_deletion`);
+4. what all records have in common around the fit without the deleted ones;
+5. the next gauge faults and hypotheses of 2, and every gauge fault at all points.
 
 Sources: Efroymson 1960 (stepwise selection); Rao 1948 (score test); Baarda 1968, Pope 1976 (data snooping);
 Atkinson and Riani 2000 (several outliers, which hide each other around a fit to all of them, and show
@@ -38,7 +37,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import chain, islice, zip_longest
+from itertools import islice
 
 import numpy as np
 
@@ -48,18 +47,16 @@ from hexacell.identification.data_faults.hypotheses import (
     FaultHypothesis,
     GaugeFaultHypothesis,
     OutlierHypothesis,
-    OutlierStatistics,
     ZeroShiftHypothesis,
-    deletion_test,
-    rank_gauge_faults,
+    deletion_tests,
     rank_hypotheses,
 )
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
-from hexacell.identification.solver.fit import COARSE, FINE, QUICK, SolverOptions, fit_regularized
-from hexacell.identification.solver.linear_model import LinearizedModel
+from hexacell.identification.solver.fit import COARSE, QUICK, SolverOptions, fit_regularized
 from hexacell.identification.solver.multistart import restarts
 from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import RecordId
 
 SUFFICIENT_DECREASE = 20.0
@@ -75,10 +72,8 @@ LARGEST_TRUSTED_RATIO = 10.0
 LARGEST_REJECTED_SHARE = 0.1
 """Share of all records above which those that disagree are not single mistakes."""
 
-LARGEST_TRIMMED_SHARE = 0.25
-"""Largest share of all records that may be outliers around the drawing."""
-
-TRIED_FROM_EACH_LIST = 3
+TRIED_FIRST = 2
+"""Likely hypotheses that are tried before, and right after, the most likely are left out at once."""
 
 CONFIRMED_SHARE = 0.5
 """Share of the first-order gain of a gauge fault that a refit must confirm."""
@@ -142,9 +137,10 @@ class CorrectedFit:
         problem: Problem,
         faults: tuple[FaultHypothesis, ...] = (),
         options: SolverOptions = QUICK,
+        start: Array | None = None,
     ) -> CorrectedFit:
         """Fit the records ``problem``, which are corrected for some faults."""
-        return cls(original, problem, fit_regularized(problem, options), faults)
+        return cls(original, problem, fit_regularized(problem, options, start), faults)
 
     def corrected_for(self, hypothesis: FaultHypothesis) -> CorrectedFit:
         """The fit after correction for one more fault."""
@@ -195,35 +191,23 @@ class CorrectedFit:
         is_near_noise = self.is_reliable and self.misfit <= SETTLING_MISFIT
         return self.is_consistent or (is_near_noise and self.misfit < other.misfit / SETTLING_DECREASE)
 
-    def likely_hypotheses(self, found_before: int = 0) -> list[FaultHypothesis]:
-        """The significant hypotheses by tests around the solution, the most likely first."""
-        return rank_hypotheses(self.fit.linear_model, self.fit.noise_test, found_before=found_before)
+    def likely_hypotheses(self) -> list[FaultHypothesis]:
+        """What may be wrong, the most likely first."""
+        return rank_hypotheses(
+            self.problem, self.fit, found_before=len(self.rejected), is_trusted=self.is_reliable
+        )
 
     def deletion_tests(self) -> dict[RecordId, DeletionTest]:
         """Tests of all records that the fit does without, but for those after a zero shift."""
-        excluded = {record for after in self.zero_shifts.values() for record in after}
-        excluded.update(self.fit.problem.record_ids)
-        tests = {}
-        for record in self.original.record_ids:
-            if record not in excluded:
-                both = self.with_records({record})
-                model = (
-                    LinearizedModel.at_start(both, self.fit.active_prior)
-                    if both.has_start_pose.all()
-                    else None
-                )
-                tests[record] = deletion_test(self.original, record, model)
-        return tests
+        shifted = {record for after in self.zero_shifts.values() for record in after}
+        return deletion_tests(self.original, self.fit, without=shifted)
 
-    def with_records(self, records: set[RecordId]) -> Problem:
-        """The records of the fit and some others, which start at the solution."""
-        used = self.original.mask_of(records.union(self.fit.problem.record_ids))
-        return self.at_solution(self.original.subset(used))
-
-    def at_solution(self, problem: Problem) -> Problem:
-        """Records that start at the solution, as far as they have poses there."""
-        solved = problem.solve_poses(self.fit.free)
-        return problem.starting_at(self.fit.free, solved.poses, solved.found)
+    def only_for(self, faults: tuple[FaultHypothesis, ...]) -> CorrectedFit:
+        """The fit of all records as measured after correction for some faults, from this solution."""
+        problem = self.original
+        for fault in faults:
+            problem = fault.corrected(problem)
+        return self.fitted(self.original, problem, faults, COARSE, self.fit.free)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -232,6 +216,11 @@ class Selection:
 
     selected: CorrectedFit
     tests: dict[RecordId, DeletionTest]
+
+    @classmethod
+    def of_all(cls, problem: Problem) -> Selection:
+        """The fit of all records as measured, whatever is wrong with them."""
+        return cls(CorrectedFit.fitted(problem, problem, options=COARSE), {})
 
 
 def select_faults(problem: Problem) -> Selection:
@@ -268,7 +257,7 @@ def _forward(current: CorrectedFit) -> CorrectedFit:
             if not current.fit.converged:  # the quick fit was cut short
                 current = current.fitted(current.original, current.problem, current.faults, COARSE)
             # The hypothesis of lowest cost that is confirmed.
-            ranked = current.likely_hypotheses(len(current.rejected)) if current.is_reliable else ()
+            ranked = current.likely_hypotheses() if current.is_reliable else ()
             confirmed = (confirmed_by_refit(current, hypothesis) for hypothesis in ranked)
             extended = next(filter(None, confirmed), None)
         if extended is None:
@@ -348,31 +337,22 @@ def _searched(current: CorrectedFit) -> CorrectedFit | None:
 
 def _candidates(current: CorrectedFit) -> Iterator[FaultHypothesis | CorrectedFit]:
     """What may be wrong, in the order above: hypotheses, and one fit without several records."""
-    problem, solved = current.problem, current.at_solution(current.problem)
-    at_start = LinearizedModel.at_start(problem, problem.prior.precision)
-    everywhere = LinearizedModel.at_start(solved, current.fit.active_prior)
-    gauge_faults, elsewhere = rank_gauge_faults(at_start), []
-    if everywhere is not None:
-        goodness = ChiSquareTest(everywhere.chi2, everywhere.problem.coordinates)
-        elsewhere = rank_hypotheses(everywhere, goodness)
-    lists = (gauge_faults, current.likely_hypotheses(), elsewhere)
-    first, *others = [*zip_longest(*(one[:TRIED_FROM_EACH_LIST] for one in lists))] or [()]
-    yield from filter(None, first)
+    if 0 < current.lost <= LARGEST_REJECTED_SHARE * current.original.records:
+        lost = set(current.problem.record_ids).difference(current.fit.problem.record_ids)
+        yield OutlierHypothesis(gain=0.0, unknowns=0, records=tuple(sorted(lost)))
+    likely = current.likely_hypotheses()
+    yield from likely[:TRIED_FIRST]
     deleted = _greedy_deletion(current)
     yield deleted
-    if (outliers := _outliers_at_start(problem)) is not None:
-        yield outliers
-    without = LinearizedModel.at_start(deleted.at_solution(problem), deleted.fit.active_prior)
-    yield from rank_gauge_faults(without)[:TRIED_FROM_EACH_LIST]
-    yield from filter(None, chain(*others))
-    yield from (hypothesis for hypothesis in gauge_faults if hypothesis.point is None)
+    yield from replace(current, fit=deleted.fit).likely_hypotheses()[:TRIED_FIRST]
+    yield from likely
 
 
 def _greedy_deletion(start: CorrectedFit) -> CorrectedFit:
     """Leave out the records of the most likely hypothesis, one after another with a refit in between."""
     now, found = start, 0
     while found < LARGEST_REJECTED_SHARE * start.problem.records and not now.is_consistent:
-        hypotheses = now.likely_hypotheses(found)
+        hypotheses = now.likely_hypotheses()
         removing = (one for one in hypotheses if not isinstance(one, GaugeFaultHypothesis))
         trials = (refitted(now, hypothesis) for hypothesis in removing)
         trial = next((trial for trial in trials if trial is not None), None)
@@ -380,21 +360,6 @@ def _greedy_deletion(start: CorrectedFit) -> CorrectedFit:
             break
         now, found = trial, found + 1
     return now
-
-
-def _outliers_at_start(problem: Problem) -> OutlierHypothesis | None:
-    """All outliers by deletion of the worst record, one after another, around the drawing."""
-    kept = problem.has_start_pose.copy()
-    while np.count_nonzero(~kept) <= LARGEST_TRIMMED_SHARE * problem.records:
-        model = LinearizedModel.at_start(problem.subset(kept), problem.prior.precision)
-        worst = None if model is None else OutlierStatistics.of(model).worst
-        if model is None or worst is None:
-            records = tuple(
-                record for record, used in zip(problem.record_ids, kept, strict=True) if not used
-            )
-            return OutlierHypothesis(gain=0.0, unknowns=0, records=records) if records else None
-        kept &= np.any(problem.labels != model.problem.labels[worst], axis=1)
-    return None
 
 
 def _readmitted(selected: CorrectedFit) -> CorrectedFit | None:
@@ -407,14 +372,11 @@ def _readmitted(selected: CorrectedFit) -> CorrectedFit | None:
     agreeing = {record for record, test in tests.items() if test.agrees(max(0, disagreeing - 1))}
     if not agreeing:
         return None
-    problem = selected.with_records(agreeing)
-    if not problem.has_start_pose.all():
-        return None
     faults = tuple(
         _only(fault, set(fault.records) - agreeing) if isinstance(fault, OutlierHypothesis) else fault
         for fault in selected.faults
     )
-    readmitted = CorrectedFit.fitted(selected.original, problem, faults, FINE)
+    readmitted = selected.only_for(faults)
     return readmitted if readmitted.is_reliable else None
 
 
@@ -426,12 +388,7 @@ def _only(fault: OutlierHypothesis, records: set[RecordId]) -> OutlierHypothesis
 def _only_proven(selected: CorrectedFit) -> Selection:
     """The fit without only those records that are proven false by the rest, which grows meanwhile."""
     while (proven := _proven_faults(selected, tests := selected.deletion_tests())) != selected.faults:
-        problem = selected.original
-        for fault in proven:
-            problem = fault.corrected(problem)
-        started = selected.at_solution(problem)
-        problem = started if started.has_start_pose.all() else problem
-        selected = CorrectedFit.fitted(selected.original, problem, proven, COARSE)
+        selected = selected.only_for(proven)
     return Selection(selected, tests)
 
 
@@ -477,10 +434,9 @@ def _other_minimum(problem: Problem) -> CorrectedFit | None:
     """A fit within the tolerances that explains all readings as they are, from another start."""
     if problem.records > FEW_RECORDS:
         return None
-    everywhere = np.ones(problem.records, dtype=bool)
     largest = LARGEST_MEAN_SQUARE * len(problem.prior.free)
     for restarted in islice(restarts(problem), OTHER_STARTS):
-        found = CorrectedFit.uncorrected(replace(restarted, has_start_pose=everywhere))
+        found = CorrectedFit.uncorrected(restarted)
         if found.is_consistent and problem.prior.squared_distance(found.fit.free) <= largest:
             return found
     return None

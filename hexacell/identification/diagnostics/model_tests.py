@@ -44,9 +44,8 @@ def update(found: Identification, further: Problem) -> Identification:
     Raises:
         IdentifiabilityError: no geometry fits any of the further records; they would prove nothing.
     """
-    solved = further.solve_poses(found.free)
-    used = found.problem.starting_at(found.free, found.poses, np.ones(found.records, dtype=bool))
-    both = used.joined(further.starting_at(found.free, solved.poses, solved.found))
+    used = found.problem.starting_at(found.free, found.poses)
+    both = used.joined(further.started_at(found.free))
     kept, solution = solve_around_singularities(both, found.active_prior, FINE)
     if not np.isin(kept.labels[:, 0], further.labels[:, 0]).any():
         raise IdentifiabilityError(

@@ -171,9 +171,17 @@ class Problem:
         return values[self.stations]
 
     def starting_at(self, free: Array, poses: PoseBatch, has_start_pose: Mask | None = None) -> Problem:
-        """The problem with another start: free parameters (p,), mm, and poses that close them."""
-        known = self.has_start_pose if has_start_pose is None else has_start_pose
+        """The problem with another start: free parameters (p,), mm, and poses that close them.
+
+        The poses are those of all records, or of some (n,).
+        """
+        known = np.ones(self.records, dtype=bool) if has_start_pose is None else has_start_pose
         return replace(self, initial_parameters=free, start=poses, has_start_pose=known)
+
+    def started_at(self, free: Array) -> Problem:
+        """The problem that starts at free parameters (p,), mm, as far as its records have poses there."""
+        solved = self.solve_poses(free)
+        return self.starting_at(free, solved.poses, solved.found)
 
     def subset(self, rows: Mask) -> Problem:
         """The problem of some of the records (n,)."""

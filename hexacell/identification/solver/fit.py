@@ -97,17 +97,20 @@ FINE = SolverOptions(SMALL_DAMPING, FINAL_STEP_MM)
 """From near the solution to the solution: Gauss-Newton steps unless one fails."""
 
 
-def fit_regularized(problem: Problem, options: SolverOptions = COARSE) -> Identification:
+def fit_regularized(
+    problem: Problem, options: SolverOptions = COARSE, start: Array | None = None
+) -> Identification:
     """Fit the records with the prior, and release it where the data determine the parameters.
 
     Args:
         problem: the records, and the parameters and poses at which the solver starts.
         options: for the first of the two solutions.
+        start: free parameters (p,), mm, at which the solver starts instead.
 
     Returns:
         The fit of the records that could be used.
     """
-    kept, first = solve_around_singularities(problem, problem.prior.precision, options)
+    kept, first = solve_around_singularities(problem, problem.prior.precision, options, start)
     # Residuals below the stated noise justify more information than stated: without it, a prior would bias
     # records with hardly any noise.
     redundancy, correction = kept.coordinates - len(first.free), 1.0
@@ -123,18 +126,21 @@ def fit_regularized(problem: Problem, options: SolverOptions = COARSE) -> Identi
 
 
 def solve_around_singularities(
-    problem: Problem, precision: Array, options: SolverOptions
+    problem: Problem, precision: Array, options: SolverOptions, start: Array | None = None
 ) -> tuple[Problem, Solution]:
-    """Minimize the cost from the problem's start, without records that come next to a singularity.
+    """Minimize the cost without records that come next to a singularity.
 
     Args:
         problem: n records, some of which may have no start pose.
         precision: (p, p) of the prior, 1/mm^2.
         options: of the solver.
+        start: free parameters (p,), mm, if not those of the problem.
 
     Returns:
         The records that were used, and their solution.
     """
+    if start is not None:
+        problem = problem.started_at(start)
     used = problem.has_start_pose.copy()
     free, poses = problem.initial_parameters, problem.start[used]
     restored = np.zeros(problem.records, dtype=bool)

@@ -26,7 +26,7 @@ import numpy as np
 from hexacell.identification.problem.prior import SystematicErrors
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction, predict
+from hexacell.identification.solver.measurement_model import NuisanceElimination, Prediction
 from hexacell.kinematics.rotations import Array, Mask
 
 
@@ -69,22 +69,6 @@ class LinearizedModel:
         covariance = np.linalg.inv(system.information() + active_prior)
         gradient = system.gradient() + active_prior @ (prediction.free - problem.prior.free)
         return cls._of(elimination, prediction, covariance, -covariance @ gradient)
-
-    @classmethod
-    def at_start(cls, problem: Problem, active_prior: Array) -> LinearizedModel | None:
-        """Linearize around the geometry at which a problem starts.
-
-        Records without a start pose, and next to a singularity there, are left out; None if no record is
-        left.
-        """
-        some = problem.subset(problem.has_start_pose)
-        prediction = predict(some, some.initial_parameters, some.start)
-        if prediction.singular.all():
-            return None
-        if prediction.singular.any():
-            some = some.subset(~prediction.singular)
-            prediction = predict(some, some.initial_parameters, some.start)
-        return cls.around(some, prediction, active_prior)
 
     @classmethod
     def _of(

@@ -20,11 +20,6 @@ def whole_lines(journal: bytes) -> bytes:
     return journal[: journal.rfind(b"\n") + 1]
 
 
-def require_nothing_lost(at_the_kill: bytes, run: RunFolder) -> None:
-    """Every record that was on the disk when the process died is there, byte for byte."""
-    assert run.journal.read_bytes().startswith(whole_lines(at_the_kill))
-
-
 def require_valid(run: RunFolder) -> RunState:
     """Every planned record counts exactly once, and all files say the same."""
     history = read_journal(run.journal)

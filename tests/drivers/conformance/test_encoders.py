@@ -18,7 +18,7 @@ from drivers.encoders.modbus import ModbusBank
 from drivers.encoders.of_controller import ControllerScales
 from drivers.interfaces import DeviceIdentity, EncoderBank, EncoderSample, StartupAction
 from drivers.simulated.linuxcnc.server import SimulatedController
-from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
+from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings
 from hexacell.cell.robot import ControllerSettings
 from hexacell.cell.simulation import FaultKind
 from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
@@ -40,23 +40,6 @@ class Cia406(EncoderConformance):
 
 class TestLinear(Cia406):
     settings = LinearEncoderSettings(timeout_s=CAN_TIMEOUT_S, heartbeat_ms=5000)
-
-
-@pytest.mark.slow  # test_sync_sampling has signs and offsets
-class TestReversedAndOffset(Cia406):
-    settings = LinearEncoderSettings.model_validate(
-        {
-            "timeout_s": CAN_TIMEOUT_S,
-            "heartbeat_ms": 5000,
-            "direction": (1, -1, 1, -1, 1, -1),
-            "offset_mm": (10.0, 20.0, 30.0, 40.0, 50.0, 60.0),
-        }
-    )
-
-
-@pytest.mark.slow  # test_open has encoders of angles
-class TestRotary(Cia406):
-    settings = RotaryEncoderSettings(timeout_s=CAN_TIMEOUT_S, heartbeat_ms=5000)
 
 
 class MachineThatStands(FakeMachine):

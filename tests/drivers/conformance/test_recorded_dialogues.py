@@ -55,17 +55,6 @@ async def test_the_driver_reads_from_the_trace_what_it_read_from_the_gauge(recor
         assert await technician(gauge_settings(protocol, url)) == values
 
 
-async def test_a_changed_answer_is_read(recorded):
-    """A line of a trace may be edited, so that a fault that was seen once becomes a test."""
-    text, line, protocol, _ = recorded
-    entries = [
-        TraceEntry(one.time_s, one.line, one.direction, one.data.replace(b"1.25", b"2.75"))
-        for one in read_trace(text)
-    ]
-    with recorded_line(entries, line) as url:
-        assert await technician(gauge_settings(protocol, url)) == [2.75] * 3
-
-
 async def replayed(recorded, reads: int) -> list[float]:
     text, line, protocol, _ = recorded
     with recorded_line(read_trace(text), line) as url:
@@ -96,15 +85,6 @@ async def test_what_comes_unasked_comes_again_before_the_first_request():
         assert await port.exchange(b"", b"\r", 5.0) == b"DT1010+1.5M\r"
         assert await port.exchange(b"?\r", b"\r", 5.0) == b"+1\r"
         await ports.close()
-
-
-def test_a_line_that_the_trace_has_not_is_named_beside_those_it_has():
-    trace = [TraceEntry(1.0, "/dev/ttyUSB0", TrafficDirection.SENT, b"?\r")]
-    with (
-        pytest.raises(ValueError, match="no line 'ttyUSB1'; its lines: /dev/ttyUSB0"),
-        recorded_line(trace, "ttyUSB1"),
-    ):
-        pass
 
 
 @pytest.fixture

@@ -135,12 +135,6 @@ async def test_another_device_is_refused_by_its_leg(raw, make_bank, sheet, file,
     assert refused.value.subject == "encoder of leg 1 (node 1)"
 
 
-async def test_a_file_that_is_not_there_is_named(make_bank, tmp_path: Path) -> None:
-    bank = make_bank(eds=str(tmp_path / "none.eds"))
-    with pytest.raises(FileError, match=r"none.eds: cannot be read: No such file"):
-        await bank.open()
-
-
 @pytest.mark.parametrize("text", ["", "nothing", "[FileInfo]\n", "[1000]\nParameterName=x\n", "\0\1\2"])
 def test_what_is_no_such_file_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "other.eds").write_text(text)

@@ -177,15 +177,6 @@ async def test_heartbeats_are_requested_and_their_loss_is_an_error(raw, heartbea
         await heartbeat_bank.read()
 
 
-async def test_loss_of_all_heartbeats_suggests_the_bus(heartbeat_bank, heartbeats):
-    await heartbeat_bank.open()
-    await heartbeats.advance(heartbeat_bank, 0.1)
-    heartbeats.beating.clear()
-    await heartbeats.advance(heartbeat_bank, 0.3)
-    with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter"):
-        await heartbeat_bank.read()
-
-
 async def test_without_heartbeats_silence_is_no_fault(bank, heartbeats):
     await bank.open()
     heartbeats.beating.clear()
@@ -201,14 +192,6 @@ async def test_a_warning_that_comes_during_a_run_makes_samples_invalid(raw, bank
     raw.nodes[2].objects[0x6505, 0] = b"\x05\0"
     with pytest.raises(InvalidSampleError, match=r"leg 2 .*has a warning \(object 6505h:0 is 0x0005\)"):
         await bank.read()
-
-
-async def test_a_node_that_wants_another_sync_is_not_a_matter_of_magnets(raw, opened):
-    raw.send(0x82, bytes.fromhex("4082110000000000"))
-    await raw.delivered_to(opened)
-    with pytest.raises(InvalidSampleError, match="it expects another length of SYNC") as caught:
-        await opened.read()
-    assert "magnet" not in str(caught.value.action)
 
 
 async def test_many_error_frames_are_a_failed_bus(raw, opened):

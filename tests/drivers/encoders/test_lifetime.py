@@ -30,13 +30,6 @@ async def test_no_thread_outlives_a_failed_open(raw, short_timeout_bank):
     assert set(threading.enumerate()) == before
 
 
-async def test_opening_again_configures_again(raw, opened):
-    raw.heard.clear()
-    await opened.open()
-    assert (0, b"\x01\x06") in raw.heard
-    assert (await opened.read()).counts[5] == 6000
-
-
 async def test_a_cancelled_read_returns_soon_and_the_next_one_is_right(raw, make_bank):
     bank = make_bank(timeout_s=3600.0)
     await bank.open()

@@ -11,7 +11,6 @@ import pytest
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.sync_sampling import MAX_SYNCS
 from drivers.errors import BusError, InvalidSampleError, SilentNodeError, WrongSetting
-from drivers.wire_trace import TraceEntry, TrafficDirection
 from hexacell.errors import DeviceError
 from tests.drivers.short_timeout import short_timeout
 from tests.waiting import until
@@ -122,14 +121,6 @@ async def test_a_late_response_is_awaited_before_the_next_sync(raw, opened, monk
     assert raw.syncs == 3
 
 
-async def test_more_positions_than_syncs_are_reported_as_a_second_device(raw, opened):
-    await opened.read()
-    raw.send(raw.nodes[4].tpdo, counts(4))
-    await raw.delivered_to(opened)
-    with pytest.raises(DeviceError, match=r"leg 4 \(node 4\).*more positions than there were SYNCs"):
-        await opened.read()
-
-
 async def test_a_surplus_position_never_passes_for_that_of_a_later_sync(raw, opened):
     await opened.read()
     raw.send(raw.nodes[4].tpdo, counts(77))
@@ -181,17 +172,3 @@ async def test_the_echo_of_its_own_sync_is_not_that_of_another_master(raw, setti
     await bank.open()
     await bank.read()
     await bank.read()
-
-
-async def test_every_frame_can_be_traced(raw, make_bank):
-    entries: list[TraceEntry] = []
-    bank = make_bank(entries.append)
-    await bank.open()
-    entries.clear()
-    await bank.read()
-    await bank.close()
-    seen = [(entry.direction, entry.data) for entry in entries]
-    assert seen[0] == (TrafficDirection.SENT, b"080#")
-    assert (TrafficDirection.RECEIVED, b"286#70170000") in seen
-    assert len(seen) == 7
-    assert all(entry.line.startswith("encoder bus virtual") for entry in entries)

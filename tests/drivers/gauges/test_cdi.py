@@ -149,13 +149,6 @@ async def test_an_indicator_that_has_reported_parameters_must_still_do_so(dialog
         await opened.check()
 
 
-async def test_unknown_parameters_are_left_out(dialogue, gauge):
-    unknown = dict.fromkeys(("p011", "p019", "p021", "p040"), b"NOT FOUND\r\n")
-    dialogue.expect(*opening(**unknown), *opening(**unknown))
-    await gauge.open()
-    await gauge.check()
-
-
 async def test_an_inch_gauge_is_refused(dialogue, gauge):
     dialogue.expect((b"R\r", b"+ 0.08417, IN\r\n"))
     with pytest.raises(WrongSetting, match="gauge y: answers in inch"):

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.errors import GaugeAtEnd, GaugeSilent, PortLost
-from drivers.gauges.described import ModbusGauge
+from drivers.errors import GaugeAtEnd
+from drivers.gauges.modbus import ModbusGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import instrument_class
 from drivers.simulated.gauges.described import crc
@@ -92,12 +92,6 @@ async def test_a_register_that_is_not_there_is_told():
             await other(made, register=999).open()
 
 
-async def test_a_device_that_is_not_there_is_silent():
-    async with bench() as made:
-        with pytest.raises(GaugeSilent, match="gauge x: does not answer within"):
-            await other(made, device=99).open()
-
-
 async def test_a_number_that_means_an_end_is_told():
     async with bench(at_end=(0x7FFFFFFF,)) as made:
         await made.gauges["x"].open()
@@ -116,18 +110,6 @@ def test_what_the_simulated_device_holds_is_understood(count, order):
     twin = instrument_class("modbus")({1 << 16: indicator}, found)
     request = bytes.fromhex("01 04 00 00 00 02")
     assert gauge._parse_value(twin.answer(request + crc(request))[3:-2]).value == count
-
-
-async def test_a_line_that_is_not_there_is_told():
-    settings = GaugeSettings(
-        name="x",
-        axis="x",
-        protocol="modbus",
-        port="/dev/nowhere",
-        modbus=ModbusSettings.model_validate({"register": 0}),
-    )
-    with pytest.raises(PortLost, match="gauge x: port /dev/nowhere is absent"):
-        await ModbusGauge(settings, SharedSerialPorts()).open()
 
 
 async def test_without_the_extra_the_command_that_installs_it_is_told(monkeypatch):

@@ -155,12 +155,6 @@ async def test_a_channel_without_a_gauge_is_silent(dialogue, gauge):
         await gauge.open()
 
 
-async def test_any_other_error_is_a_plunger_at_its_end(dialogue, opened):
-    dialogue.expect((b"2\r", b"912\r"))
-    with pytest.raises(GaugeAtEnd, match="912"):
-        await opened.read()
-
-
 async def test_a_plunger_at_its_end_does_not_prevent_opening(dialogue, gauge):
     dialogue.expect((b"2\r", b"912\r"), OPENING[1], (b"2\r", VALUE), (b"2\r", VALUE), (b"2\r", VALUE))
     await gauge.open()
@@ -255,14 +249,6 @@ async def test_a_gauge_that_may_be_zeroed_at_either_end_shows_twice_its_travel(
             await gauge.read()
     else:
         assert (await gauge.read()).value_mm == 9.0
-
-
-async def test_values_may_be_anywhere_after_it_was_opened_again(dialogue, opened):
-    far = b"02A+0040.123\r"
-    await opened.close()
-    dialogue.expect((b"2\r", far), OPENING[1], (b"2\r", far), (b"2\r", far))
-    await opened.open()
-    assert (await opened.read()).value_mm == 40.123
 
 
 async def test_the_cell_file_says_which_readings_agree(dialogue, links, settings):

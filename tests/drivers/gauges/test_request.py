@@ -68,15 +68,6 @@ async def test_anything_else_is_asked_for_again_and_then_quoted(dialogue, gauge,
         await gauge.open()
 
 
-async def test_a_pattern_that_takes_anything_takes_numbers_only(dialogue, links, settings):
-    gauge = RequestGauge(
-        settings("request", request=ID_H | {"answer": "(.*)", "example": "1.0\r\n"}), links
-    )
-    dialogue.expect(*[(b"GA01\r\n", b"error\r\n")] * 3)
-    with pytest.raises(WrongAnswer, match="error"):
-        await gauge.open()
-
-
 async def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file(links, settings):
     with pytest.raises(FileError, match="gauge y: does not say what is asked and answered"):
         RequestGauge(settings("request"), links)
@@ -109,19 +100,3 @@ def test_what_the_simulated_gauge_answers_is_understood(value, description):
     )
     assert shown.value == pytest.approx(value, abs=0.51e-4)
     assert shown.decimals == 4
-
-
-def test_the_simulated_one_is_asked_by_what_is_no_line_too():
-    described = RequestSettings.model_validate(ID_H | {"ask": "\x02"})
-    twin = instrument_class("request")({1: Indicator(lambda: 1.5)}, described)
-    commands, rest = twin.split(b"\x02\x02")
-    assert (commands, rest) == ([b"\x02"] * 2, b"")
-    assert twin.answer(commands[0]) == b"GN01,+0001.5000\r\n"
-
-
-def test_the_simulated_one_hears_a_question_that_comes_in_parts():
-    twin = instrument_class("request")({1: Indicator(lambda: 1.5)}, RequestSettings.model_validate(ID_H))
-    commands, rest = twin.split(b"GA01\r")
-    assert commands == []
-    commands, rest = twin.split(rest + b"\n")
-    assert (commands, rest) == ([b"GA01"], b"")

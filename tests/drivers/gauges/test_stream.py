@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer
+from drivers.errors import GaugeSilent
 from drivers.gauges.described import StreamGauge
 from drivers.gauges.streaming import Origin
 from drivers.serial.shared_port import SharedSerialPorts
@@ -63,25 +63,12 @@ async def test_without_a_channel_it_has_the_port_alone(line, gauge, links, setti
         await StreamGauge(settings("stream", "z", stream=CALIPER), links).open()
 
 
-async def test_an_end_of_its_travel_is_told(line, gauge):
-    line.repeats(b"----\r\n")
-    await gauge.open()
-    with pytest.raises(GaugeAtEnd, match=r"gauge y: plunger at its end \(----\)"):
-        await gauge.read()
-
-
 async def test_a_stream_that_stops_names_the_gauge(line, gauge):
     line.repeats(b"-001.23 mm\r\n")
     await gauge.open()
     line.stops()
     with pytest.raises(GaugeSilent, match=r"gauge y: sends nothing for 0\.05 s on port wire"):
         await gauge.check()
-
-
-async def test_other_lines_are_quoted(line, gauge):
-    line.repeats(b"-001.23 in\r\n")
-    with pytest.raises(WrongAnswer, match="where protocol stream has answers like"):
-        await gauge.open()
 
 
 async def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file(links, settings):

@@ -105,22 +105,6 @@ async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> Non
             assert (await pose_of(controller)).position != pytest.approx(believed.position, abs=0.5)
 
 
-def test_settings_have_an_address_for_every_device_and_no_simulation(bundled_cell) -> None:
-    with serve(bundled_cell) as cell:
-        assert cell.settings.simulation is None
-        assert len({gauge.port for gauge in cell.settings.gauges}) == 3
-        assert cell.settings.encoders.bus == cell.encoders.bus_settings
-        assert cell.settings.controller.port == cell.controller.port
-        type(cell.settings).model_validate(cell.settings.model_dump(), strict=True)
-
-
-def test_other_processes_reach_the_encoders_too(bundled_cell) -> None:
-    with serve(bundled_cell, other_processes=True) as cell:
-        bus = cell.settings.encoders.bus
-        assert bus != cell.encoders.bus_settings
-        assert bus["interface"] == "slcan"
-
-
 def test_closing_ends_all_threads_and_may_be_repeated(bundled_cell) -> None:
     before = set(threading.enumerate())
     cell = serve(bundled_cell)

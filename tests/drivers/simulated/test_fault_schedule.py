@@ -112,18 +112,6 @@ def test_a_fault_waits_for_its_move(log) -> None:
         assert log.wait_for(2) == [("inject", "x"), ("inject", "y")]
 
 
-def test_planned_faults_are_checked_at_the_start(log) -> None:
-    with pytest.raises(UsageError):
-        FaultSchedule(log, log.clock, [fault("absent")])
-
-
-def test_closing_drops_faults_that_are_not_due(log) -> None:
-    schedule = FaultSchedule(log, log.clock, [fault("x", after_s=1000.0)])
-    schedule.close()
-    schedule.close()
-    assert log.told == []
-
-
 def test_a_cell_file_with_an_impossible_fault_is_refused(bundled_cell) -> None:
     settings = bundled_cell.settings
     simulation = settings.simulation.model_copy(update={"faults": (fault("w"),)})

@@ -116,16 +116,6 @@ def test_gauges_stand_where_they_were_when_the_program_is_started_again(followed
     np.testing.assert_array_equal(second.physics.gauges.station, first.physics.gauges.station)
 
 
-def test_gauges_are_placed_anew_where_the_config_is_another(followed, tmp_path) -> None:
-    first, joints = followed([*STANDS, TURNED])
-    shown_at_last(first, joints)
-    with (tmp_path / "simulated-hexaglide.controller.toml").open("a") as config:
-        config.write("\n# edited\n")
-    second, joints = followed([TURNED])
-    shown_at_last(second, joints)
-    assert np.abs(second.physics.gauges.station - first.physics.gauges.station).max() > 0.01
-
-
 @pytest.mark.parametrize("damaged", [b"", b"\xff", b"[]", b'{"config": 1}'])
 def test_a_damaged_file_of_the_gauges_places_is_none(followed, tmp_path, damaged) -> None:
     (tmp_path / ".simulated-hexaglide.controller.toml.simulated-gauges").write_bytes(damaged)

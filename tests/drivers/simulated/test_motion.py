@@ -53,19 +53,9 @@ def test_no_piece_is_passed_faster_than_at_the_rate_between_the_ramps(
     assert passed <= 1e-3 / duration_s * (1.0 + 1e-9)
 
 
-times = st.floats(-100.0, 100.0)
-
-
 @given(stopped=st.floats(10.0, 14.0), later=st.floats(0.0, 100.0))
 def test_a_stopped_motion_stays_at_its_position(stopped: float, later: float) -> None:
     motion = Motion(PATH, start_s=10.0, duration_s=4.0)
     halted = replace(motion, stopped_s=stopped)
     assert halted.end_s == stopped
     assert np.array_equal(halted.joints(stopped + later), motion.joints(stopped))
-
-
-def test_a_stationary_motion_is_complete_from_the_start() -> None:
-    rest = Motion(PATH[[1, 1]], -1e9, 0.0)
-    assert rest.end_s < 0.0
-    assert rest.fraction(0.0) == 1.0
-    assert np.array_equal(rest.joints(0.0), PATH[1])

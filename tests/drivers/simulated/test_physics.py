@@ -45,14 +45,6 @@ def test_sliders_follow_the_controllers_geometry(twin) -> None:
         assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(pose), abs=1e-9)
 
 
-def test_the_pose_does_not_depend_on_the_path(make_twin) -> None:
-    one, other = make_twin(station_reach_mm=1e6), make_twin(station_reach_mm=1e6)
-    go(one, POSES[2])
-    for pose in (POSES[1], POSES[0], POSES[2]):
-        go(other, pose)
-    assert one.seen() == pytest.approx(other.seen(), abs=1e-6)
-
-
 def test_a_move_takes_the_time_of_its_longest_slider(make_twin) -> None:
     twin = make_twin(motion__speed_mm_s=50.0, motion__minimum_s=0.2)
     here = twin.physics.encoder_positions()
@@ -72,20 +64,6 @@ def test_sliders_and_ball_are_between_start_and_end_during_a_move(make_twin) -> 
     assert twin.physics.progress() == pytest.approx(0.5)
     assert twin.physics.encoder_positions() == pytest.approx(start + 10.0)
     assert twin.seen() - seen == pytest.approx([10.0, 0.0, 0.0], abs=1e-6)
-
-
-def test_a_stopped_robot_stays_in_place(make_twin) -> None:
-    twin = make_twin(station_reach_mm=1e6)
-    start, seen = twin.physics.encoder_positions(), twin.seen()
-    motion = twin.physics.start_motion(np.stack([start, start + 20.0]))
-    twin.clock.time_s += motion.duration_s / 2.0
-    twin.physics.stop()
-    for _ in range(3):
-        assert twin.physics.progress() == pytest.approx(0.5)
-        assert twin.physics.encoder_positions() == pytest.approx(start + 10.0)
-        assert twin.seen() - seen == pytest.approx([10.0, 0.0, 0.0], abs=1e-6)
-        twin.clock.time_s += motion.duration_s
-        twin.physics.stop()
 
 
 def test_noise_is_drawn_at_every_stop_and_stays_until_the_next(make_twin) -> None:

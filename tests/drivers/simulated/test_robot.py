@@ -26,14 +26,6 @@ def rewrite(twin: Any, geometry: Geometry) -> None:
     twin.config.write_text(NativeToml(HEXAGLIDE_PARAMETERS).rewrite(text, geometry))
 
 
-def test_a_move_lasts_until_the_sliders_stand(make_twin) -> None:
-    twin = make_twin(motion__minimum_s=2.5)
-    begun = twin.clock.now()
-    twin.machine.move(TILTED)
-    assert twin.clock.now() - begun == 2.5
-    assert twin.physics.progress() == 1.0
-
-
 def test_the_pose_during_a_move_is_between_start_and_end(twin) -> None:
     seen: list[Pose] = []
 
@@ -92,14 +84,6 @@ def test_the_machine_stops_in_place(twin) -> None:
     twin.clock.time_s += 10.0
     assert twin.machine.pose().as_tuple() == pytest.approx(there.as_tuple(), abs=1e-6)
     assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(there), abs=1e-3)
-
-
-def test_after_a_stop_the_next_move_starts_there(twin) -> None:
-    stop_half_way(twin)
-    twin.machine.move(Pose(4.0, 0.0, 550.0))
-    twin.clock.on_wait = lambda: None
-    twin.machine.move(TILTED)
-    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
 
 
 def test_a_stop_while_the_line_is_computed_is_not_lost(twin, monkeypatch) -> None:

@@ -22,10 +22,10 @@ from hexacell.verdict.decision import Verdict
 from hexacell.verdict.length_check import LengthStatement
 from procedures.calibration.calibration import Mode, expected_records
 from procedures.devices.device_set import Thermometers
-from procedures.engine.commands import MeasureAgain, UnattendedOperator
+from procedures.engine.commands import MeasureAgain
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
-from procedures.run.questions import GaugePlacement, Question, ask_mounting
+from procedures.run.questions import GaugePlacement, Question
 from procedures.run.state import RunState, fold
 from procedures.steps import events
 from procedures.steps.move import Move
@@ -299,14 +299,6 @@ async def test_a_seat_out_of_reach_is_told_before_anything_moves(make_length_rig
     failures = await plan_failures(calibration, unattended=True)
     assert failures
     assert all("length check, seat " in str(failure) for failure in failures)
-
-
-async def test_an_unattended_operator_says_which_seat(make_length_rig) -> None:
-    question = ask_mounting(2, 2, HERE)
-    with pytest.raises(AnswerNeeded, match="mounted in seat 2 of the fixture"):
-        await UnattendedOperator().ask(question)
-    assert "without zeroing them" in question.text
-    assert "and zero them" in ask_mounting(1, 1, HERE).text
 
 
 async def test_a_run_checks_the_scale_before_its_verdict(make_rig) -> None:

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.campaign.planner import Plan
 from hexacell.campaign.stopping_rules import REFUSALS
-from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -46,14 +44,6 @@ def spy(monkeypatch: pytest.MonkeyPatch, *blocked: tuple[float, ...]) -> list[tu
 
     monkeypatch.setattr(route_module, "is_clear", is_clear)
     return asked
-
-
-def test_a_run_begins_by_locating_the_robot(make_rig) -> None:
-    rig = make_rig()
-    beginning = [rig.started()]
-    assert next_step(rig.calibration, fold(beginning)).key == "locate"
-    step = next_step(rig.calibration, fold([*beginning, found_at(ELSEWHERE)]))
-    assert step.key == "P1/o01/move"
 
 
 def test_a_blocked_straight_line_is_replaced_by_a_route_over_a_waypoint(make_rig, monkeypatch) -> None:
@@ -224,15 +214,6 @@ def test_the_return_from_a_refused_pose_begins_at_the_last_record(make_rig, stor
     refusals = [story().arrived(5), story().refused(5)] * (REFUSALS + 1)
     step = next_step(make_rig().calibration, fold([*story().whole(4)[:-2], *refusals]))
     assert step.key == "P1/o04/move"
-
-
-def test_without_an_estimate_the_return_visits_every_previous_pose(make_rig, story, monkeypatch) -> None:
-    def unknown(*_: Any) -> Any:
-        raise IdentifiabilityError("the records cannot be followed")
-
-    monkeypatch.setattr(Plan, "estimate", unknown)
-    step = next_step(make_rig().calibration, fold(story().whole(ORIENTATIONS)[:-2]))
-    assert step.key == f"P1/o{ORIENTATIONS - 1:02d}/move"
 
 
 def test_the_ball_stays_inside_the_travel_on_every_path(recording, make_rig) -> None:

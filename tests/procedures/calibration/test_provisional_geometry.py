@@ -69,10 +69,6 @@ async def test_a_provisional_geometry_is_closer_to_the_truth_than_the_drawing(ri
     assert better < 0.9 * drawn
 
 
-def test_no_provisional_geometry_is_applied_by_default(recording) -> None:
-    assert "lent" not in {event.kind for event in recording.history}
-
-
 async def require_finished(rig: Any) -> None:
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE

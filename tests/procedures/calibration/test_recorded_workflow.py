@@ -128,11 +128,6 @@ def _passes(step: Any, following: Any) -> bool:
     return isinstance(step, Move) and isinstance(following, Move)
 
 
-@pytest.mark.parametrize(("mode", "seen"), [(Mode.OPTIMISE, 40), (Mode.CHECK, 42)])
-def test_the_number_of_expected_records(make_rig, mode: Mode, seen: int) -> None:
-    assert expected_records(make_rig(mode).cell.settings, mode) == seen
-
-
 def test_a_run_takes_the_expected_number_of_records(recording, make_rig) -> None:
     came = sum(isinstance(event, events.RecordTaken | events.SetClosed) for event in recording.history)
     assert came == expected_records(make_rig().cell.settings, Mode.OPTIMISE)
@@ -172,12 +167,6 @@ def moves(recording):
     for place, event in enumerate(recording.history):
         if isinstance(event, events.StepBegun) and isinstance(event.step, Move) and event.step.expected:
             yield event.step, recording.history[:place]
-
-
-def test_every_chosen_move_has_a_forecast_of_its_gain_and_of_the_remaining_records(recording) -> None:
-    forecasts = [step.expected.forecast for step, _ in moves(recording) if step.expected]
-    assert [forecast.records for forecast in forecasts if forecast] == [*range(17, 9, -1), *range(8, 0, -1)]
-    assert all(f and f.end_mm <= f.next_mm <= f.now_mm and f.minutes > 0.0 for f in forecasts)
 
 
 def test_with_the_target_reached_the_set_is_closed_and_the_geometry_identified(recording, make_rig, story):

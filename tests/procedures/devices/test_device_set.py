@@ -8,21 +8,15 @@ from typing import Any
 
 import pytest
 
-from drivers.errors import GaugeAtEnd, GaugeSilent
+from drivers.errors import GaugeSilent
 from drivers.interfaces import DeviceIdentity, TemperatureReading
-from hexacell.errors import CellBusy, DeviceError, ExitCode, HexacellError, SeveralErrors, consists_only_of
+from hexacell.errors import DeviceError, ExitCode, SeveralErrors
 from procedures.calibration.calibration import Mode
 from procedures.devices.device_set import Thermometers, gather_errors
 from procedures.journal.journal import read_journal
 from procedures.run.readings import Temperature
 from procedures.steps import events
 from tests.waiting import until
-
-
-async def test_all_devices_are_opened_and_identified(bench) -> None:
-    identities = await bench.devices.open()
-    names = [identity.name for identity in identities]
-    assert names == ["x", "y", "z", *(f"encoder {leg}" for leg in range(1, 7)), "controller"]
 
 
 async def test_all_devices_that_cannot_be_opened_are_named_at_once(bench) -> None:
@@ -89,24 +83,6 @@ async def test_cancelling_cancels_every_call() -> None:
     with pytest.raises(asyncio.CancelledError):
         await task
     assert cancelled == [1, 2]
-
-
-END = GaugeAtEnd("is at an end")
-SILENT = GaugeSilent("does not answer")
-
-
-@pytest.mark.parametrize(
-    ("error", "expected"),
-    [
-        (END, True),
-        (SILENT, False),
-        (SeveralErrors("two", [END, END]), True),
-        (SeveralErrors("two", [END, SILENT]), False),
-    ],
-)
-def test_errors_are_classified_by_their_kind(error: HexacellError, expected: bool) -> None:
-    assert consists_only_of(error, GaugeAtEnd) is expected
-    assert consists_only_of(error, GaugeAtEnd, CellBusy, GaugeSilent)
 
 
 class FakeThermometer:

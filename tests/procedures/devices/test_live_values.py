@@ -8,10 +8,8 @@ from dataclasses import replace
 import pytest
 
 from drivers.interfaces import ControllerStatus, GaugeReading
-from hexacell.cell.measuring import TimingSettings
 from hexacell.errors import DeviceError
 from procedures.devices.device_set import Devices, LiveValues, poll_for_screens
-from procedures.devices.settling import settle
 from procedures.guards.guards import Guards
 from tests.waiting import until
 
@@ -51,13 +49,6 @@ async def test_a_failure_is_kept_with_the_age_of_the_last_value(live, devices, b
     bench.encoders.failure = None
     await devices.read_encoders()
     assert live.encoders.problem == ""
-
-
-async def test_readings_taken_while_settling_are_published(live, devices, bench) -> None:
-    settled = await settle(devices, TimingSettings(), bench.clock)
-    assert settled.gauges.mean(axis=0).tolist() == [0.0, 0.0, 0.0]
-    assert live.encoders.value == settled.window[-1].encoders
-    assert live.gauge("z").value == settled.window[-1].gauges[2]
 
 
 async def test_values_polled_by_the_guards_are_published(make_rig) -> None:

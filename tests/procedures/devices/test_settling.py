@@ -90,21 +90,6 @@ async def test_limits_are_ranges_and_included(bench) -> None:
     assert np.ptp(settled.gauges[:, 0]) == TIMING.spread_gauge_mm
 
 
-async def test_readings_from_before_an_unsteady_one_do_not_count(bench) -> None:
-    looks = 0
-
-    def shown() -> float:
-        nonlocal looks
-        looks += 1
-        if looks == 4:  # at 0.3 s
-            bench.gauges[2].failures.append(unsteady("z"))
-        return 0.0
-
-    bench.gauges[1].shown = shown
-    settled = await settle(bench.devices, TIMING, bench.clock)
-    assert settled.window[0].at_s > 0.35
-
-
 @pytest.mark.parametrize(
     ("gauges", "leg", "named"),
     [
@@ -200,15 +185,6 @@ async def test_a_window_longer_than_the_time_allowed_is_reported(bench) -> None:
         await settle(bench.devices, timing, bench.clock)
 
 
-async def test_a_snapshot_contains_raw_answers_counts_and_positions(bench) -> None:
-    bench.gauges[1].shown = lambda: -1.25
-    bench.encoders.shown = lambda: (0.001, 0.0, 0.0, 0.0, 0.0, -2.5)
-    look = await read_all(bench.devices, bench.clock)
-    assert [reading.raw for reading in look.gauges] == ["+0.000", "-1.250", "+0.000"]
-    assert look.encoders.counts == (1, 0, 0, 0, 0, -2500)
-    assert look.encoders.positions == (0.001, 0.0, 0.0, 0.0, 0.0, -2.5)
-
-
 async def test_encoders_are_read_while_gauges_are_and_the_skew_is_from_the_first_to_the_last(
     bench, monkeypatch
 ) -> None:
@@ -237,13 +213,6 @@ async def test_encoders_are_read_while_gauges_are_and_the_skew_is_from_the_first
     look = await read_all(bench.devices, cast("CellClock", Moments()))
     assert look.at_s == pytest.approx(5.04)
     assert look.skew_s == pytest.approx(0.03)
-
-
-async def test_gauges_and_encoders_that_fail_together_are_all_named(bench) -> None:
-    bench.gauges[2].failures = [GaugeSilent("does not answer", subject="gauge z")]
-    bench.encoders.failure = DeviceError("are not open", subject="encoders")
-    with pytest.raises(SeveralErrors, match=r"(?s)gauge z.*encoders"):
-        await read_all(bench.devices, bench.clock)
 
 
 @pytest.mark.parametrize("count", [3, 4, 5, 7, 12])

@@ -166,21 +166,6 @@ async def test_undo_discards_the_last_record_at_the_time_of_the_command(stage: S
     assert sampled == [1, 2, 3, 2], "what was discarded stays in the journal"
 
 
-async def test_two_undo_commands_discard_two_records(stage: Stage) -> None:
-    await stage.held_at("P1/o03/move")
-    for _ in range(2):
-        stage.engine.command(Undo())
-    await stage.over()
-    undone = [
-        event
-        for event in stage.journal.events
-        if isinstance(event, events.RecordDiscarded | events.SetInvalidated)
-    ]
-    assert undone[0] == events.RecordDiscarded(at=P1, orientation=2)
-    assert undone[1] == events.SetInvalidated(at=P1, reason="a person asked for it")
-    assert len(fold(stage.journal.events).set(P1).samples) == 3
-
-
 @pytest.mark.parametrize(
     ("command", "event"),
     [

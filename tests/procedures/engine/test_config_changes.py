@@ -67,19 +67,6 @@ def test_an_early_end_reverts_unverified_and_provisional_geometries(history, err
     assert step_at_end(history, error) == step
 
 
-def test_only_a_result_that_stays_in_the_controller_is_reported() -> None:
-    result, provisional = (
-        revert_at_end(fold([COMMITTED]), FAILURE),
-        revert_at_end(fold([APPLIED, arrived(1)]), FAILURE),
-    )
-    assert result is not None
-    assert provisional is not None
-    assert result.failure == "the new geometry was not verified, and could not be taken back"
-    assert not provisional.failure, "the resumed run reverts it"
-    assert result.is_recorded
-    assert provisional.is_recorded
-
-
 @pytest.mark.parametrize(("event", "step"), [(COMMITTED, ROLL_BACK), (APPLIED, TAKE_BACK)])
 def test_a_change_that_could_not_be_journalled_is_reverted(event: events.Event, step: BaseStep) -> None:
     reversal = revert_unrecorded(event, RunState())

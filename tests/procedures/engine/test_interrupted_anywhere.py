@@ -66,14 +66,3 @@ async def interrupted_twice(rig: Any, how: str, first: int, second: int) -> None
 async def test_a_run_interrupted_after_any_event_and_again_finishes_with_every_record_once(make_rig, first):
     how = list(WAYS)[first % 2]
     await interrupted_twice(make_rig(), how, first, 1 + (7 * first) % 13)
-
-
-@pytest.mark.parametrize(
-    ("how", "sets", "first", "second"),
-    [pytest.param("power cut", 1, 27, 3, marks=pytest.mark.slow), ("aborted", 2, 14, 6)],
-)
-async def test_a_run_interrupted_twice_after_whole_sets_finishes_with_every_record_once(
-    recording, replayed, how: str, sets: int, first: int, second: int
-) -> None:
-    rig = replayed(recording.until(events.SetClosed, count=sets))
-    await interrupted_twice(rig, how, first, second)

@@ -10,9 +10,9 @@ import pytest
 
 from drivers.errors import BusError, GaugeSilent, ZeroVoid
 from hexacell.cell.recovery import Action, FailureKind
-from hexacell.errors import DeviceError, ExitCode, HexacellError, Interruption
+from hexacell.errors import DeviceError, ExitCode, HexacellError
 from procedures.engine.command_loop import Status
-from procedures.engine.commands import Abort, Answer, Pause, Resume
+from procedures.engine.commands import Answer, Pause, Resume
 from procedures.steps import events
 from tests.procedures.engine.injected_failures import (
     ATTENDED,
@@ -156,15 +156,6 @@ async def test_the_recovery_chosen_by_the_operator_is_executed(at_second_point, 
     )
 
 
-async def test_an_operator_who_chooses_abort_ends_the_run(at_second_point) -> None:
-    rig = at_second_point
-    rig.operator.decisions = [Action.ABORT]
-    silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT))
-    with pytest.raises(GaugeSilent):
-        await rig.run(silent, policy=ATTENDED)
-    assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.HARDWARE
-
-
 async def test_a_fault_rejects_other_commands_until_it_is_answered(at_second_point) -> None:
     rig = at_second_point
     asked = asyncio.Event()
@@ -187,17 +178,3 @@ async def test_a_fault_rejects_other_commands_until_it_is_answered(at_second_poi
     rig.engine.command(Answer("retry"))
     assert await running
     assert [event.command for event in happened(rig, events.CommandRejected)] == ["Resume", "Pause"]
-
-
-async def test_a_faulted_run_can_be_aborted(at_second_point) -> None:
-    rig = at_second_point
-
-    async def leave(*_: Any) -> Action:
-        rig.engine.command(Abort())
-        await asyncio.Event().wait()
-        return Action.RETRY
-
-    rig.operator.ask = leave
-    silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT))
-    with pytest.raises(Interruption):
-        await rig.run(silent, policy=ATTENDED)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import pytest
@@ -17,7 +16,6 @@ from procedures.journal.journal import read_journal
 from procedures.resources import controller_config as config_changes
 from procedures.run.state import fold
 from procedures.steps import events
-from tests.procedures.runs.listening import cancelled, on
 
 INTERRUPTED = events.Interrupted(reason="a power cut", exit_code=130)
 
@@ -86,23 +84,6 @@ def require_whole_sets(history: Sequence[events.Event]) -> None:
                 doubted -= {event.at}
             case events.RecordTaken() | events.SetClosed():
                 assert event.at not in doubted
-
-
-@pytest.mark.sample("6", "25")
-@pytest.mark.parametrize("number", [1, 6, 22, 25, 28])
-async def test_a_run_cancelled_after_any_event_resumes(recording, replayed, number: int) -> None:
-    rig = replayed(recording.until(events.SetClosed, count=3))
-    begun = len(read_journal(rig.folder.journal))
-    await cancelled(rig, partial(on, object, count=number))
-    first = read_journal(rig.folder.journal)
-    assert first[-1] == events.Interrupted(reason="CancelledError", exit_code=130)
-    assert len(first) - begun in {number + 1, number + 2}, "a step that was being done may have ended"
-    assert rig.controller.log[-1] == "stop"
-
-    assert (await rig.run()).exit_code == ExitCode.DONE
-    history = read_journal(rig.folder.journal)
-    assert history[: len(first)] == first
-    require_whole_sets(history)
 
 
 async def test_a_write_back_in_progress_is_completed_despite_cancellation(recording, replayed, monkeypatch):

@@ -73,20 +73,6 @@ def test_partial_writes_are_continued_to_a_whole_line(path: Path, monkeypatch) -
     assert read_journal(path) == TOLD[:1]
 
 
-def test_a_partial_write_is_reported_with_the_error_that_ended_it(path: Path, monkeypatch) -> None:
-    with Journal(path) as journal:
-        disk = FullDisk(monkeypatch, 40)
-
-        def limited(descriptor: int, data: bytes) -> int:
-            if not disk.room:
-                raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
-            return disk.write(descriptor, data)
-
-        monkeypatch.setattr(os, "write", limited)
-        with pytest.raises(FileError, match=r"it may not become larger\. Raise the limit"):
-            journal.append(TOLD[0])
-
-
 def test_half_a_line_that_could_not_be_cut_off_is_cut_off_before_the_next(path: Path, monkeypatch) -> None:
     with Journal(path) as journal:
         journal.append(TOLD[0])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import fcntl
-import gc
 import json
 import os
 import time
@@ -168,15 +167,3 @@ def test_a_wall_clock_that_jumps_leaves_the_monotonic_times_sorted(path: Path, m
     assert len(seconds) == len(TOLD)
     assert seconds == sorted(seconds)
     assert begun <= seconds[0] <= seconds[-1] <= time.monotonic() + 0.001
-
-
-def test_reading_restores_the_state_of_the_garbage_collector(path: Path, written: bytes) -> None:
-    assert gc.isenabled()
-    read_journal(path)
-    assert gc.isenabled()
-    gc.disable()
-    try:
-        read_journal(path)
-        assert not gc.isenabled()
-    finally:
-        gc.enable()

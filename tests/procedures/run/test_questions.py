@@ -72,11 +72,3 @@ async def test_an_empty_answer_is_the_default() -> None:
     assert broker.open.subject == GaugePlacement(2, Pose(1.0, 2.0, 3.0), "point 2")
     assert broker.answer(None)
     assert await asking == "placed"
-
-
-async def test_an_approval_may_be_declined() -> None:
-    broker = QuestionBroker(SilentOperator())
-    asking = asyncio.create_task(broker.ask(ask_approval([], "diff", cell="bench")))
-    await asyncio.sleep(0)
-    assert broker.answer(None)
-    assert await asking is None

@@ -24,13 +24,6 @@ def test_a_fold_applies_one_event_at_a_time(recording) -> None:
     assert fold(recording.history) == state
 
 
-def test_applying_an_event_does_not_change_the_former_state(story) -> None:
-    first = fold([story().arrived(), story().placed()])
-    apply(first, story().sampled())
-    apply(first, story().voided())
-    assert first == fold([story().arrived(), story().placed()])
-
-
 def test_a_rejected_record_is_counted_and_voids_the_position(story) -> None:
     state = fold([story().arrived(2), story().refused(), story().arrived(2), story().refused()])
     assert state.set(P1).rejections == 2

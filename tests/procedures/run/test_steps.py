@@ -7,7 +7,7 @@ from typing import Any, get_args
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from hexacell.campaign.pilots import FIRST_PILOT
 from procedures.journal.journal import Journal, read_journal
@@ -41,11 +41,6 @@ P2 = SetKey(phase=Phase.IDENTIFY, point=2)
 )
 def test_keys_are_stable(step: Any, key: str) -> None:
     assert step.key == key
-
-
-def test_unknown_keys_are_refused() -> None:
-    with pytest.raises(ValidationError):
-        TypeAdapter(Step).validate_python({"kind": "close", "at": {"phase": "P", "point": 1}, "why": 1})
 
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)

@@ -96,18 +96,3 @@ async def test_after_an_interruption_the_gauges_are_tried_again_before_the_set_c
     assert after[:8] == [*["P1/o00/move", "P1/probe"] * 3, "P1/o01/move", "P1/try"]
     records = [event.orientation for event in history if isinstance(event, events.RecordTaken)][:9]
     assert records == [1, 2, 3, 4, 5, 6, 7, 8, 9]
-
-
-@pytest.mark.slow
-async def test_a_trial_that_was_interrupted_begins_again(make_rig) -> None:
-    rig = make_rig(stations__trial_mm=1.0)
-
-    def stop() -> None:
-        raise LimitError("stop here")
-
-    with pytest.raises(LimitError, match="stop here"):
-        await rig.run(on(events.GaugesProbed, stop, count=2))
-    ended = await rig.run()
-    assert ended.exit_code == ExitCode.DONE
-    probes = [event for event in happened(rig, events.GaugesProbed) if event.at == P1]
-    assert len(probes) == 5

@@ -19,7 +19,6 @@ from hexacell.config.change import Receipt
 from hexacell.errors import ExitCode, Interruption
 from hexacell.kinematics.pose import Pose
 from hexacell.services.run.calibration_run import calibration_of_run
-from procedures.calibration.calibration import Mode
 from procedures.engine.commands import Abort, Stop
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
@@ -215,11 +214,6 @@ async def test_records_are_means_of_several_windows_where_that_is_allowed_and_pa
     assert state.set(P1).samples[:2] == (zero, second)
     noise = rig.calibration.known(state).robot_of(state).noise
     assert noise.encoder < 0.85 * 0.0045
-
-
-async def test_a_check_measures_the_noise_too(make_rig: MakeRig) -> None:
-    rig = make_rig(Mode.CHECK, **ASKED)
-    assert not (await measure_noise(rig)).noise.is_larger
 
 
 @pytest.fixture(scope="module")

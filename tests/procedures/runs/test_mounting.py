@@ -54,18 +54,6 @@ async def test_a_person_is_told_how_to_move_the_gauge_and_the_set_begins_again(m
     assert failed.failure is FailureKind.MOUNTING
 
 
-@pytest.mark.slow
-async def test_a_gauge_that_does_not_tell_its_place_is_not_refused(make_rig) -> None:
-    rig = make_rig()
-    gauges = tuple(gauge.model_copy(update={"middle_mm": None}) for gauge in rig.cell.settings.gauges)
-    blind = make_rig(gauges=gauges, stations__mounting_mm=0.5)
-    off_the_middle(blind.gauges[1], -1.5)
-    ended = await blind.run()
-    assert ended.exit_code == ExitCode.DONE
-    sampled = [event for event in happened(blind, events.RecordTaken) if event.orientation > 1]
-    assert np.abs([event.deviation_mm for event in sampled]).max() <= 4.5
-
-
 async def test_no_record_leaves_the_room_of_gauges_zeroed_off_the_middle(make_rig) -> None:
     rig = make_rig(simulation__gauges__placing_mm=0.0)
     for gauge, off_mm in zip(rig.gauges, (0.9, -0.9, 0.9), strict=True):

@@ -91,16 +91,6 @@ async def test_an_answer_after_its_timeout_is_discarded(play):
     assert (await pose_of(driver)).x == 5.0
 
 
-async def test_a_missing_answer_makes_the_driver_reconnect(play):
-    play.patience = play.IMPATIENT
-    driver = await play.opened(
-        [("get abs_act_pos", play.SILENCE)], [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)]
-    )
-    with pytest.raises(ResponseTimeout):
-        await pose_of(driver)
-    assert (await pose_of(driver)).x == 5.0
-
-
 async def test_a_server_that_was_started_anew_is_connected_to_again(play):
     driver = await play.opened(
         [("get abs_act_pos", ARRIVED, play.HANG_UP)], [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)]

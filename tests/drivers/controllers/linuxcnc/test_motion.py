@@ -193,14 +193,6 @@ async def test_a_refused_pose_whose_command_is_acknowledged_is_refused_all_the_s
         await driver.move(TARGET, MOVE_S)
 
 
-async def test_a_machine_that_is_not_homed_refuses_no_pose(play):
-    why = said("get error: Can't issue MDI command when not homed | get error: OK")
-    driver = await play.opened([*REFUSED, *why])
-    with pytest.raises(MoveRefused, match="when not homed") as refused:
-        await driver.move(TARGET, MOVE_S)
-    assert not isinstance(refused.value, PoseRefused)
-
-
 [MODES] = said("get program_codes: G1 G17 G40 G21 G90 G94 G54 G49 F250 S0")
 CONTROL = [AGAIN_IN_CONTROL, NO_ERROR, *said("set set_wait done")]
 READY = [*CONTROL, *NO_ESTOP, *IS_ON, *HOMED, *MDI_MODE]
@@ -215,13 +207,6 @@ async def test_the_modes_of_before_are_restored_after_a_move(play):
     await driver.prepare(frozenset())
     await driver.move(TARGET, MOVE_S)
     await driver.close()
-
-
-async def test_modes_that_are_not_restored_for_no_reason_are_asked_for_again(play):
-    refused = [*REFUSED_TO_RESTORE, *STATE] * 2
-    driver = await play.opened([*READY, *CHECKED, *MOVED, *refused, RESTORED_HERE])
-    await driver.prepare(frozenset())
-    await driver.move(TARGET, MOVE_S)
 
 
 async def test_modes_that_are_not_restored_for_a_reason_are_not_asked_for_again(play):

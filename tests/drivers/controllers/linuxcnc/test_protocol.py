@@ -37,12 +37,6 @@ def test_lines_are_split_at_any_line_end_and_any_packet_boundary(lines, data):
     assert buffer.rest == ""
 
 
-def test_bytes_without_a_line_end_are_kept():
-    buffer = LineBuffer()
-    assert buffer.feed(b"login: ") == []
-    assert buffer.rest == "login:"
-
-
 @given(st.text())
 def test_an_encoded_command_fits_the_server_and_is_one_line(command):
     try:
@@ -53,12 +47,6 @@ def test_an_encoded_command_fits_the_server_and_is_one_line(command):
         assert len(line) <= 255
         assert line.endswith(b"\r\n")
         assert line.count(b"\n") == line.count(b"\r") == 1
-
-
-def test_a_command_longer_than_the_limit_is_refused():
-    assert len(encode_command("x" * 253, "controller")) == 255
-    with pytest.raises(UsageError, match="256 bytes is longer than the 255"):
-        encode_command("x" * 254, "controller")
 
 
 @given(st.builds(Pose, *[COORDINATES] * 6), st.floats(0.1, 1e5))

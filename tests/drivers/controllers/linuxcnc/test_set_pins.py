@@ -124,9 +124,3 @@ def test_without_linuxcnc_the_command_fails_in_one_line(files, monkeypatch, caps
     said = capsys.readouterr().err
     assert said.startswith("hexacell-set-pins: halcmd cannot be run")
     assert said.count("\n") == 1
-
-
-def test_the_command_tells_how_many(pins, files, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(sys, "argv", ["hexacell-set-pins", *map(str, files())])
-    assert command.main() == 0
-    assert capsys.readouterr().out == "2 pins set\n"

@@ -50,13 +50,6 @@ async def test_a_sample_is_newer_than_its_request(simulated):
         assert (await cell.driver.read()).positions == pytest.approx((10.0 + 0.01 * step,) * 6)
 
 
-async def test_encoders_that_wait_for_a_request_get_it(simulated):
-    cell = simulated(request="080#", delay_s=100.0)  # of those alone that send unasked
-    await cell.driver.open()
-    cell.positions[0] = 10.25
-    assert (await cell.driver.read()).positions[0] == pytest.approx(10.25)
-
-
 async def test_the_request_is_on_the_wire(settings, wire):
     bank = DbcBank(settings(wire.settings, request="123#A0B1"))
     opening = asyncio.create_task(bank.open())
@@ -64,24 +57,6 @@ async def test_the_request_is_on_the_wire(settings, wire):
     assert (message.arbitration_id, bytes(message.data)) == (0x123, b"\xa0\xb1")
     with pytest.raises(SilentNodeError):
         await opening
-    await bank.close()
-
-
-async def test_direction_and_offset_are_those_of_the_cell_file(simulated, settings, wire):
-    changes = {"direction": (1, -1, 1, 1, 1, 1), "offset": (100.0, 0.0, 0.0, 0.0, 0.0, 0.0)}
-    bank = DbcBank(settings(wire.settings).model_copy(update=changes))
-    await while_sending(wire, bank.open)
-    sample = await while_sending(wire, bank.read)
-    assert sample.positions == pytest.approx((101.5, 2.0, 3.0, 4.0, 5.0, 6.0))
-    await bank.close()
-
-
-async def test_other_frames_on_the_bus_are_ignored(settings, wire):
-    bank = DbcBank(settings(wire.settings))
-    await while_sending(wire, bank.open)
-    wire.send(0x201, b"\xff" * 6, extended=True)
-    wire.send(0x700, b"\xff" * 8)
-    assert (await while_sending(wire, bank.read)).positions[0] == pytest.approx(1.5)
     await bank.close()
 
 
@@ -157,11 +132,6 @@ async def test_a_file_that_does_not_fit_is_told(settings, dbc_file, wire, text, 
     dbc_file.write_text(text)
     with pytest.raises(FileError, match=message):
         await DbcBank(settings(wire.settings, signals=signals)).open()
-
-
-async def test_a_file_that_is_not_there_is_told(settings, wire):
-    with pytest.raises(FileError, match=r"/nowhere\.dbc: cannot be read"):
-        await DbcBank(settings(wire.settings, file="/nowhere.dbc")).open()
 
 
 async def test_metres_become_millimetres(settings, dbc_file, wire):

@@ -3,8 +3,7 @@
 import pytest
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid
-from drivers.gauges.sylvac import SylvacGauge
-from hexacell.errors import DeviceError, ExitCode, FileError
+from hexacell.errors import DeviceError, ExitCode
 from tests.drivers.gauges.sylvac.dialogue import OPENING, opening
 
 
@@ -164,30 +163,6 @@ async def test_requests_are_repeated_if_opening_switches_the_gauge_on(dialogue, 
     assert (await gauge.read()).value_mm == 1.0
 
 
-async def test_a_power_up_message_before_opening_is_ignored(dialogue, gauge, monkeypatch):
-    opening_port = dialogue.open
-
-    def open_with_banner():
-        opening_port()
-        dialogue.unasked(b"SY276.1\r")
-
-    monkeypatch.setattr(dialogue, "open", open_with_banner)
-    dialogue.expect(OPENING[0], *OPENING)
-    await gauge.open()
-
-
-async def test_a_lost_port_is_reported_until_the_gauge_is_opened_again(dialogue, opened):
-    dialogue.broken = OSError(5, "Input/output error")
-    with pytest.raises(DeviceError, match="gauge y: port wire was lost"):
-        await opened.read()
-    dialogue.broken = None
-    with pytest.raises(DeviceError, match="was lost"):
-        await opened.read()
-    dialogue.expect(*OPENING, (b"?\r", b"+1.000\r"), (b"?\r", b"+1.000\r"))
-    await opened.open()
-    assert (await opened.read()).value_mm == 1.0
-
-
 async def test_a_gauge_that_is_not_open_cannot_be_read_and_may_be_closed_twice(dialogue, gauge):
     for call in (gauge.read, gauge.check):
         with pytest.raises(DeviceError, match="gauge y: is not open"):
@@ -199,8 +174,3 @@ async def test_a_gauge_that_is_not_open_cannot_be_read_and_may_be_closed_twice(d
     assert not dialogue.is_open
     with pytest.raises(DeviceError, match="is not open"):
         await gauge.read()
-
-
-async def test_a_gauge_without_a_port_is_an_error_of_the_cell_file(links, settings):
-    with pytest.raises(FileError, match="gauge y: has no port"):
-        await SylvacGauge(settings("sylvac", port=None), links).open()

@@ -6,7 +6,6 @@ import pytest
 
 from drivers.errors import GaugeUnsteady, WrongAnswer, WrongSetting
 from drivers.gauges.serial_gauge import MAX_READINGS
-from drivers.gauges.sylvac import SylvacGauge
 from drivers.interfaces import DeviceIdentity, Gauge, GaugeReading
 from hexacell.errors import DeviceError
 from tests.drivers.gauges.sylvac.dialogue import OPENING
@@ -29,18 +28,6 @@ async def test_the_serial_line_has_the_defaults_of_the_protocol(dialogue, opened
         "exclusive": True,
     }
     assert (dialogue.dtr, dialogue.rts) == (True, False)
-
-
-async def test_the_cell_file_overrides_the_defaults(dialogue, links, settings):
-    dialogue.expect(*OPENING)
-    serial = {"baudrate": 9600, "xonxoff": True, "dtr": False}
-    gauge = SylvacGauge(settings("sylvac", serial=serial), links)
-    await gauge.open()
-    assert dialogue.settings["baudrate"] == 9600
-    assert dialogue.settings["xonxoff"] is True
-    assert dialogue.settings["parity"] == "E"
-    assert dialogue.dtr is False
-    await gauge.close()
 
 
 async def test_echoed_requests_are_not_answers(dialogue, gauge):
@@ -84,11 +71,6 @@ async def test_the_request_is_repeated_after_a_frame_that_does_not_match(dialogu
 async def test_the_request_is_repeated_after_an_incomplete_frame(dialogue, opened):
     dialogue.expect((b"?\r", b"+1.23"), (b"?\r", b"+1.234\r"), (b"?\r", b"+1.234\r"))
     assert (await opened.read()).value_mm == 1.234
-
-
-async def test_read_once_sends_one_request(dialogue, opened):
-    dialogue.expect((b"?\r", b"+1.234\r"))
-    assert await opened.read_once() == GaugeReading(1.234, "+1.234")
 
 
 async def test_read_once_does_not_repeat_a_garbled_answer(dialogue, opened):

@@ -73,15 +73,3 @@ async def test_a_cancelled_close_closes_all_the_same(fake):
     with pytest.raises(asyncio.CancelledError):
         await closing
     await until(lambda: not port.is_open)
-
-
-async def test_closing_twice_is_harmless_and_use_after_closing_is_an_error(fake):
-    fake(FakePort())
-    link = await opened()
-    await link.close()
-    await link.close()
-    link.require_silence()
-    with pytest.raises(DeviceError, match="is closed"):
-        await link.exchange(b"?\r", b"\r", FOREVER_S)
-    with pytest.raises(DeviceError, match="is closed"):
-        await link.open()

@@ -5,16 +5,8 @@ import serial
 
 from drivers.serial.framing import FRAME_LIMIT
 from drivers.serial.request_port import NoAnswer
-from drivers.wire_trace import TrafficDirection, WireTrace
 from hexacell.errors import DeviceError
-from tests.drivers.serial.shared_port.fake_port import (
-    LONG_S,
-    SOON_S,
-    WORST_LATENCY_S,
-    FakePort,
-    link_to,
-    opened,
-)
+from tests.drivers.serial.shared_port.fake_port import LONG_S, SOON_S, WORST_LATENCY_S, FakePort, opened
 
 
 async def test_an_answer_is_complete_and_read_by_one_thread(fake):
@@ -119,23 +111,3 @@ async def test_a_device_that_never_falls_silent_is_refused(fake):
     with pytest.raises(DeviceError, match="keeps sending unasked"):
         await link.exchange(b"?\r", b"\r", LONG_S)
     assert port.asked == []
-
-
-async def test_the_echo_alone_is_no_answer():
-    link = await opened("loop://")
-    with pytest.raises(NoAnswer) as caught:
-        await link.exchange(b"?\r", b"\r", SOON_S)
-    assert caught.value.received == b"?\r"
-
-
-async def test_every_byte_is_traced(fake):
-    trace = WireTrace()
-    fake(FakePort(lambda _: [(0.0, b"?\r+1.234\r")]))
-    link = link_to("fake", {}, trace=trace)
-    await link.open()
-    await link.exchange(b"?\r", b"\r", LONG_S)
-    await link.close()
-    assert [(each.line, each.direction, each.data) for each in trace.entries()] == [
-        ("fake", TrafficDirection.SENT, b"?\r"),
-        ("fake", TrafficDirection.RECEIVED, b"?\r+1.234\r"),
-    ]

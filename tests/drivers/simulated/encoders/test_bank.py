@@ -64,23 +64,6 @@ async def test_positions_come_back_within_half_a_step(make_bank, driver, setting
     assert found == pytest.approx(positions, abs=changed.measuring_step_nm * 0.5e-6 + 1e-9)
 
 
-async def test_two_cells_in_one_process_have_separate_buses(make_bank, driver):
-    banks = [driver(make_bank(positions=lambda mm=mm: [mm] * 6).bus_settings) for mm in (1.0, 2.0)]
-    await asyncio.gather(*(bank.open() for bank in banks))
-    rounds = await asyncio.gather(*(bank.read() for bank in banks for _ in range(10)))
-    assert [found.positions[0] for found in rounds] == pytest.approx([1.0] * 10 + [2.0] * 10)
-
-
-async def test_latency_is_in_the_cells_time(make_bank, driver):
-    clock = CellClock(100.0)
-    simulated = make_bank(clock=clock, latency_s=2.0)
-    bank = driver(simulated.bus_settings)
-    await bank.open()
-    begun_s = clock.now()
-    await bank.read()
-    assert clock.now() - begun_s >= 2.0
-
-
 @pytest.mark.parametrize("timeouts", [0.5, 1.4, 2.5, 4.5])
 async def test_late_answers_are_never_mixed_with_later_samples(make_bank, driver, timeouts):
     """Leg 3 answers every SYNC that much later, with what it saw at that SYNC."""

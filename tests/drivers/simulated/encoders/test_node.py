@@ -12,13 +12,6 @@ START, STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION = 1, 2, 0x80, 0x81, 0x8
 SYNC, NMT, ALL = 0x80, 0, 0
 
 
-def test_nothing_is_sent_before_start(make_bank, listen):
-    ear = listen(make_bank(vendors=(EVENTS_ONLY,) * 6))
-    assert ear.silence()
-    ear.send(SYNC)
-    assert ear.heard() == []
-
-
 @pytest.mark.parametrize("command", [STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION])
 def test_positions_are_sent_only_while_operational(make_bank, listen, command):
     ear = listen(make_bank())
@@ -29,18 +22,6 @@ def test_positions_are_sent_only_while_operational(make_bank, listen, command):
     ear.heard()
     ear.send(SYNC)
     assert ear.heard() == []
-
-
-def test_event_timers_run_while_operational(make_bank, listen):
-    clock = CellClock()
-    ear = listen(make_bank(clock=clock))
-    begun_s = clock.now()
-    ear.send(NMT, START, 2)
-    assert {ear.next()[0] for _ in range(5)} == {0x182}
-    assert clock.now() - begun_s >= 5 * 0.01
-    ear.send(NMT, STOP, 2)
-    ear.heard()
-    assert ear.silence()
 
 
 def test_a_reset_restores_the_vendors_defaults(make_bank, listen):
@@ -92,30 +73,6 @@ def test_changes_of_pdos_against_the_rules_are_refused(make_bank, listen, before
     answer = ear.sdo(1, request_)
     assert answer[:2] == "80"
     assert int.from_bytes(bytes.fromhex(answer[8:]), "little") == code
-
-
-def test_a_fixed_mapping_stays(make_bank, listen):
-    ear = listen(make_bank(vendors=(TWO_MAGNETS,) * 6))
-    ear.sdo(1, "2301180181020080")
-    assert ear.sdo(1, "2f011a0000").endswith("02000106")
-
-
-def test_one_sample_serves_all_nodes(make_bank, listen, samples):
-    ear = listen(make_bank())
-    for node in range(1, 7):
-        ear.send(NMT, START, node)
-    ear.send(SYNC)
-    positions = {can_id: data[:8] for can_id, data in ear.heard() if 0x280 < can_id < 0x300}
-    expected = samples.taken.to_bytes(4, "little").hex()
-    assert positions == {0x280 + node: expected for node in range(1, 7)}
-
-
-def test_reading_the_position_by_sdo_gives_the_last_sample(make_bank, listen, samples):
-    ear = listen(make_bank())
-    assert samples.taken == 1
-    assert ear.sdo(1, "40046000") == "4304600001000000"
-    ear.send(SYNC)
-    assert ear.sdo(1, "40046000") == "4304600002000000"
 
 
 def test_an_emergency_is_a_frame_and_a_register(make_bank, listen):

@@ -77,14 +77,6 @@ def test_frames_pass_only_while_the_channel_is_open(adapter):
     assert [message.arbitration_id for message in sent] == [0x80, 0x80]
 
 
-def test_in_listen_only_mode_no_frame_is_sent(adapter):
-    device, sent = adapter
-    assert device.answer("L") == b"\r"
-    assert device.is_open
-    assert device.answer("t0800") == b"\a"
-    assert sent == []
-
-
 @pytest.mark.parametrize(
     ("command", "answer"),
     [
@@ -103,11 +95,6 @@ def test_in_listen_only_mode_no_frame_is_sent(adapter):
 )
 def test_commands_and_their_answers(adapter, command, answer):
     assert adapter[0].answer(command) == answer
-
-
-def test_the_bit_rate_is_not_changed_while_open(adapter):
-    adapter[0].answer("O")
-    assert adapter[0].answer("S6") == b"\a"
 
 
 @pytest.fixture(params=[partial(PtyLine, "slcan"), SocketLine], ids=["pty", "socket"])
@@ -151,16 +138,6 @@ def test_no_frame_is_lost_in_a_burst(pair):
                 found = far.recv(10.0)
                 assert found is not None
                 assert int.from_bytes(found.data, "big") == expected
-
-
-def test_a_client_that_does_not_read_blocks_nothing(pair):
-    near, far = pair
-    for number in range(3000):  # far more than a line buffers
-        near.send(can.Message(arbitration_id=0x181, data=number.to_bytes(8, "big"), is_extended_id=False))
-    far.send(can.Message(arbitration_id=0x080, is_extended_id=False))
-    found = near.recv(10.0)
-    assert found is not None
-    assert found.arbitration_id == 0x080
 
 
 def test_the_server_continues_after_garbage():

@@ -11,7 +11,6 @@ from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.errors import MotionInterrupted, MoveRefused, PoseRefused
 from drivers.interfaces import StartupAction
-from drivers.simulated.linuxcnc.mdi import ModalState
 from drivers.simulated.linuxcnc.server import SimulatedController
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
@@ -125,20 +124,3 @@ async def test_a_frozen_controller_and_one_that_was_ended_are_told_apart(driver,
     with pytest.raises(DeviceError, match="could not be stopped: it cannot be reached: Connection refused"):
         await hasty.stop()
     await hasty.close()
-
-
-async def test_the_heartbeat_changes_with_the_position(ready) -> None:
-    before = (await ready.status()).heartbeat
-    assert (await ready.status()).heartbeat == before
-    await ready.move(TARGET, MOVE_S)
-    assert (await ready.status()).heartbeat not in {before, ""}
-
-
-async def test_a_move_lasts_as_long_as_it_is_told_and_leaves_the_modes_as_they_were(
-    ready, simulated, machine
-) -> None:
-    simulated.state.modes = ModalState(1, 94, 250.0)
-    await ready.prepare(ALL)
-    await ready.move(TARGET, 2.5)
-    assert machine.durations_s == [pytest.approx(2.5)]
-    assert simulated.state.modes == ModalState(1, 94, 250.0)

@@ -144,25 +144,6 @@ def test_a_move_that_another_client_ends_is_acknowledged(ready, client, machine,
     ready.expect("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
 
 
-def test_a_move_is_acknowledged_on_receipt_by_default(ready, machine):
-    ready.does("set set_wait received")
-    machine.duration_s = 30.0
-    ready.does("set mdi G0 X100")
-    assert machine.pose().x < 99.0
-
-
-def test_an_abort_drops_waiting_moves(ready, machine):
-    ready.does("set set_wait received")
-    machine.duration_s = 30.0
-    ready.does("set mdi G0 X100 | set mdi G0 X200")
-    machine.wait_for("move")
-    ready.does("set abort")
-    machine.duration_s = 0.01
-    ready.does("set set_wait done | set mdi G0 X300")
-    assert machine.events.count("move") == 2
-    assert machine.pose().x == 300.0
-
-
 def test_switching_on_reads_the_config_again(ready, machine):
     ready.does("set mdi G0 X10")
     machine.config = 2.0
@@ -200,12 +181,4 @@ def test_faults_during_a_move_stop_it(ready, simulated, machine, fault):
     ready.expect("get machine", b"MACHINE OFF\r\n")
     ready.expect("get estop", b"ESTOP ON\r\n" if fault == "estop" else b"ESTOP OFF\r\n")
     ready.expect("get error", b"ERROR OK\r\n" if fault == "estop" else b"ERROR joint 3 following error\r\n")
-    assert machine.pose().x < 99.0
-
-
-def test_closing_ends_a_move_and_may_be_repeated(ready, simulated, machine):
-    ready.moves_slowly(machine)
-    machine.ignored_stops = 2
-    simulated.close()
-    simulated.close()
     assert machine.pose().x < 99.0

@@ -141,11 +141,6 @@ async def linked(line, **settings):
         await link.close()
 
 
-def send_unsolicited(line, data):
-    """Send ``data`` now without a request, as a data button or a foot switch does."""
-    line._run_on_thread(lambda: line._line.send(data))
-
-
 def questions_to(line):
     """A list that gets every question when it arrives at ``line``."""
     questions, answer = [], line.instrument.answer

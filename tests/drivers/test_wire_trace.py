@@ -1,12 +1,21 @@
-"""Protects what a wire trace keeps of an exchange, and how much memory it may take."""
+"""Protects what a wire trace keeps of an exchange, how much memory it may take, and what is logged."""
 
+from __future__ import annotations
+
+import logging
 import tracemalloc
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.conformance import served_encoder_twin, served_twin
+from drivers.encoders.cia406 import Cia406Bank
+from drivers.errors import GaugeSilent, SilentNodeError
+from drivers.gauges.sylvac import SylvacGauge
+from drivers.serial.shared_port import SharedSerialPorts
 from drivers.wire_trace import ENTRY_BYTES, TraceEntry, TrafficDirection, WireTrace, read_trace
+from hexacell.cell.devices import GaugeSettings, LinearEncoderSettings
 from hexacell.errors import FileError
 
 
@@ -46,7 +55,7 @@ def test_what_is_kept_is_bounded_in_memory():
     trace = WireTrace(capacity=1 << 20)
     tracemalloc.start()
     try:
-        for number in range(50_000):
+        for number in range(10_000):
             trace(TraceEntry(number / 7, "/dev/ttyUSB0", TrafficDirection.SENT, b"%d" % (number % 10)))
         held, _ = tracemalloc.get_traced_memory()
     finally:
@@ -87,3 +96,41 @@ def test_the_text_of_a_trace_is_read_back(entries):
 def test_what_is_no_entry_is_named_with_its_line():
     with pytest.raises(FileError, match="line 2 is no entry of a wire trace: 'hello'"):
         read_trace("1.500000 /dev/ttyUSB0 > 3f 0d  ?.\nhello\n")
+
+
+def logged(caplog: pytest.LogCaptureFixture, name: str) -> list[tuple[str, str]]:
+    return [(one.levelname, one.getMessage()) for one in caplog.records if one.name == name]
+
+
+async def test_a_gauge_logs_under_its_name_and_its_bytes_at_debug(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.DEBUG, "drivers")
+    ports = SharedSerialPorts(worst_latency_s=0.1)
+    with served_twin(GaugeSettings(name="y", axis="y", protocol="sylvac")) as twin:
+        gauge = SylvacGauge(twin.settings, ports)
+        await gauge.open()
+        twin.inject("silent", on=True)
+        with pytest.raises(GaugeSilent):
+            await gauge.read_once()
+        await gauge.close()
+    assert logged(caplog, "drivers.gauges.y") == [
+        ("INFO", f"opened on port {twin.settings.port}: SY276"),
+        ("WARNING", r"no answer to b'?\r' within 0.5 s"),
+    ]
+    [first, *_] = logged(caplog, "drivers.wire")
+    assert first[0] == "DEBUG"
+    assert first[1].endswith("> 55 4e 49 3f 0d  UNI?.")
+
+
+async def test_encoders_log_openings_and_missing_samples(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, "drivers")
+    settings = LinearEncoderSettings(bus={}, timeout_s=0.2, heartbeat_ms=0)
+    with served_encoder_twin(settings) as twin:
+        bank = Cia406Bank(twin.settings)
+        await bank.open()
+        twin.inject("silent", on=True)
+        with pytest.raises(SilentNodeError):
+            await bank.read()
+        await bank.close()
+    levels = [(level, text.split(":")[0]) for level, text in logged(caplog, "drivers.encoders")]
+    assert levels == [("INFO", "opened"), ("WARNING", "no sample")]
+    assert logged(caplog, "drivers.wire") == []

@@ -34,7 +34,7 @@ from hexacell.plugins import Group, load
 from hexacell.services import search_effort
 from procedures.journal import journal
 from tests.faults.interception import Failing, intercepted
-from tests.faults.pulling import pull_out
+from tests.faults.steps import pull_out
 
 UNEXPECTED = 70
 """The exit code for an error that the program did not expect."""

@@ -10,8 +10,7 @@ from procedures.steps import events
 from tests.faults.cell import Site
 from tests.faults.killing import KILLED, after, finish, history_of, places
 from tests.faults.promises import require_identical, require_valid
-from tests.faults.pulling import DEVICES
-from tests.faults.steps import STEPS
+from tests.faults.steps import DEVICES, STEPS
 
 TIMEOUT_S = 1.0
 PULLED = tuple(step for step in STEPS if step not in {"beginning", "ending"})

@@ -1,10 +1,16 @@
-"""Events as they would happen, short to write."""
+"""Events and identifications as they would happen, short to write."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.identification.solver.result import Termination
+from hexacell.results.result import IdentificationResult
 from procedures.run.keys import SetKey, SixNumbers, ThreeNumbers
 from procedures.run.readings import Reading
 from procedures.run.state import RunState
@@ -81,3 +87,25 @@ class Story:
         for orientation in range(2, orientations + 1):
             told += [self.arrived(orientation), self.sampled(orientation)]
         return [*told, self.arrived(), self.closed()]
+
+
+def an_identification(**changes: Any) -> IdentificationResult:
+    """The drawing of the simulated cell, found without doubt; fields may be changed."""
+    nominal = load_cell(bundled_config("simulated-hexaglide")).settings.robot.nominal.model_dump()
+    document = {
+        "converged": True,
+        "termination": next(end for end in Termination if end.converged),
+        "iterations": 3,
+        "records": 18,
+        "points": 2,
+        "residual_rms_mm": 0.001,
+        "chi2": 12.0,
+        "dof": 11,
+        "geometry": nominal,
+        "sigma": nominal,
+        "covariance": np.eye(42).tolist(),
+        "undetermined": (),
+        "outliers": (),
+        "frame": "as drawn",
+    }
+    return IdentificationResult.model_validate(document | changes)

@@ -1,4 +1,4 @@
-"""Our own encoders pass what every driver of encoders must."""
+"""Our own encoders and controller pass what every driver of such a device must."""
 
 from __future__ import annotations
 
@@ -10,17 +10,24 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
-from drivers.conformance import EncoderConformance, EncoderTwin, served_encoder_twin
+from drivers.conformance import (
+    ControllerConformance,
+    ControllerTwin,
+    EncoderConformance,
+    EncoderTwin,
+    served_encoder_twin,
+)
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.dbc import DbcBank
 from drivers.encoders.modbus import ModbusBank
 from drivers.encoders.of_controller import ControllerScales
-from drivers.interfaces import DeviceIdentity, EncoderBank, EncoderSample, StartupAction
+from drivers.interfaces import Controller, DeviceIdentity, EncoderBank, EncoderSample, StartupAction
 from drivers.simulated.linuxcnc.server import SimulatedController
 from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings
 from hexacell.cell.robot import ControllerSettings
 from hexacell.cell.simulation import FaultKind
+from hexacell.kinematics.pose import Pose
 from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
 from tests.drivers.simulated.linuxcnc.conftest import QUICK, FakeMachine
 
@@ -50,7 +57,7 @@ class MachineThatStands(FakeMachine):
             self._joints = tuple(joints)
 
 
-class ControllerTwin:
+class ScalesTwin:
     """The scales of a simulated LinuxCNC."""
 
     def __init__(self, machine: MachineThatStands, server: SimulatedController) -> None:
@@ -66,7 +73,7 @@ class ControllerTwin:
 class WithItsController:
     """Encoders that are opened and closed with the controller that has their scales."""
 
-    def __init__(self, twin: ControllerTwin) -> None:
+    def __init__(self, twin: ScalesTwin) -> None:
         settings = ControllerSettings(config="machine.ini", port=twin.port)
         self._controller = LinuxcncrshController(settings, timeouts=replace(QUICK, answer=0.5))
         self._scales = ControllerScales(twin.settings, self._controller)
@@ -88,14 +95,14 @@ class TestScalesOfAController(EncoderConformance):
     name = "controller"
 
     def driver(self, twin: EncoderTwin) -> EncoderBank:
-        assert isinstance(twin, ControllerTwin)
+        assert isinstance(twin, ScalesTwin)
         return WithItsController(twin)
 
     @contextmanager
     def twin(self) -> Iterator[EncoderTwin]:
         machine = MachineThatStands()
         with SimulatedController(machine, ControllerSettings(config="machine.ini")) as server:
-            yield ControllerTwin(machine, server)
+            yield ScalesTwin(machine, server)
 
 
 class TestByDbcFile(EncoderConformance):
@@ -150,3 +157,49 @@ def test_samples_of_two_instants_are_found() -> None:
 
     with pytest.raises(AssertionError):
         Conformance().test_a_sample_is_of_one_instant()
+
+
+LEAST_S = 0.01
+HASTY = replace(QUICK, answer=0.5)
+
+
+class MachineInTime(FakeMachine):
+    """Its moves last as long as they are told to."""
+
+    def move(self, pose: Pose, duration_s: float | None) -> None:
+        self.duration_s = duration_s or LEAST_S
+        super().move(pose, duration_s)
+
+    def home(self) -> None:
+        self.duration_s = LEAST_S
+        super().home()
+
+
+class LinuxcncTwin:
+    """The simulated LinuxCNC."""
+
+    target = Pose(100.0, -200.0, 550.0, 12.5, -3.0, 8.0)
+    out_of_reach = Pose(0.0, 0.0, 2000.0)
+
+    def __init__(self, server: SimulatedController) -> None:
+        self.settings = ControllerSettings(config="machine.ini", port=server.port)
+        self._server = server
+
+    def inject(self, fault: FaultKind, *, on: bool) -> None:
+        match fault:
+            case "unplugged":
+                self._server.set_unplugged(on=on)
+            case "silent":
+                self._server.set_silent(on=on)
+            case _:
+                self._server.state.set_estop(on=on)
+
+
+class TestLinuxcncrsh(ControllerConformance):
+    def driver(self, settings: ControllerSettings) -> Controller:
+        return LinuxcncrshController(settings, timeouts=HASTY)
+
+    @contextmanager
+    def twin(self) -> Iterator[ControllerTwin]:
+        with SimulatedController(MachineInTime(), ControllerSettings(config="machine.ini")) as server:
+            yield LinuxcncTwin(server)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import uuid
 from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -174,3 +175,12 @@ async def opened(bank: Cia406Bank) -> Cia406Bank:
 def short_timeout_bank(make_bank: Callable[..., Cia406Bank]) -> Cia406Bank:
     """A bank for tests in which a node is silent."""
     return make_bank(timeout_s=1.0)
+
+
+@contextmanager
+def short_timeout(bank: Cia406Bank, timeout_s: float = 0.1) -> Iterator[None]:
+    assert bank._session is not None
+    sampler = bank._session._sampler
+    before, sampler._timeout_s = sampler._timeout_s, timeout_s
+    yield
+    sampler._timeout_s = before

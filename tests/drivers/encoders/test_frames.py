@@ -1,16 +1,17 @@
-"""What comes on a bus unasked: counted by identifier, and told apart from CANopen nodes."""
+"""Discovery on a CAN bus: frames of strangers are told, and the node id of the only device is set."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 
 import can
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.discovery import SearchTimeouts
+from drivers.discovery import SearchTimeouts, node_ids
 from drivers.discovery.encoders import (
     MAX_IDENTIFIERS,
     FoundFrame,
@@ -18,7 +19,10 @@ from drivers.discovery.encoders import (
     frames_of_no_node,
     search_bus,
 )
+from drivers.errors import BusError
 from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
+from hexacell.errors import DeviceError
+from tests.drivers.encoders.conftest import LSS_REQUEST
 
 QUICK = SearchTimeouts(adapter=1.0, node=0.1, listen=0.3)
 STRANGER, EXTENDED = 0x321, 0x18FF0001
@@ -104,3 +108,68 @@ def test_frames_of_all_nodes_are_told_only_where_there_are_none(number: int) -> 
     one = FoundFrame(number, False, 0, 1.0, changes=False)
     assert frames_of_no_node([one], []) == (one,)
     assert frames_of_no_node([one], [5]) == ()
+
+
+set_node_id = partial(node_ids.set_node_id, timeouts=SearchTimeouts(adapter=0.3, node=0.1))
+
+
+@pytest.fixture
+def bus(raw):
+    return {"interface": "virtual", "channel": raw.channel}
+
+
+@pytest.fixture
+def alone(raw):
+    raw.nodes = {3: raw.nodes[3]}
+    return raw
+
+
+def test_the_only_device_takes_the_id_and_answers_with_it(alone, bus) -> None:
+    assert set_node_id(bus, 5) == 3
+    assert list(alone.nodes) == [5]
+    assert not alone.layer_setting.is_configuring
+    requests = [data[0] for can_id, data in alone.heard if can_id == LSS_REQUEST]
+    assert requests == [0x04, 0x5A, 0x11, 0x17, 0x04]
+
+
+def test_a_device_without_an_id_gets_one(raw, bus) -> None:
+    raw.nodes, raw.layer_setting.nameless = {}, 1
+    assert set_node_id(bus, 7) is None
+    assert list(raw.nodes) == [7]
+
+
+def test_nothing_is_set_where_there_are_several(raw, bus) -> None:
+    with pytest.raises(DeviceError, match=r"has several nodes: 1, 2, 3, 4, 5, 6\. Connect the one device"):
+        set_node_id(bus, 9)
+    assert not any(can_id == LSS_REQUEST for can_id, _ in raw.heard)
+
+
+def test_one_without_an_id_beside_it_is_counted(alone, bus) -> None:
+    alone.layer_setting.nameless = 1
+    with pytest.raises(DeviceError, match=r"has 2 devices that answer\. Connect the one device"):
+        set_node_id(bus, 5)
+    assert list(alone.nodes) == [3]
+    assert alone.layer_setting.node is None
+    assert not alone.layer_setting.is_configuring
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_what_does_not_know_the_protocol_is_told(alone, bus, is_there: bool) -> None:
+    alone.layer_setting.is_known = False
+    if not is_there:
+        alone.nodes = {}
+    with pytest.raises(DeviceError, match="has no device that knows LSS: "):
+        set_node_id(bus, 5)
+
+
+def test_an_id_that_is_refused_is_told_and_the_device_works_on(alone, bus) -> None:
+    alone.layer_setting.refusal = 1
+    with pytest.raises(DeviceError, match="has a device that refuses node id 5: "):
+        set_node_id(bus, 5)
+    assert not alone.layer_setting.is_configuring
+
+
+def test_an_id_that_does_not_hold_is_told(alone, bus) -> None:
+    alone.layer_setting.forgets = True
+    with pytest.raises(BusError, match="has no node 5 after it was stored"):
+        set_node_id(bus, 5)

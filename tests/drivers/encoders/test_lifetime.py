@@ -10,7 +10,7 @@ import pytest
 
 from drivers.errors import BusError
 from hexacell.errors import DeviceError
-from tests.drivers.short_timeout import short_timeout
+from tests.drivers.encoders.conftest import short_timeout
 from tests.waiting import until
 
 

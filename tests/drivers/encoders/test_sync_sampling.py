@@ -12,7 +12,7 @@ from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.sync_sampling import MAX_SYNCS
 from drivers.errors import BusError, InvalidSampleError, SilentNodeError, WrongSetting
 from hexacell.errors import DeviceError
-from tests.drivers.short_timeout import short_timeout
+from tests.drivers.encoders.conftest import short_timeout
 from tests.waiting import until
 
 

@@ -15,7 +15,7 @@ from drivers.simulated.gauges.instruments import Indicator
 from hexacell.cell.described_devices import StreamSettings
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError
-from tests.drivers.gauges.streaming_line import StreamingLine
+from tests.drivers.gauges.conftest import StreamingLine
 
 CALIPER = {"answer": r"([+-]\d{3}\.\d{2}) mm", "example": "+012.34 mm\r\n", "at_end": "----"}
 """What many microcontrollers make of Digimatic."""

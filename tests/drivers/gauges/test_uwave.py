@@ -13,7 +13,7 @@ from drivers.serial.opening import SLICE_S
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.indicators import Uwave
 from hexacell.cell.devices import GaugeSettings
-from tests.drivers.gauges.streaming_line import StreamingLine
+from tests.drivers.gauges.conftest import StreamingLine
 
 DELAY_S = 0.02
 

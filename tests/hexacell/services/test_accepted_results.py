@@ -18,7 +18,7 @@ from hexacell.verdict.verification import Verification
 from procedures.journal.journal import Journal
 from procedures.steps import events
 from tests.hexacell.services.recorded_nights import Nights
-from tests.procedures.identified import an_identification
+from tests.procedures.story import an_identification
 
 IDENTIFIED = events.Identified(result=an_identification(), held_out=())
 PASSED = events.ResultValidated(verdict=Verdict.PASS, line="it is good")

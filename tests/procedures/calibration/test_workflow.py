@@ -24,8 +24,7 @@ from procedures.steps.roll_back import RollBack
 from procedures.steps.sample import Sample
 from procedures.workflow import sets as path_planning
 from procedures.workflow.points import IdentificationSteps
-from tests.procedures.identified import an_identification
-from tests.procedures.story import Story, located, next_step
+from tests.procedures.story import Story, an_identification, located, next_step
 
 POINTS, ORIENTATIONS, HELD_OUT = 2, 9, 3
 HELD_OUT_POSES = tuple(

@@ -25,8 +25,7 @@ from procedures.steps.base import BaseStep
 from procedures.steps.lend import Lend
 from procedures.steps.roll_back import RollBack
 from procedures.steps.take_back import TakeBack
-from tests.procedures.engine.injected_failures import UNATTENDED, failing
-from tests.procedures.runs.listening import happened, on, run_until
+from tests.procedures.runs.listening import UNATTENDED, failing, happened, on, run_until
 
 ROLL_BACK, TAKE_BACK = RollBack(), TakeBack()
 ZERO = (0.0, 0.0, 0.0)

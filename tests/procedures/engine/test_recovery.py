@@ -14,15 +14,15 @@ from hexacell.errors import DeviceError, ExitCode, HexacellError
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Answer, Pause, Resume
 from procedures.steps import events
-from tests.procedures.engine.injected_failures import (
+from tests.procedures.runs.listening import (
     ATTENDED,
     KEY,
     SILENT,
     UNATTENDED,
     failing,
+    happened,
     until_closed,
 )
-from tests.procedures.runs.listening import happened
 from tests.waiting import until
 
 

@@ -39,7 +39,7 @@ from procedures.run.trips import DriftTripped, Guard, Trip
 from procedures.steps import events
 from procedures.steps.sample import Sample
 from procedures.workflow.sets import NoSafePath, TravelError
-from tests.procedures.engine.injected_failures import ATTENDED, UNATTENDED
+from tests.procedures.runs.listening import ATTENDED, UNATTENDED
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 STEP = Sample(at=P1, orientation=2, pose=(0.0,) * 6)

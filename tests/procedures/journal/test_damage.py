@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hexacell.errors import FileError
 from procedures.journal.journal import VERSION, Journal, read_journal
-from tests.procedures.journal.told import TOLD, checked, write_told
+from tests.procedures.journal.conftest import TOLD, checked, write_told
 
 
 def test_a_tail_torn_at_any_byte_is_dropped(path: Path, written: bytes) -> None:
@@ -44,7 +44,7 @@ def zeros(data: bytes, begin: int, end: int) -> bytes:
     return data[:begin] + bytes(len(data[begin:end])) + data[end:]
 
 
-@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_last_line_with_zeros_for_bytes_is_a_torn_tail(path: Path, data) -> None:
     """As file systems leave it that lengthen a file before its blocks are written."""
@@ -138,7 +138,7 @@ def test_a_journal_that_states_no_version_is_refused(path: Path) -> None:
         read_journal(path)
 
 
-@settings(max_examples=500, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_changed_byte_is_always_detected(path: Path, data) -> None:
     written = bytearray(path.read_bytes() if path.exists() else write_told(path))

@@ -14,7 +14,7 @@ from procedures.journal.journal import decode
 from procedures.replay.replayer import Change, changes, is_wording
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
-from tests.procedures.journal.told import checked
+from tests.procedures.journal.conftest import checked
 from tests.procedures.story import READING
 
 KEY = SetKey(phase=Phase.BEFORE, point=2)

@@ -20,7 +20,7 @@ from procedures.steps.pilot import Pilot
 from procedures.steps.registry import STEPS, Step
 from procedures.steps.roll_back import RollBack
 from procedures.steps.sample import Sample
-from tests.procedures.identified import an_identification
+from tests.procedures.story import an_identification
 
 POSE = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 P2 = SetKey(phase=Phase.IDENTIFY, point=2)

@@ -1,4 +1,4 @@
-"""Listeners that step in at a moment of a run, and what its journal says of it."""
+"""Listeners that step in at a moment of a run or let it fail, and what its journal says of it."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from typing import Any
 
 import pytest
 
+from drivers.errors import GaugeSilent
+from hexacell.cell.recovery import RecoverySettings
 from hexacell.errors import Interruption
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.engine.commands import Stop
 from procedures.engine.recovery import GIVE_UP, RecoveryPolicy
 from procedures.journal.journal import read_journal
-from procedures.run.keys import Phase
-from procedures.run.state import RunState
+from procedures.run.keys import Phase, SetKey
+from procedures.run.state import RunState, fold
 from procedures.steps import events
 
 
@@ -109,3 +111,28 @@ def somebody_edits(rig: Any) -> bytes:
     config.write_bytes(config.read_bytes() + b"# somebody was here\n")
     edited: bytes = config.read_bytes()
     return edited
+
+
+UNATTENDED = RecoveryPolicy.of(RecoverySettings(), attended=False)
+ATTENDED = RecoveryPolicy.of(RecoverySettings(), attended=True)
+P2 = SetKey(phase=Phase.IDENTIFY, point=2)
+SILENT = GaugeSilent("does not answer", subject="gauge y")
+KEY = "P2/o03/sample"
+
+
+def failing(key: str, action: Callable[[], Any], times: int = 1) -> Any:
+    """A listener that does something whenever a step is begun, so many times."""
+    left = [times]
+
+    def listener(event: events.Event, _: RunState) -> None:
+        if isinstance(event, events.StepBegun) and event.step.key == key and left[0]:
+            left[0] -= 1
+            action()
+
+    return listener
+
+
+async def until_closed(rig: Any, *listeners: Any, policy: RecoveryPolicy) -> bool:
+    """Run until the second point is measured; whether it came to that."""
+    await run_until(rig, events.SetClosed, *listeners, policy=policy)
+    return fold(read_journal(rig.folder.journal)).set(P2).closed

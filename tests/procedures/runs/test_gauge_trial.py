@@ -1,18 +1,22 @@
-"""Gauges that do not answer as they are mounted are named before anything is measured with them."""
+"""Gauges that are mounted wrongly or off their middle are named before anything is measured with them."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 from drivers.errors import GaugeSilent
-from hexacell.cell.recovery import Action
+from hexacell.cell.recovery import Action, FailureKind
 from hexacell.errors import ExitCode, HexacellError, LimitError
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
 from procedures.steps.move import Move
+from procedures.steps.place import MountingError
 from tests.procedures.runs.gauge_mistakes import MISTAKES, corrected, make_mistake
 from tests.procedures.runs.listening import at_step, happened, on, run_until, steps_of
 
@@ -45,20 +49,21 @@ async def test_a_person_puts_it_right_and_the_station_begins_again(make_rig) -> 
     assert rig.operator.placed[:3] == [1, 1, 2]
 
 
-async def test_every_station_is_tried_once(make_rig) -> None:
-    rig = make_rig(stations__trial_mm=1.0)
+async def test_every_station_is_tried_once(recording, replayed) -> None:
+    rig = replayed(recording.until(events.Identified), stations__trial_mm=1.0)
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE
     tried = [str(event.at) for event in happened(rig, events.GaugesTried)]
-    assert tried == ["P1", "P2", "before-V1", "before-V2", "after-V1", "after-V2"]
+    assert tried == ["before-V1", "before-V2", "after-V1", "after-V2"]
     assert len(happened(rig, events.GaugesProbed)) == 3 * len(tried)
-    trial = ["P1/o01/sample", *["P1/o00/move", "P1/probe"] * 3, "P1/o01/move", "P1/try"]
+    first = happened(rig, events.GaugesTried)[0].at
+    trial = [f"{first}/o01/sample", *[f"{first}/o00/move", f"{first}/probe"] * 3]
     begun = [step.key for step in steps_of(rig)]
-    assert begun[begun.index("P1/o01/sample") :][: len(trial)] == trial
+    assert begun[begun.index(trial[0]) :][:9] == [*trial, f"{first}/o01/move", f"{first}/try"]
     lengths = [
-        np.abs(np.subtract(step.pose[:3], (100.0, -100.0, 500.0))).max()
+        np.abs(np.subtract(step.pose[:3], (-100.0, -50.0, 450.0))).max()
         for step in steps_of(rig)
-        if isinstance(step, Move) and step.at == P1 and step.orientation == 0
+        if isinstance(step, Move) and step.at == first and step.orientation == 0
     ]
     assert lengths[:3] == pytest.approx([1.0] * 3)
 
@@ -96,3 +101,49 @@ async def test_after_an_interruption_the_gauges_are_tried_again_before_the_set_c
     assert after[:8] == [*["P1/o00/move", "P1/probe"] * 3, "P1/o01/move", "P1/try"]
     records = [event.orientation for event in history if isinstance(event, events.RecordTaken)][:9]
     assert records == [1, 2, 3, 4, 5, 6, 7, 8, 9]
+
+
+def off_the_middle(gauge: Any, off_mm: float) -> Callable[[], None]:
+    """Clamp a gauge by its stem elsewhere; gives how to put it right."""
+    right = gauge.shown
+    gauge.shown = lambda: right() + off_mm
+
+    def correct() -> None:
+        gauge.shown = right
+
+    return correct
+
+
+async def test_without_a_person_a_gauge_off_its_middle_ends_the_run_in_words(make_rig) -> None:
+    rig = make_rig()
+    off_the_middle(rig.gauges[1], -3.8)
+    with pytest.raises(MountingError, match=r"stands [34]\.\d mm from the middle of its travel") as refusal:
+        await rig.run()
+    assert refusal.value.exit_code is ExitCode.HARDWARE
+    assert refusal.value.subject == "gauge y"
+    assert "towards -y" in str(refusal.value)
+    assert not happened(rig, events.RecordTaken)
+
+
+async def test_a_person_is_told_how_to_move_the_gauge_and_the_set_begins_again(make_rig) -> None:
+    rig = make_rig(stations__placement="by-hand")
+    correct = off_the_middle(rig.gauges[0], 3.8)
+    rig.operator.decisions = [Action.REDO_SET]
+    policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=True)
+    await run_until(rig, events.GaugesPlaced, on(events.Failed, correct), count=3, policy=policy)
+    (problem,) = rig.operator.problems
+    assert "Move the gauge by " in problem
+    assert "along +x" in problem
+    assert rig.operator.placed[:3] == [1, 1, 2], "the gauges were placed again"
+    (failed,) = happened(rig, events.Failed)
+    assert failed.failure is FailureKind.MOUNTING
+
+
+async def test_no_record_leaves_the_room_of_gauges_zeroed_off_the_middle(make_rig) -> None:
+    rig = make_rig(simulation__gauges__placing_mm=0.0)
+    for gauge, off_mm in zip(rig.gauges, (0.9, -0.9, 0.9), strict=True):
+        off_the_middle(gauge, off_mm)
+    await run_until(rig, events.Identified)
+    assert not happened(rig, events.RecordRejected)
+    for taken in happened(rig, events.RecordTaken):
+        assert np.abs(taken.reading.gauges_mm).max() <= 5.0, "beyond the plates"

@@ -35,7 +35,7 @@ from procedures.steps.standstill import Standstill
 from tests.procedures.replay.test_replayer import numbered
 from tests.procedures.rig import MakeRig, Rig, new_rig
 from tests.procedures.runs.listening import PowerCut, happened, on, run_until, steps_of
-from tests.small_cell import choose_among_few
+from tests.small_cell import choose_among_few, history_until
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 ASKED: dict[str, Any] = {"noise__standstill_readings": 16, "noise__revisits": 6}
@@ -241,7 +241,8 @@ def test_the_result_has_the_measured_noise(whole: Rig) -> None:
 
 
 def test_the_run_is_reproduced(whole: Rig, few_candidates: None, tmp_path: Path) -> None:
-    history = read_journal(whole.folder.journal)
+    """Until three records are taken with what the measured noise says."""
+    history = history_until(read_journal(whole.folder.journal), events.RecordTaken, count=4)
     started = history[0]
     assert isinstance(started, events.RunStarted)
     written = whole.config
@@ -253,16 +254,16 @@ def test_the_run_is_reproduced(whole: Rig, few_candidates: None, tmp_path: Path)
     asyncio.run(Replayer(executor, report).replay(numbered(history)))
     whole.cell.config_path.write_bytes(written)
     assert report.differences == []
-    assert report.results > 60
+    assert report.results > 50
 
 
 @pytest.mark.parametrize(
     ("command", "step"),
-    [(Abort(), 27), *(pytest.param(one, 3, marks=pytest.mark.slow) for one in (Abort(), None))],
+    [(Abort(), 56), *(pytest.param(one, 3, marks=pytest.mark.slow) for one in (Abort(), None))],
 )
 async def test_interrupted_anywhere_it_is_measured_once(make_rig, few_candidates, tmp_path, command, step):
     """After a stop, and after a death that leaves no word, at some events until the noise is measured."""
-    for number in range(2, 110, 2 * step):
+    for number in range(step, 110, 2 * step):
         folder = tmp_path / f"{number}"
         folder.mkdir()
         rig = new_rig(folder, **ASKED)

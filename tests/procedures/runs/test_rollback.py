@@ -1,4 +1,4 @@
-"""A result that is worse, cannot be loaded or meets an edited config does not stay in the controller."""
+"""A result that is worse, cannot be loaded or meets an edited config is taken back; writes are recorded."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ from typing import Any
 import pytest
 
 from drivers.errors import GaugeAtEnd
+from hexacell.config.write_record import RECORDS, THE_RUN, WriteKind, WriteRecord, read_records
 from hexacell.errors import DeviceError, ExitCode, FileError, WriteBackUndone
 from hexacell.verdict.decision import Verdict
 from procedures.engine.commands import UnattendedOperator
 from procedures.run.state import fold
 from procedures.steps import events
 from tests.procedures.runs.listening import (
+    PowerCut,
     at_step,
     commanding,
+    cut_power,
     happened,
     on,
     somebody_edits,
@@ -23,6 +26,13 @@ from tests.procedures.runs.listening import (
 
 CLEARLY_WORSE: dict[str, Any] = {"simulation__gauges__noise_mm": 0.01}
 """Deviations that are significant whatever noise is drawn."""
+
+
+def recorded(run: Any) -> tuple[WriteRecord, ...]:
+    """What is recorded of writes into the config, by a rig's run or the recorded one."""
+    records, damaged = read_records(run.folder.siblings)
+    assert not damaged
+    return records
 
 
 async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(recording, replayed) -> None:
@@ -36,6 +46,13 @@ async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(recording, 
     assert rig.config == recording.config_before
     assert rig.controller.log.count("reload") == 2
     assert commanding(rig).largest_difference(rig.calibration.robot.controller) == 0.0
+    written, back = recorded(rig)
+    assert (back.kind, back.by, back.run) == (WriteKind.TAKEN_BACK, THE_RUN, "run")
+    assert back.why.endswith("(worse than before)")
+    assert back.sha256_after == written.sha256_before
+    assert back.largest is not None
+    assert written.largest is not None
+    assert back.largest.change == pytest.approx(-written.largest.change)
 
 
 async def test_a_better_result_out_of_limits_is_rolled_back_if_nobody_keeps_it(recording, replayed) -> None:
@@ -49,8 +66,13 @@ async def test_a_better_result_out_of_limits_is_rolled_back_if_nobody_keeps_it(r
     assert rig.config == recording.config_before
 
 
-async def test_a_better_result_out_of_limits_stays_if_a_person_keeps_it(recording, replayed) -> None:
+async def test_a_result_that_a_person_keeps_stays_although_the_run_is_killed_before_the_decision(
+    recording, replayed
+) -> None:
     rig = replayed(recording.until(events.Proposed), acceptance__position_mm=0.0001)
+    with pytest.raises(PowerCut):
+        await rig.run(on(events.ResultValidated, cut_power))
+    assert rig.config == recording.config_after
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert ended.line.endswith(": fail; kept by a tester")
@@ -74,15 +96,6 @@ async def test_a_conditional_verdict_needs_a_person(recording, replayed, attende
     assert rig.folder.proposal.exists()
 
 
-async def test_a_run_killed_before_the_decision_asks_again(recording, replayed) -> None:
-    rig = replayed(recording.until(events.Proposed), acceptance__position_mm=0.0001)
-    broken = KeyboardInterrupt("killed")
-    with pytest.raises(KeyboardInterrupt):
-        await rig.run(on(events.ResultValidated, lambda: raise_(broken)))
-    assert rig.config == recording.config_after
-    assert (await rig.run()).line.endswith("kept by a tester")
-
-
 def limit_within(recording: Any) -> float:
     """A limit that neither passes nor fails the recorded result, nor the same measured once more."""
     (judged,) = (event for event in recording.history if isinstance(event, events.ResultValidated))
@@ -92,23 +105,17 @@ def limit_within(recording: Any) -> float:
     return float(position.value)
 
 
-def raise_(error: BaseException) -> None:
-    raise error
-
-
-@pytest.mark.parametrize("key", ["after-V2/o03/sample"])
-async def test_a_ball_outside_the_travel_twice_at_verification_causes_a_rollback(recording, replayed, key):
+async def test_a_ball_outside_the_travel_twice_at_verification_causes_a_rollback(recording, replayed):
     rig = replayed(recording.until(events.Proposed))
     at_end = GaugeAtEnd("is at an end of its travel", subject="gauge x")
-    fault = at_step(key, lambda: rig.gauges[0].failures.append(at_end))
+    fault = at_step("after-V2/o03/sample", lambda: rig.gauges[0].failures.append(at_end))
     assert (await rig.run(fault)).exit_code == ExitCode.OUT_OF_LIMITS
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
     assert happened(rig, events.RolledBack)
     assert rig.config == recording.config_before
 
 
-@pytest.mark.parametrize("key", ["after-V1/o02/sample"])
-async def test_a_reading_that_could_not_be_taken_once_is_taken_again(recording, replayed, key: str) -> None:
+async def test_a_reading_that_could_not_be_taken_once_is_taken_again(recording, replayed) -> None:
     """The gauges show that their zero is as it was; the pose is measured then."""
     rig = replayed(recording.until(events.Proposed))
     at_ends = [GaugeAtEnd("is at an end of its travel", subject="gauge x")]
@@ -117,9 +124,9 @@ async def test_a_reading_that_could_not_be_taken_once_is_taken_again(recording, 
         rig.gauges[0].failures.extend(at_ends)
         at_ends.clear()
 
-    assert (await rig.run(at_step(key, once))).exit_code == ExitCode.DONE
+    assert (await rig.run(at_step("after-V1/o02/sample", once))).exit_code == ExitCode.DONE
     (refused,) = happened(rig, events.RecordRejected)
-    assert f"{refused.at}/o{refused.orientation:02d}/sample" == key
+    assert (str(refused.at), refused.orientation) == ("after-V1", 2)
     assert [event.at for event in happened(rig, events.ReferenceConfirmed)] == [refused.at]
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.PASS
     assert rig.config == recording.config_after
@@ -147,6 +154,8 @@ async def test_a_failed_reload_restores_the_config(recording, replayed) -> None:
     assert rig.controller.log.count("reload") == 2, "the old config must be loaded again"
     assert not happened(rig, events.Committed)
     assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.WRITE_BACK_UNDONE
+    assert [one.kind for one in recorded(rig)] == [WriteKind.RESULT, WriteKind.TAKEN_BACK]
+    assert "did not take it: controller: does not come back" in recorded(rig)[-1].why
     assert (await rig.run()).exit_code == ExitCode.DONE, "resumed, it is written"
     assert rig.config == recording.config_after
 
@@ -195,3 +204,22 @@ async def test_an_interrupted_rollback_is_finished_on_resuming(recording, replay
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert happened(rig, events.RolledBack)
     assert commanding(rig).largest_difference(rig.calibration.robot.controller) == 0.0
+
+
+def test_a_result_is_recorded(recording) -> None:
+    (written,) = recorded(recording)
+    within_limits = "the cell file: within its limits"
+    assert (written.kind, written.by, written.run) == (WriteKind.RESULT, within_limits, "run")
+    assert [file.parent for file in written.files] == [recording.folder.path.parent]
+    assert written.numbers_changed is not None
+    assert written.numbers_changed > 30
+    assert written.largest is not None
+
+
+async def test_a_run_goes_on_where_nothing_can_be_recorded(recording, replayed, caplog) -> None:
+    rig = replayed(recording.until(events.Proposed))
+    (rig.folder.siblings / RECORDS).mkdir()
+    assert (await rig.run()).exit_code == ExitCode.DONE
+    assert rig.config == recording.config_after
+    (warning,) = caplog.messages
+    assert warning.startswith("The config is written, but the history has no record of it: ")

@@ -3,7 +3,21 @@
 import pytest
 
 from drivers.gauges.sylvac import SylvacGauge
-from tests.drivers.gauges.sylvac.dialogue import OPENING
+
+OPENING = (
+    (b"UNI?\r", b"MM\r"),
+    (b"CHA?\r", b"CHA+\r"),
+    (b"ID?\r", b"SY276\r"),
+    (b"MOD?\r", b"NOR\r"),
+    (b"STO?\r", b"STO0\r"),
+    (b"PRE?\r", b"PRE +0.000\r"),
+    (b"BAT?\r", b"BAT1\r"),
+)
+
+
+def opening(**answers):
+    """The opening with other answers to some questions."""
+    return [(question, answers.get(question[:3].decode(), answer)) for question, answer in OPENING]
 
 
 @pytest.fixture

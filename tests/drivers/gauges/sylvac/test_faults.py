@@ -4,7 +4,7 @@ import pytest
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid
 from hexacell.errors import DeviceError, ExitCode
-from tests.drivers.gauges.sylvac.dialogue import OPENING, opening
+from tests.drivers.gauges.sylvac.conftest import OPENING, opening
 
 
 async def test_a_silent_gauge_is_named_with_what_to_do(dialogue, gauge):

@@ -8,7 +8,7 @@ from drivers.errors import GaugeUnsteady, WrongAnswer, WrongSetting
 from drivers.gauges.serial_gauge import MAX_READINGS
 from drivers.interfaces import DeviceIdentity, Gauge, GaugeReading
 from hexacell.errors import DeviceError
-from tests.drivers.gauges.sylvac.dialogue import OPENING
+from tests.drivers.gauges.sylvac.conftest import OPENING
 
 
 async def test_opening_identifies_the_gauge_and_reading_gives_its_value(dialogue, gauge):

@@ -1,9 +1,16 @@
-"""Serial settings, and gauges that share one port."""
+"""Serial settings, gauges that share one port, and ports that fail and are opened again."""
+
+import errno
+import os
+import termios
 
 import pytest
+import serial
 
-from hexacell.errors import ExitCode, FileError
-from tests.drivers.serial.shared_port.fake_port import FakePort, opened
+from drivers.errors import PortLost
+from drivers.serial.opening import opening_errors
+from hexacell.errors import DeviceError, ExitCode, FileError
+from tests.drivers.serial.shared_port.fake_port import LONG_S, FakePort, link_to, opened
 
 
 async def test_settings_reach_pyserial_unchanged(fake):
@@ -74,3 +81,115 @@ async def test_closing_all_closes_ports_still_in_use(links, fake):
     await links.close()
     assert not port.is_open
     await links.release("fake", "x")
+
+
+async def test_an_absent_port_is_reported_with_the_gauge_and_an_action(links):
+    link = links.acquire("/dev/absent-port", "x", {})
+    with pytest.raises(DeviceError) as caught:
+        await link.open()
+    text = "gauge x: port /dev/absent-port is absent. Plug it in or correct port in the cell file"
+    assert str(caught.value) == text
+    assert caught.value.exit_code is ExitCode.HARDWARE
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (errno.ENOENT, "is absent"),
+        (errno.EACCES, "may not be opened by this user"),
+        (errno.EBUSY, "is in use"),
+        (errno.EAGAIN, "is in use"),
+        (errno.EIO, "cannot be opened"),
+    ],
+)
+def test_the_cause_is_reported_in_words(number, words):
+    with pytest.raises(PortLost, match=words) as caught, opening_errors("gauge x", "/dev/ttyUSB0"):
+        raise serial.SerialException(number, "reason")
+    assert caught.value.action
+
+
+async def test_a_port_in_use_is_reported():
+    near, far = os.openpty()
+    url = os.ttyname(far)
+    one, two = await opened(url, exclusive=True), link_to(url, {"exclusive": True})
+    with pytest.raises(DeviceError, match="is in use"):
+        await two.open()
+    await one.close()
+    await two.close()
+    os.close(near)
+    os.close(far)
+
+
+async def test_a_terminal_marks_bytes_of_wrong_parity_and_opens_again():
+    """Of a pseudo-terminal that refuses a second opening with parity, see pyserial's issue 196."""
+    near, far = os.openpty()
+    for _ in range(2):
+        link = link_to(os.ttyname(far), {"bytesize": 7, "parity": "E", "stopbits": 2})
+        await link.open()
+        flags = termios.tcgetattr(far)[0]
+        assert flags & termios.INPCK
+        assert flags & termios.PARMRK
+        assert not flags & termios.IGNPAR
+        await link.close()
+    os.close(near)
+    os.close(far)
+
+
+async def test_a_pseudo_terminal_that_refuses_parity_is_reported(fake):
+    port = fake(FakePort())
+
+    def refuse():
+        raise termios.error(errno.EINVAL, "Invalid argument")
+
+    port.open = refuse
+    link = link_to("fake", {"bytesize": 7, "parity": "E", "stopbits": 2})
+    with pytest.raises(DeviceError, match="cannot be opened"):
+        await link.open()
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        serial.SerialException("device reports readiness to read but returned no data"),
+        serial.SerialTimeoutException("Write timeout"),
+        OSError(errno.EIO, "Input/output error"),
+        termios.error(errno.EIO, "Input/output error"),
+    ],
+)
+async def test_a_port_that_breaks_is_lost_until_it_is_opened_again(fake, broken):
+    port = fake(FakePort())
+    link = await opened()
+    port.broken = broken
+    with pytest.raises(DeviceError, match="was lost") as caught:
+        await link.exchange(b"?\r", b"\r", LONG_S)
+    assert caught.value.action is not None
+    assert not port.is_open
+    port.broken = None
+    with pytest.raises(DeviceError, match="was lost"):
+        await link.exchange(b"?\r", b"\r", LONG_S)
+    assert link.line.open_count == 1
+    assert await link.open() == 2
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
+
+
+async def test_opening_an_open_port_is_no_new_session(fake):
+    port = fake(FakePort())
+    link = await opened()
+    port.due = [(0.0, b"SY276.1\r")]
+    assert await link.open() == 1
+    assert link.take_unsolicited() == b"SY276.1\r"
+
+
+async def test_opening_detects_that_an_open_port_has_been_lost(fake):
+    port = fake(FakePort())
+    link = await opened()
+    port.broken = OSError(errno.EIO, "Input/output error")
+    monitor = port.close
+
+    def replug():
+        monitor()
+        port.broken = None
+
+    port.close = replug
+    assert await link.open() == 2
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"

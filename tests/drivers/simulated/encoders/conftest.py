@@ -12,6 +12,7 @@ import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
+from drivers.simulated.encoders.object_dictionary import TpdoDefaults, Vendor
 from drivers.simulated.serial_line import PtyLine, SerialLine, SocketLine
 from drivers.simulated.slcan import SlcanServer
 from hexacell.cell.devices import LinearEncoderSettings
@@ -144,3 +145,30 @@ def listen() -> Iterator[Callable[[SimulatedEncoderBank], Listener]]:
             return Listener(stack.enter_context(can.Bus(**bank.bus_settings)), bank)
 
         yield make
+
+
+_POSITION = (0x6004, 0, 32)
+_SPEED = (0x6030, 1, 16)
+_MAGNET_1 = (0x6020, 1, 32)
+_MAGNET_2 = (0x6020, 2, 32)
+
+EVENTS_ONLY = Vendor(
+    device_type=0x0008_0196,
+    tpdos=(
+        TpdoDefaults((_POSITION,), transmission_type=254, event_timer_ms=1),
+        TpdoDefaults((), transmission_type=1, enabled=False),
+    ),
+    step_in_6005=False,
+)
+"""TPDO1 every millisecond, TPDO2 off and empty; the step is in 6501h."""
+
+TWO_MAGNETS = Vendor(
+    device_type=0x000A_0196,
+    tpdos=(
+        TpdoDefaults((_MAGNET_1, _SPEED), transmission_type=254, event_timer_ms=10),
+        TpdoDefaults((_MAGNET_2, _MAGNET_1), transmission_type=1),
+    ),
+    mapping_writable=False,
+    magnets=2,
+)
+"""Positions in 6020h, and a fixed mapping in which the first magnet comes second."""

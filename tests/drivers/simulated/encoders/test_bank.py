@@ -16,9 +16,9 @@ from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.slcan import SlcanServer
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError
-from tests.drivers.short_timeout import short_timeout
+from tests.drivers.encoders.conftest import short_timeout
 from tests.drivers.simulated.encoders import faults
-from tests.drivers.simulated.encoders.vendors import EVENTS_ONLY, TWO_MAGNETS
+from tests.drivers.simulated.encoders.conftest import EVENTS_ONLY, TWO_MAGNETS
 from tests.waiting import until
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC
 from hexacell.clock import CellClock
-from tests.drivers.simulated.encoders.vendors import EVENTS_ONLY, TWO_MAGNETS
+from tests.drivers.simulated.encoders.conftest import EVENTS_ONLY, TWO_MAGNETS
 
 START, STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION = 1, 2, 0x80, 0x81, 0x82
 SYNC, NMT, ALL = 0x80, 0, 0

@@ -55,13 +55,6 @@ class Cutter:
         return f"{found}, leftover" if left else found
 
 
-def test_a_kill_before_the_replacement_leaves_the_old_config(program, new_site, undisturbed):
-    calls = undisturbed.ended.calls
-    replaced = next(number for number, call in enumerate(calls) if call.other.endswith(CONFIG))
-    cutter = Cutter(program, new_site, undisturbed)
-    assert cutter.cut(replaced, "committing") == "old config, leftover"
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 def test_a_kill_at_any_call_of_a_write_back_or_rollback_leaves_a_valid_config(

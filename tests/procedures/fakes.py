@@ -17,6 +17,7 @@ from drivers.interfaces import (
     ReportedPosition,
     StartupAction,
     StartupActions,
+    TemperatureReading,
 )
 from drivers.simulated.linuxcnc.state import MotionRefused
 from drivers.simulated.robot import SimulatedMachine
@@ -91,10 +92,7 @@ class FakeGauge(Fake):
         self.reads += 1
         if self.failures:
             raise self.failures.pop(0)
-        value = self.shown()
-        if abs(value) > HALF_TRAVEL_MM:
-            raise GaugeAtEnd("is at an end of its travel", subject=f"gauge {self.name}")
-        return GaugeReading(value, f"{value:+.3f}")
+        return await self.read_once()
 
     async def read_once(self) -> GaugeReading:
         value = self.shown()
@@ -105,6 +103,24 @@ class FakeGauge(Fake):
     async def check(self) -> None:
         if self.void:
             raise self.void
+
+
+class FakeThermometer(Fake):
+    """One that shows what stands in a list, the last of it for ever."""
+
+    def __init__(self, name: str, *shown: float | Exception) -> None:
+        self.name = name
+        self.shown = list(shown)
+
+    async def open(self) -> DeviceIdentity:
+        await self.read()
+        return DeviceIdentity(f"thermometer {self.name}", "fake", "a thermometer")
+
+    async def read(self) -> TemperatureReading:
+        shown = self.shown.pop(0) if len(self.shown) > 1 else self.shown[0]
+        if isinstance(shown, Exception):
+            raise shown
+        return TemperatureReading(shown, f"{1000 * shown:.0f}")
 
 
 class FakeEncoders(Fake):

@@ -6,15 +6,13 @@ import pytest
 
 from drivers.conformance import DialogueDiffers, recorded_bus, recorded_line, served_twin
 from drivers.encoders.cia406 import Cia406Bank
-from drivers.gauges.cdi import CdiGauge
-from drivers.gauges.sylvac import SylvacGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.wire_trace import TraceEntry, TrafficDirection, WireTrace, read_trace
 from hexacell.cell.devices import GaugeSettings, LinearEncoderSettings
 from hexacell.clock import CellClock
+from hexacell.plugins import Group, load
 
-DRIVERS = {"sylvac": SylvacGauge, "cdi": CdiGauge}
 WORST_LATENCY_S = 0.2
 
 
@@ -27,7 +25,7 @@ async def technician(
 ) -> list[float]:
     """Open a gauge, read it, check it."""
     ports = SharedSerialPorts(trace=trace, worst_latency_s=WORST_LATENCY_S)
-    gauge = DRIVERS[settings.protocol](settings, ports)
+    gauge = load(Group.GAUGES, settings.protocol)(settings, ports)
     try:
         await gauge.open()
         values = [(await gauge.read()).value_mm for _ in range(reads)]
@@ -37,7 +35,7 @@ async def technician(
     return values
 
 
-@pytest.fixture(params=sorted(DRIVERS))
+@pytest.fixture(params=["cdi", "sylvac"])
 async def recorded(request):
     """A trace as it stands in a run folder, its line, the protocol, and what was read."""
     trace = WireTrace()

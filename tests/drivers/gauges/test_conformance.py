@@ -10,20 +10,9 @@ from drivers.interfaces import Gauge
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.plugins import Group, load, names
-from tests.drivers.gauges.test_request import ID_H
-from tests.drivers.gauges.test_stream import RECEIVER
+from tests.drivers.simulated.gauges.served.cell import STREAM_DELAY_S, described
 
-MORE: dict[str, dict[str, Any]] = {
-    "request": {"request": ID_H},
-    "uwave": {"channel": 2, "delay_s": 0.02},
-    "stream": {"stream": RECEIVER, "delay_s": 0.02},
-    "mitutoyo-id-h": {"channel": 7},
-    "keyence-dl-rs1a": {"channel": 2},
-    "visa": {"visa": {"ask": "MEAS:DIST?", "mm_per_unit": 1000.0}},
-    # a pseudo-terminal refuses the parity of a port that is opened again
-    "modbus": {"modbus": {"device": 3, "register": 100}},
-}
-"""What the cell file must say beside the protocol, or says to try a channel or to be quick."""
+CHANNEL = 2
 
 TOLERANCES_MM = {"visa": 1e-6}
 
@@ -39,7 +28,8 @@ class OfProtocol(GaugeConformance):
 
     def twin(self) -> AbstractContextManager[GaugeTwin]:
         stated: dict[str, Any] = {"name": "x", "axis": "x", "protocol": self.protocol, "timeout_s": 0.4}
-        return served_twin(GaugeSettings(**stated, **MORE.get(self.protocol, {})))
+        stated |= {"channel": CHANNEL, "delay_s": STREAM_DELAY_S}
+        return served_twin(GaugeSettings(**stated, **described(self.protocol, CHANNEL)))
 
 
 for name in names(Group.GAUGES):

@@ -29,7 +29,7 @@ from hexacell.cell.simulation import FaultKind
 from hexacell.errors import HexacellError
 from procedures.devices.settling import trimmed_mean
 from tests.drivers.encoders.dbc.conftest import SIGNALS, dbc_text
-from tests.drivers.simulated.gauges.served.cell import MORE_DRIVERS, PROTOCOLS, Cell
+from tests.drivers.simulated.gauges.served.cell import DESCRIBED, DISPLAYS, PROTOCOLS, Cell
 
 TABLE = Path(__file__).with_name("fault_table.md")
 BEFORE_MM, AFTER_MM = 1.0, 1.5
@@ -169,7 +169,7 @@ async def encoder_row(protocol: str, fault: FaultKind, folder: Path) -> Row:
 def gauge_pairs() -> list[tuple[str, FaultKind]]:
     """Protocols with faults, in the order of the table."""
     faults = _kinds(lambda: Cell(["sylvac"] * 3).rack, "x")
-    pairs = [(protocol, fault) for fault in faults for protocol in (*PROTOCOLS, *MORE_DRIVERS)]
+    pairs = [(protocol, fault) for fault in faults for protocol in (*PROTOCOLS, *DISPLAYS, *DESCRIBED)]
     return [pair for pair in pairs if pair not in NOT_DUE]
 
 

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.interfaces import DeviceIdentity, TemperatureReading
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.loader import load_cell
@@ -31,7 +30,7 @@ from procedures.steps import events
 from procedures.steps.move import Move
 from procedures.workflow.length import BESIDE_MM
 from procedures.workflow.preflight import plan_failures
-from tests.procedures.fakes import Approver
+from tests.procedures.fakes import Approver, FakeThermometer
 from tests.procedures.rig import Rig
 from tests.procedures.runs.listening import happened
 
@@ -144,21 +143,6 @@ async def test_a_fixture_beside_its_direction_is_found_by_the_first_reading(make
     assert np.abs([sample.deviation_mm for sample in samples[1:]]).max() < 0.1
 
 
-class WarmFixture:
-    """A thermometer on the fixture."""
-
-    name = "fixture"
-
-    async def open(self) -> DeviceIdentity:
-        return DeviceIdentity("thermometer fixture", "fake", "a thermometer")
-
-    async def read(self) -> TemperatureReading:
-        return TemperatureReading(24.0, "24000")
-
-    async def close(self) -> None:
-        pass
-
-
 async def test_a_warm_fixture_is_longer_by_its_expansion(make_length_rig) -> None:
     """4 K of steel are 46 um/m: the true distance of the seats is that of the warm fixture."""
     longer = 300.0 * (1.0 + 4 * 11.5e-6)
@@ -167,7 +151,7 @@ async def test_a_warm_fixture_is_longer_by_its_expansion(make_length_rig) -> Non
         length_check__thermometer="fixture",
         simulation__fixture__distance_mm=longer,
     )
-    rig.performer = replace(rig.performer, thermometers=Thermometers([WarmFixture()]))
+    rig.performer = replace(rig.performer, thermometers=Thermometers([FakeThermometer("fixture", 24.0)]))
     found = await stated(rig)
     assert found.result.distance_mm == pytest.approx(longer)
     assert abs(found.result.long_um_m) <= found.result.expanded_um_m < 40.0
@@ -240,20 +224,6 @@ async def test_a_check_resumed_between_the_seats_goes_on_there(make_length_rig, 
     assert person.placed == [1, 2, 3]
 
 
-async def test_a_check_whose_gauges_lost_their_zero_meanwhile_says_so(make_length_rig) -> None:
-    """Switched off between the seats, with nobody who noticed."""
-    person = LeavesBefore(2)
-    rig = make_length_rig(person, length_check__mounting="by-hand")
-    with pytest.raises(AnswerNeeded):
-        await rig.run()
-    person.mounting = None
-    for gauge in rig.gauges:
-        gauge.shown = partial(less, gauge.shown, 0.3)
-    found = await stated(rig)
-    assert found.verdict is Verdict.NOT_EVALUATED
-    assert "they were zeroed in between" in found.result.reason
-
-
 async def test_a_mounting_that_is_measured_again_takes_all_with_it(make_length_rig) -> None:
     """The others have the zero of the first, which is in doubt."""
     rig = make_length_rig()
@@ -268,14 +238,6 @@ async def test_a_mounting_that_is_measured_again_takes_all_with_it(make_length_r
     assert found.verdict is Verdict.PASS
     placed = [event.at.point for event in happened(rig, events.GaugesPlaced)]
     assert placed == [1, 2, 1, 2, 3]
-
-
-def test_a_mounting_without_a_record_is_voided_alone(story) -> None:
-    first, second = story(Phase.LENGTH, 1), story(Phase.LENGTH, 2)
-    begun = [*first.whole(2), second.arrived(), second.placed(), second.voided()]
-    assert list(fold(begun).sets) == [MOUNTINGS[0]]
-    measured = [*first.whole(2), second.arrived(), second.placed(), second.sampled(), second.voided()]
-    assert fold(measured).sets == {}
 
 
 def test_the_first_mounting_has_the_zero_of_all(story) -> None:
@@ -318,14 +280,6 @@ async def test_a_run_checks_the_scale_before_its_verdict(make_rig) -> None:
     assert accuracy.length.long_um_m == pytest.approx(1000.0, abs=accuracy.length.expanded_um_m)
     assert accuracy.position.value > 0.12
     assert rig.engine.state.judged.verdict is not Verdict.PASS
-
-
-async def test_gauges_are_tried_at_every_mounting(make_length_rig) -> None:
-    rig = make_length_rig(stations__trial_mm=1.0)
-    found = await stated(rig)
-    assert found.verdict is Verdict.PASS
-    history = read_journal(rig.folder.journal)
-    assert [event.at for event in history if isinstance(event, events.GaugesTried)] == MOUNTINGS
 
 
 async def test_gauges_mounted_the_wrong_way_round_are_named_at_once(make_length_rig) -> None:

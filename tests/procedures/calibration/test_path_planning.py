@@ -165,18 +165,6 @@ def test_the_return_to_the_reference_uses_clear_lines_or_visited_poses(
     assert step.key == "P1/close"
 
 
-def test_a_return_path_over_waypoints_visits_each_of_them(make_rig, story, monkeypatch) -> None:
-    stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
-    ClearLines(monkeypatch, 1, stops=(stop,))
-    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
-    step = next_step(calibration, fold(happened))
-    assert isinstance(step, Move)
-    assert step.key == "P1/o00/move"
-    assert step.pose == pytest.approx(stop.as_tuple())
-    step = next_step(calibration, fold([*happened, story().arrived(0, step.pose)]))
-    assert step.key == "P1/o01/move"
-
-
 def test_a_return_path_is_not_planned_again_at_its_waypoint(make_rig, story, monkeypatch) -> None:
     """No line is clear from the waypoint; planning from there would go back and forth endlessly."""
     stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)

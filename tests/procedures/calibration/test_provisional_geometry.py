@@ -16,7 +16,7 @@ from procedures.journal.journal import read_journal
 from procedures.run.state import fold
 from procedures.steps import events
 from tests.procedures.rig import failure_without_record
-from tests.procedures.runs.listening import PowerCut, at_step, cut_power, on
+from tests.procedures.runs.listening import PowerCut, on
 
 
 @pytest.fixture
@@ -98,18 +98,6 @@ async def test_an_abort_within_a_set_leaves_the_provisional_geometry_until_the_r
         await rig.run(on(events.RecordTaken, lambda: rig.engine.command(Abort()), count))
     assert rig.config != before
     await require_finished(rig)
-
-
-@pytest.mark.sample("take back")
-@pytest.mark.parametrize("step", ["lend", "take back"])
-async def test_a_run_resumes_after_a_power_cut_before_the_provisional_geometry_is_written(rig, step):
-    before = rig.config
-    with pytest.raises(PowerCut):
-        await rig.run(at_step(step, cut_power))
-    ended = await rig.run()
-    assert ended.exit_code == ExitCode.DONE
-    assert kinds(rig)[-3:] == ["identified", "committed", "ended"]
-    assert rig.config != before
 
 
 async def test_a_run_resumes_after_a_power_cut_with_the_provisional_geometry_written(rig, monkeypatch):

@@ -19,9 +19,7 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.state import fold
 from procedures.steps import events
 from procedures.steps.move import Move
-from procedures.steps.place import Place
 from procedures.steps.roll_back import RollBack
-from procedures.steps.sample import Sample
 from procedures.workflow import sets as path_planning
 from procedures.workflow.points import IdentificationSteps
 from tests.procedures.story import Story, an_identification, located, next_step
@@ -212,24 +210,6 @@ class Choices:
             gain=1.0,
             forecast=None,
         )
-
-
-def test_references_are_the_cells_points_untilted(make_rig) -> None:
-    rig = make_rig()
-    step = next_step(rig.calibration, fold([]))
-    assert step.pose == (*rig.cell.settings.identification.points[0], 0.0, 0.0, 0.0)
-    assert step.expected is None
-
-
-def test_placing_and_sampling_happen_at_the_pose_commanded(make_rig) -> None:
-    pose = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
-    calibration = make_rig().calibration
-    place = next_step(calibration, fold([s().arrived(1, pose)]))
-    assert isinstance(place, Place)
-    assert place.pose == pose
-    sample = next_step(calibration, fold([s().arrived(1, pose), s().placed()]))
-    assert isinstance(sample, Sample)
-    assert sample.pose == pose
 
 
 def test_a_set_is_closed_at_the_pose_of_its_reference(make_rig, monkeypatch) -> None:

@@ -10,7 +10,7 @@ from typing import Any, cast
 import pytest
 
 from drivers.errors import GaugeSilent
-from drivers.interfaces import DeviceIdentity, TemperatureReading
+from drivers.interfaces import DeviceIdentity
 from hexacell.cell.devices import GaugeAxis
 from hexacell.errors import DeviceError, ExitCode, SeveralErrors
 from procedures.calibration.calibration import Mode
@@ -19,6 +19,7 @@ from procedures.devices.reconnection import DeviceReplaced, reconnect, require_k
 from procedures.journal.journal import read_journal
 from procedures.run.readings import Temperature
 from procedures.steps import events
+from tests.procedures.fakes import FakeThermometer
 from tests.waiting import until
 
 
@@ -86,28 +87,6 @@ async def test_cancelling_cancels_every_call() -> None:
     with pytest.raises(asyncio.CancelledError):
         await task
     assert cancelled == [1, 2]
-
-
-class FakeThermometer:
-    """One that shows what stands in a list, the last of it for ever."""
-
-    def __init__(self, name: str, *shown: float | Exception) -> None:
-        self.name = name
-        self.shown = list(shown)
-        self.closed = 0
-
-    async def open(self) -> DeviceIdentity:
-        await self.read()
-        return DeviceIdentity(f"thermometer {self.name}", "fake", "a thermometer")
-
-    async def read(self) -> TemperatureReading:
-        shown = self.shown.pop(0) if len(self.shown) > 1 else self.shown[0]
-        if isinstance(shown, Exception):
-            raise shown
-        return TemperatureReading(shown, f"{1000 * shown:.0f}")
-
-    async def close(self) -> None:
-        self.closed += 1
 
 
 GONE = DeviceError("cannot be read", subject="thermometer rails", action="Check it")

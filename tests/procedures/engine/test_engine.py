@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import errno
-import os
 from typing import Any
 
 import pytest
@@ -14,6 +12,7 @@ from hexacell.errors import (
     DeviceError,
     ExitCode,
     FileError,
+    HexacellError,
     Interruption,
     LimitError,
     SeveralErrors,
@@ -168,55 +167,31 @@ async def test_a_controller_that_cannot_be_prepared_ends_the_run_at_once(script,
     assert [event.kind for event in journal.events] == ["interrupted"]
 
 
-async def test_if_stopping_fails_too_that_is_said_first(script, journal, bench) -> None:
-    script.failure = DeviceError("does not answer", subject="gauge x")
+@pytest.mark.parametrize(
+    "error", [DeviceError("does not answer", subject="gauge x"), Interruption("aborted")]
+)
+async def test_if_stopping_fails_too_that_is_said_first(
+    script, journal, bench, error: HexacellError
+) -> None:
+    script.failure = error
     bench.controller.failures["stop"] = DeviceError("connection lost", subject="controller")
     with pytest.raises(RobotNotStopped) as failure:
         await Engine(script, journal).run()
     first, then = str(failure.value).splitlines()
     assert first.startswith("PRESS THE EMERGENCY STOP. The robot could not be stopped and may still move: ")
     assert first.endswith("controller: connection lost")
-    assert then == "gauge x: does not answer"
+    assert then == str(error)
     assert failure.value.exit_code is ExitCode.HARDWARE
     assert journal.events[-1] == events.Interrupted(reason=str(failure.value), exit_code=3)
 
 
-async def test_an_interruption_with_a_stop_that_fails_is_a_failure_of_the_hardware(script, journal, bench):
-    script.failure = Interruption("aborted")
-    bench.controller.failures["stop"] = DeviceError("connection lost", subject="controller")
-    with pytest.raises(RobotNotStopped, match=r"^PRESS THE EMERGENCY STOP") as failure:
-        await Engine(script, journal).run()
-    assert failure.value.exit_code is ExitCode.HARDWARE
-
-
-async def test_a_full_disk_stops_motion(script, journal, bench, path, monkeypatch) -> None:
-    def full(*_: Any) -> int:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    before: list[bytes] = []
-    real = script.perform
-
-    async def perform(step: Any, state: RunState) -> events.Event:
-        if step == MOVES[1]:
-            before.append(path.read_bytes())
-            monkeypatch.setattr(os, "write", full)
-        event: events.Event = await real(step, state)
-        return event
-
-    script.perform = perform
-    with pytest.raises(FileError, match="disk is full"):
-        await Engine(script, journal).run()
-    monkeypatch.undo()
-    assert bench.controller.log == ["prepare", "stop"]
-    assert path.read_bytes() == before[0]
-
-
-async def test_a_listener_that_fails_stops_motion(script, journal, bench) -> None:
+@pytest.mark.parametrize("error", [BrokenPipeError(), FileError("the disk is full")])
+async def test_an_event_that_is_not_kept_or_not_heard_stops_motion(script, journal, bench, error) -> None:
     def listener(event: events.Event, _: RunState) -> None:
         if isinstance(event, events.Arrived):
-            raise BrokenPipeError
+            raise error
 
-    with pytest.raises(BrokenPipeError):
+    with pytest.raises(type(error)):
         await Engine(script, journal, [listener]).run()
     assert bench.controller.log == ["prepare", "stop"]
 

@@ -99,13 +99,8 @@ def test_rejected_records_are_reproduced(make_rig, replay) -> None:
     assert report.differences == []
 
 
-NUMBERS = range(1, 26)
-
-
 @pytest.mark.sample("13")
-@pytest.mark.parametrize(
-    "number", [pytest.param(n, marks=[] if n % 8 == 5 else pytest.mark.slow) for n in NUMBERS]
-)
+@pytest.mark.parametrize("number", range(1, 26))
 def test_a_check_stopped_after_any_event_is_reproduced(make_rig, replay, number: int) -> None:
     rig = make_rig(Mode.CHECK)
 

@@ -21,6 +21,9 @@ async def test_settings_reach_pyserial_unchanged(fake):
     assert port.rts is False
     assert port.timeout <= 0.2
     assert port.write_timeout <= 0.2
+    del port.write_timeout
+    await opened("rfc2217://host:4001")
+    assert not hasattr(port, "write_timeout"), "pyserial refuses to open such a port with one"
 
 
 @pytest.mark.parametrize(

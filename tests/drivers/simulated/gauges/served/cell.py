@@ -2,19 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import Callable
 
-from drivers.gauges.cdi import CdiGauge
-from drivers.gauges.described import ModbusGauge, RequestGauge, StreamGauge
-from drivers.gauges.digimatic_usb import DigimaticUsbGauge
-from drivers.gauges.heidenhain_nd import HeidenhainGauge
-from drivers.gauges.keyence_dl_rs1a import KeyenceGauge
-from drivers.gauges.mitutoyo_id_h import IdHGauge
-from drivers.gauges.mux10 import Mux10Gauge
-from drivers.gauges.serial_gauge import SerialGauge
-from drivers.gauges.sylvac import SylvacGauge
-from drivers.gauges.uwave import UwaveGauge
-from drivers.gauges.visa import VisaGauge
 from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, instrument_class
 from drivers.simulated.gauges.instruments import Indicator
@@ -24,25 +12,11 @@ from drivers.wire_trace import WireTrace
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
+from hexacell.plugins import Group, load
 
-DRIVERS: dict[str, Callable[..., SerialGauge]] = {
-    "sylvac": SylvacGauge,
-    "mux10": Mux10Gauge,
-    "cdi": CdiGauge,
-}
-
-PROTOCOLS = tuple(DRIVERS)
-MORE_DRIVERS: dict[str, Callable[..., SerialGauge]] = {
-    "mitutoyo-id-h": IdHGauge,
-    "heidenhain-nd": HeidenhainGauge,
-    "keyence-dl-rs1a": KeyenceGauge,
-    "digimatic-usb": DigimaticUsbGauge,
-    "uwave": UwaveGauge,
-    "visa": VisaGauge,
-    "modbus": ModbusGauge,
-    "request": RequestGauge,
-    "stream": StreamGauge,
-}
+PROTOCOLS = ("sylvac", "mux10", "cdi")
+DISPLAYS = ("mitutoyo-id-h", "heidenhain-nd", "keyence-dl-rs1a", "digimatic-usb")
+DESCRIBED = ("uwave", "visa", "modbus", "request", "stream")
 REQUEST = {
     "ask": "GA01\r\n",
     "answer": r"GN01,([+-]\d{4}\.\d{4})",
@@ -102,8 +76,7 @@ class Cell:
         self.trace = WireTrace()
         self.links = SharedSerialPorts(trace=self.trace, worst_latency_s=WORST_LATENCY_S)
         self.gauges = {
-            each.name: (DRIVERS | MORE_DRIVERS)[each.protocol](each, self.links)
-            for each in self.rack.gauges
+            each.name: load(Group.GAUGES, each.protocol)(each, self.links) for each in self.rack.gauges
         }
 
     async def open(self):

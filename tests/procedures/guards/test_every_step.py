@@ -15,7 +15,9 @@ from typing import Any
 import pytest
 
 from hexacell.errors import ExitCode, HexacellError
+from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
+from procedures.run.state import fold
 from procedures.run.trips import Guard, GuardTripped
 from procedures.steps import events
 from procedures.steps.close import CloseSet
@@ -42,61 +44,38 @@ def sample(at: SetKey, orientation: int) -> Sample:
     return Sample(at=at, orientation=orientation, pose=move(at, orientation).pose)
 
 
-async def before(scene: Any, *steps: Any, then: Any) -> Step:
-    for step in steps:
-        await scene.do(step)
-    return lambda: scene.do(then)
+def zeroed(at: SetKey) -> tuple[Any, ...]:
+    return move(at, 1), sample(at, 1)
 
 
-async def prepare(scene: Any) -> Step:
-    return lambda: scene.rig.performer.prepare(scene.state)
+STEPS: dict[str, tuple[Any, ...]] = {
+    "prepare": (),
+    "move to a reference": (move(P1, 2), move(V1, 1)),
+    "place": (move(P1, 1), Place(at=P1, pose=move(P1, 1).pose)),
+    "move in a set": (*zeroed(P1), move(P1, 2)),
+    "way back": (*zeroed(P1), move(P1, 2), sample(P1, 2), move(P1, 1)),
+    "move afterwards": (*zeroed(V1), move(V1, 2)),
+    "sample of the reference": zeroed(P1),
+    "sample in a set": (*zeroed(P1), move(P1, 2), sample(P1, 2)),
+    "close": (*zeroed(P1), CloseSet(at=P1)),
+    "sample afterwards": (*zeroed(V1), move(V1, 2), sample(V1, 2)),
+    "reload": (Commit(),),
+}
+"""Kinds of steps: the last one after those before it; to prepare is none of a run's steps."""
+
+OUTSIDE = ("move to a reference",)
+WITHIN = ("move in a set", "way back", "move afterwards")
+READING = ("sample of the reference", "sample in a set", "close", "sample afterwards")
 
 
-async def move_to_a_reference(scene: Any) -> Step:
-    return await before(scene, move(P1, 2), then=move(V1, 1))
-
-
-async def place(scene: Any) -> Step:
-    return await before(scene, move(P1, 1), then=Place(at=P1, pose=move(P1, 1).pose))
-
-
-async def sample_of_the_reference(scene: Any) -> Step:
-    return await before(scene, move(P1, 1), then=sample(P1, 1))
-
-
-async def move_in_a_set(scene: Any) -> Step:
-    return await before(scene, move(P1, 1), sample(P1, 1), then=move(P1, 2))
-
-
-async def sample_in_a_set(scene: Any) -> Step:
-    return await before(scene, move(P1, 1), sample(P1, 1), move(P1, 2), then=sample(P1, 2))
-
-
-async def way_back(scene: Any) -> Step:
-    there = (move(P1, 1), sample(P1, 1), move(P1, 2), sample(P1, 2))
-    return await before(scene, *there, then=move(P1, 1))
-
-
-async def close(scene: Any) -> Step:
-    return await before(scene, move(P1, 1), sample(P1, 1), then=CloseSet(at=P1))
-
-
-async def reload(scene: Any) -> Step:
-    return lambda: scene.do(Commit())
-
-
-async def move_afterwards(scene: Any) -> Step:
-    return await before(scene, move(V1, 1), sample(V1, 1), then=move(V1, 2))
-
-
-async def sample_afterwards(scene: Any) -> Step:
-    return await before(scene, move(V1, 1), sample(V1, 1), move(V1, 2), then=sample(V1, 2))
-
-
-OUTSIDE = (move_to_a_reference,)
-WITHIN = (move_in_a_set, way_back, move_afterwards)
-READING = (sample_of_the_reference, sample_in_a_set, close, sample_afterwards)
-STEPS = (prepare, *OUTSIDE, place, *WITHIN, *READING, reload)
+async def come_to(scene: Any, step: str) -> Step:
+    """Do what comes before a step, which is given to be done."""
+    if step == "prepare":
+        return lambda: scene.rig.performer.prepare(scene.state)
+    *before, last = STEPS[step]
+    for one in before:
+        await scene.do(one)
+    return lambda: scene.do(last)
 
 
 @dataclass(frozen=True)
@@ -106,17 +85,14 @@ class Fault:
     name: str
     guard: Guard
     strike: Callable[[Any], Any]
-    steps: tuple[Any, ...]
-
-    def __str__(self) -> str:
-        return self.name
+    steps: tuple[str, ...]
 
 
-STANDING_ON = (*OUTSIDE, *WITHIN, place, *READING)
-MOVING = (prepare, *OUTSIDE, *WITHIN, place, reload)
+STANDING_ON = (*OUTSIDE, *WITHIN, "place", *READING)
+MOVING = ("prepare", *OUTSIDE, *WITHIN, "place", "reload")
 LAGS = "joint 3 following error"
 FAULTS = (
-    Fault("stop line", Guard.STOP_LINE, lambda s: setattr(s, "forbidden", "stop exists"), STEPS),
+    Fault("stop line", Guard.STOP_LINE, lambda s: setattr(s, "forbidden", "stop exists"), tuple(STEPS)),
     Fault("estop", Guard.EMERGENCY_STOP, lambda s: s.switch_off(estop=True), STANDING_ON),
     Fault("switched off", Guard.CONTROLLER, lambda s: s.switch_off(), STANDING_ON),
     Fault("following error", Guard.FOLLOWING, lambda s: s.switch_off(LAGS), STANDING_ON),
@@ -134,12 +110,9 @@ FAULTS = (
 def stage(scene: Any, recording: Any, replayed: Any) -> Callable[..., Any]:
     """A scene that has come as far as a step needs."""
 
-    def make(step: Any) -> Any:
-        if step is not reload:
+    def make(step: str) -> Any:
+        if step != "reload":
             return scene(stations__placement="by-hand")
-        from procedures.journal.journal import read_journal
-        from procedures.run.state import fold
-
         staged = scene(replayed(recording.until(events.Proposed), guards__stale_s=0.12))
         staged.state = fold(read_journal(staged.rig.folder.journal))
         return staged
@@ -170,37 +143,24 @@ def root(error: BaseException) -> GuardTripped:
     return error
 
 
-SOME = (
-    [(move_in_a_set, fault) for fault in FAULTS]
-    + [(step, FAULTS[0]) for step in STEPS if step is not move_in_a_set]
-    + [
-        (move_to_a_reference, FAULTS[5]),
-        (move_afterwards, FAULTS[6]),
-        (reload, FAULTS[9]),
-        (close, FAULTS[7]),
-    ]
+MORE = (
+    *("gauge at its end-move to a reference", "ball off its plate-move afterwards"),
+    *("encoder alarm-reload", "silent gauge-close"),
 )
-THE_REST = [(step, fault) for step in STEPS for fault in FAULTS if (step, fault) not in SOME]
 
 
-def names(cases: list[tuple[Any, Fault]]) -> list[str]:
-    return [f"{fault}-{step.__name__}" for step, fault in cases]
-
-
-@pytest.mark.parametrize(
-    ("step", "fault"),
-    [*SOME, *(pytest.param(*case, marks=pytest.mark.slow) for case in THE_REST)],
-    ids=names([*SOME, *THE_REST]),
-)
+@pytest.mark.sample("*-move in a set", "stop line-*", *MORE)
+@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize("fault", FAULTS, ids=[fault.name for fault in FAULTS])
 async def test_the_robot_stops_within_the_limit_for_each_guard_and_step(stage, step, fault):
     scene = stage(step)
     config = scene.rig.config
-    doing = await step(scene)
+    doing = await come_to(scene, step)
     at_s, ended = await struck(scene, fault, doing)
-    goes_on = step is reload and step not in fault.steps
+    goes_on = step == "reload" and step not in fault.steps
     assert (scene.rig.config == config) is not goes_on
-    assert scene.rig.physics._motion.end_s <= at_s + MUST_S or (step in OUTSIDE and step not in fault.steps)
-    if step is move_afterwards and fault.guard in {Guard.GAUGE_END, Guard.PLATE}:
+    assert scene.rig.physics.motion_end_s <= at_s + MUST_S or (step in OUTSIDE and step not in fault.steps)
+    if step == "move afterwards" and fault.guard in {Guard.GAUGE_END, Guard.PLATE}:
         assert isinstance(ended, events.RecordRejected), "a verdict on the new geometry"
         assert scene.rig.performer.guards.supervisor.latched is None
     elif step in fault.steps:
@@ -218,18 +178,18 @@ async def test_the_robot_stops_within_the_limit_for_each_guard_and_step(stage, s
         assert scene.rig.physics.progress() < 1.0, "stopped on the way"
 
 
-@pytest.mark.parametrize("step", STEPS, ids=[step.__name__ for step in STEPS])
-async def test_no_step_begins_without_free_disk_space(stage: Any, step: Any, monkeypatch: Any) -> None:
+@pytest.mark.parametrize("step", STEPS)
+async def test_no_step_begins_without_free_disk_space(stage: Any, step: str, monkeypatch: Any) -> None:
     scene = stage(step)
     config = scene.rig.config
-    doing = await step(scene)
-    orders, still_since_s = len(scene.controller.log), scene.rig.physics._motion.end_s
+    doing = await come_to(scene, step)
+    orders, still_since_s = len(scene.controller.log), scene.rig.physics.motion_end_s
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=49_900_000))
     with pytest.raises(HexacellError) as refusal:
         await doing()
     assert root(refusal.value).trip.guard is Guard.DISK
     assert "only 50 MB are free" in str(root(refusal.value))
     assert scene.rig.config == config
-    if step is not reload:
+    if step != "reload":
         assert len(scene.controller.log) == orders
     assert scene.rig.physics._motion.end_s == still_since_s

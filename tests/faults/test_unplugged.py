@@ -8,8 +8,15 @@ import pytest
 
 from procedures.steps import events
 from tests.faults.cell import Site
-from tests.faults.killing import KILLED, after, finish, history_of, places
-from tests.faults.promises import require_identical, require_valid
+from tests.faults.promises import (
+    KILLED,
+    after,
+    finish,
+    history_of,
+    places,
+    require_identical,
+    require_valid,
+)
 from tests.faults.steps import DEVICES, STEPS
 
 TIMEOUT_S = 1.0

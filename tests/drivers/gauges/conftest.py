@@ -139,3 +139,8 @@ class StreamingLine:
         if self._repeated and now >= self._next_s:
             self._next_s = now + GAP_S
             self._dialogue.pending += self._repeated
+
+
+@pytest.fixture
+def line(dialogue):
+    return StreamingLine(dialogue)

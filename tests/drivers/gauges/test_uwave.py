@@ -13,14 +13,8 @@ from drivers.serial.opening import SLICE_S
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.indicators import Uwave
 from hexacell.cell.devices import GaugeSettings
-from tests.drivers.gauges.conftest import StreamingLine
 
 DELAY_S = 0.02
-
-
-@pytest.fixture
-def line(dialogue):
-    return StreamingLine(dialogue)
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""The true state of the simulated robot: motions, positions by the true geometry, sensors with noise."""
+"""The true state of the simulated robot: motions, positions, sensors with noise, places of the gauges."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.simulated.physics import RAMP_S, Motion
+from drivers.simulated.physics import RAMP_S, GaugePlaces, Motion
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.cell.simulation import SimulatedFixture
+from hexacell.cell.uncertainty import LengthCheckSettings
 from hexacell.errors import ReachError
 from hexacell.kinematics.pose import Pose
 
@@ -57,17 +61,6 @@ def test_a_move_takes_the_time_of_its_longest_slider(make_twin) -> None:
     twin.clock.time_s += 10.0
     here = twin.physics.encoder_positions()
     assert twin.physics.start_motion(np.stack([here, here + 0.001])).duration_s == 0.2
-
-
-def test_sliders_and_ball_are_between_start_and_end_during_a_move(make_twin) -> None:
-    twin = make_twin(station_reach_mm=1e6)
-    start, seen = twin.physics.encoder_positions(), twin.seen()
-    end = start + 20.0  # all of them alike: the platform goes along the rails
-    motion = twin.physics.start_motion(np.stack([start, end]))
-    twin.clock.time_s += motion.duration_s / 2.0
-    assert twin.physics.progress() == pytest.approx(0.5)
-    assert twin.physics.encoder_positions() == pytest.approx(start + 10.0)
-    assert twin.seen() - seen == pytest.approx([10.0, 0.0, 0.0], abs=1e-6)
 
 
 def test_noise_is_drawn_at_every_stop_and_stays_until_the_next(make_twin) -> None:
@@ -218,3 +211,86 @@ def test_a_stopped_motion_stays_at_its_position(stopped: float, later: float) ->
     halted = replace(motion, stopped_s=stopped)
     assert halted.end_s == stopped
     assert np.array_equal(halted.joints(stopped + later), motion.joints(stopped))
+
+
+FIXTURE = LengthCheckSettings(
+    first_seat=(-150.0, 0.0, 500.0), direction=(0.6, 0.8, 0.0), distance_mm=200.0, uncertainty_mm=0.01
+)
+FIRST, SECOND = np.array(FIXTURE.first_seat), np.array(FIXTURE.second_seat)
+ELSEWHERE = np.array([100.0, -100.0, 550.0])
+
+
+@pytest.fixture
+def places():
+    simulation = load_cell(bundled_config("simulated-hexaglide")).settings.simulation
+    assert simulation is not None
+
+    def make(
+        ball: Any = FIRST, *, has_fixture: bool = True, off_mm: Any = (0.0, 0.0, 0.0), **fixture: float
+    ) -> GaugePlaces:
+        settings = simulation.model_copy(
+            update={
+                "fixture": SimulatedFixture(**fixture),
+                "gauges": simulation.gauges.model_copy(
+                    update={"misalignment_deg": 1.0, "off_middle_mm": off_mm}
+                ),
+            }
+        )
+        return GaugePlaces(settings, FIXTURE if has_fixture else None, np.random.default_rng(3), ball)
+
+    return make
+
+
+def test_plungers_stand_off_their_middle_by_what_the_cell_file_says(places) -> None:
+    right, off = places(ELSEWHERE), places(ELSEWHERE, off_mm=(3.8, -1.0, 0.5))
+    shown = off.triad @ (ELSEWHERE - off.station) - right.triad @ (ELSEWHERE - right.station)
+    assert shown == pytest.approx([3.8, -1.0, 0.5])
+
+
+def test_between_the_seats_the_gauges_keep_the_certified_distance(places) -> None:
+    made = places()
+    first, triad = made.station, made.triad
+    assert 0.05 < np.linalg.norm(first - FIRST) < 2.0
+    made.follow(SECOND + 1.0)
+    assert made.station - first == pytest.approx(SECOND - FIRST)
+    assert made.triad == pytest.approx(triad)
+    made.follow(FIRST - 1.0)
+    assert made.station == pytest.approx(first)
+
+
+def test_a_fixture_has_the_distance_the_direction_and_the_seating_that_are_stated(places) -> None:
+    made = places(distance_mm=200.5, yaw_deg=90.0)
+    first = made.station
+    made.follow(SECOND)
+    assert made.station - first == pytest.approx([-160.4, 120.3, 0.0])
+    loose = places(seating_mm=0.01)
+    first = loose.station
+    loose.follow(SECOND)
+    loose.follow(FIRST)
+    assert 0.001 < np.linalg.norm(loose.station - first) < 0.05
+
+
+def test_gauges_that_are_turned_in_the_second_seat_see_the_ball_from_there(places) -> None:
+    made = places(turned_deg=180.0)
+    ball = made.triad.T @ [1.0, 2.0, 3.0]
+    made.follow(SECOND)
+    assert made.triad @ ball == pytest.approx([-1.0, -2.0, 3.0])
+
+
+@pytest.mark.parametrize("has_fixture", [True, False])
+def test_everywhere_else_they_are_placed_by_hand(places, has_fixture: bool) -> None:
+    made = places(ELSEWHERE, has_fixture=has_fixture)
+    made.follow(SECOND)
+    off = made.station - SECOND
+    assert 0.05 < np.linalg.norm(off) < 2.0
+    before = made.triad
+    made.follow(FIRST)
+    assert not np.allclose(made.station - FIRST, off)
+    assert not np.allclose(made.triad, before)
+
+
+def test_a_ball_that_stays_near_does_not_move_them(places) -> None:
+    made = places()
+    before = made.station
+    made.follow(FIRST + 5.0)
+    assert made.station is before

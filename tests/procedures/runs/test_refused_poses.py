@@ -42,22 +42,6 @@ def excluded(rig: Any) -> list[events.PoseExcluded]:
     return happened(rig, events.PoseExcluded)
 
 
-@pytest.mark.slow
-async def test_a_run_within_narrow_limits_of_the_controller_ends_well(make_rig) -> None:
-    rig = make_rig(**limits(a=(-9.0, 9.0), b=(-9.0, 9.0), c=(-14.0, 14.0)))
-    ended = await rig.run()
-    assert ended.exit_code == ExitCode.DONE, ended.line
-    refusals = excluded(rig)
-    assert refusals, "otherwise nothing is tested"
-    assert len(happened(rig, events.RecordTaken)) >= 18
-    for refusal in refusals:
-        assert sent(rig)[f"move {Pose(*refusal.pose)}"] == 1, "it was never sent again"
-        assert refusal.axis is not None
-        assert f"would exceed {refusal.axis.upper()}'s" in refusal.reason
-    assert len(refusals) < 40
-    assert not happened(rig, events.Failed)
-
-
 async def test_a_resumed_run_does_not_send_it_again(make_rig) -> None:
     rig = make_rig(**limits(c=(-5.0, 5.0)))
     await run_until(rig, events.PoseExcluded)

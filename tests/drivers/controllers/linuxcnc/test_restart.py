@@ -174,18 +174,13 @@ def test_a_screen_that_could_not_come_back_is_not_ended(with_screen: Machine, mo
 
 
 @pytest.mark.parametrize(
-    ("arguments", "path", "problem"),
-    [((), os.environ["PATH"], "no INI file is named"), (("machine.ini",), "", "'inivar'")],
+    ("arguments", "problem"), [((), "no INI file is named"), (("machine.ini",), "'inivar'")]
 )
-def test_the_command_says_in_one_line_what_is_wrong(arguments, path, problem) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "drivers.controllers.linuxcnc.restart", *arguments],
-        env=os.environ | {"PATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert done.stderr.startswith("hexacell-restart-linuxcnc: ")
-    assert problem in done.stderr
-    assert done.stderr.count("\n") == 1
+def test_the_command_says_in_one_line_what_is_wrong(monkeypatch, capsys, arguments, problem) -> None:
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setattr(sys, "argv", ["hexacell-restart-linuxcnc", *arguments])
+    assert command.main() == 1
+    said = capsys.readouterr().err
+    assert said.startswith("hexacell-restart-linuxcnc: ")
+    assert problem in said
+    assert said.count("\n") == 1

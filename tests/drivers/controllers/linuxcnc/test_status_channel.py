@@ -6,7 +6,6 @@ import asyncio
 
 import pytest
 
-from drivers.controllers.linuxcnc.connection import PARSED_S, SendArbiter
 from drivers.errors import MotionInterrupted, MoveRefused
 from drivers.interfaces import ControllerStatus, StartupAction
 from hexacell.errors import DeviceError
@@ -165,43 +164,6 @@ async def test_the_status_is_not_read_during_a_stop(play) -> None:
     at_rest.set()
     await stop
     assert await looking == ON
-
-
-async def test_commands_are_not_sent_at_once_but_a_query_is_sent_while_a_long_command_runs() -> None:
-    arbiter = SendArbiter()
-    said: list[str] = []
-    asked = asyncio.Event()
-
-    async def order() -> None:
-        async with arbiter.query_turn():
-            said.append("order")
-            await asked.wait()
-            said.append("order done")
-
-    async def question() -> None:
-        async with arbiter.query_turn():
-            said.append("question")
-            asked.set()
-
-    await asyncio.gather(order(), question())
-    assert said == ["order", "question", "order done"]
-
-
-async def test_queries_wait_until_an_exclusive_turn_ends() -> None:
-    arbiter = SendArbiter()
-    said: list[str] = []
-
-    async def opening() -> None:
-        async with arbiter.line:
-            await asyncio.sleep(3 * PARSED_S)
-            said.append("opened")
-
-    async def question() -> None:
-        async with arbiter.query_turn():
-            said.append("question")
-
-    await asyncio.gather(opening(), question())
-    assert said == ["opened", "question"]
 
 
 async def test_a_stop_during_a_move_is_reported_by_the_move(play) -> None:

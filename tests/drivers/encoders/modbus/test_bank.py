@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -12,10 +14,62 @@ from drivers.encoders.modbus import ModbusBank, RegisterSpan, counts_in, registe
 from drivers.errors import BusError, InvalidSampleError, SilentNodeError
 from drivers.interfaces import DeviceIdentity
 from drivers.serial.modbus_port import RefusedRequest
+from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
+from drivers.wire_trace import TrafficDirection, WireTrace
 from hexacell.cell.described_devices import ModbusEncoderSettings
 from hexacell.cell.devices import LinearEncoderSettings
+from hexacell.clock import CellClock
 from hexacell.errors import HexacellError, UsageError
-from tests.drivers.encoders.modbus.conftest import TWO_DEVICES, modbus_settings
+
+FAST = 100.0
+ONE_DEVICE = {"registers": (100, 102, 104, 106, 108, 110)}
+TWO_DEVICES = {"registers": (0, 2, 4, 0, 2, 4), "devices": (7, 7, 7, 8, 8, 8)}
+
+
+def modbus_settings(timeout_s: float = 0.5, **modbus: Any) -> LinearEncoderSettings:
+    return LinearEncoderSettings.model_validate(
+        {"protocol": "modbus", "timeout_s": timeout_s, "modbus": {**ONE_DEVICE, **modbus}}
+    )
+
+
+class Simulated:
+    """Six simulated encoders, at 10, 20 and so on mm, and their driver."""
+
+    def __init__(
+        self, changes: dict[str, Any], *, has_gaps: bool = True, timeout_s: float = 0.5, **modbus: Any
+    ) -> None:
+        self.positions: Sequence[float] = [10.0 * leg for leg in range(1, 7)]
+        settings = modbus_settings(timeout_s, **modbus).model_copy(update=changes)
+        assert settings.modbus is not None
+        self.bank = SimulatedModbusBank(
+            settings, settings.modbus, lambda: self.positions, CellClock(FAST), has_gaps=has_gaps
+        )
+        self.settings = settings.model_copy(update={"modbus": self.bank.described})
+        self.trace = WireTrace()
+        self.driver = ModbusBank(self.settings, self.trace)
+
+    @property
+    def requests(self) -> list[bytes]:
+        """What was sent so far, without checksums."""
+        return [
+            entry.data[:-2] for entry in self.trace.entries() if entry.direction is TrafficDirection.SENT
+        ]
+
+
+@pytest.fixture
+async def simulated():
+    """Makes simulated encoders with a driver, by changes of ``[encoders]`` and keys of its ``modbus``."""
+    made = []
+
+    def make(changes: dict[str, Any] | None = None, **modbus: Any) -> Simulated:
+        made.append(Simulated(changes or {}, **modbus))
+        return made[-1]
+
+    yield make
+    for one in made:
+        await one.driver.close()
+        one.bank.close()
+
 
 LATCH = {"register": 9, "value": 1, "delay_s": 0.0}
 ALL = tuple(10.0 * leg for leg in range(1, 7))

@@ -69,50 +69,29 @@ class TestAllKills:
             kill(*[after(records), within(2), after(7), after(1), within(4), after(9)])
 
 
+def own_records(step: str, history: Sequence[events.Event]) -> range:
+    """The records of a run at which it does what other runs do not."""
+    first = places(history)["committing" if step == "rolling back" else step]
+    if step == "rolling back":
+        return range(first, len(history) + 1)
+    if step != "measuring noise":
+        return range(first - 1, first + 4)
+    [last] = (n for n, event in enumerate(history, start=1) if isinstance(event, events.NoiseMeasured))
+    return range(first - 1, last + 1)
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_a_result_to_be_rolled_back_is_rolled_back_after_a_kill_at_any_record(
-    program: Any, new_site: Any, rolled_back: Any
+@pytest.mark.parametrize("step", ["rolling back", "lending", "taking back", "measuring noise"])
+def test_a_run_killed_at_any_record_that_other_runs_do_not_have_is_resumed(
+    step: str, program: Any, new_site: Any, whole_with: Any
 ) -> None:
-    history = rolled_back.history
-    for records in range(places(history)["committing"], len(history) + 1):
-        site = new_site(*rolled_back.changes)
+    whole = whole_with(step)
+    for records in own_records(step, whole.history):
+        site = new_site(*whole.changes)
         assert program.run(site, **after(records)).code == KILLED
-        finish(program, site, code=1)
-        require_identical(site, rolled_back.site)
-        assert site.config.read_bytes() == rolled_back.config_before
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(3600)
-def test_a_provisional_geometry_is_reverted_after_a_kill_at_any_record(program, new_site, lent):
-    begun = places(lent.history)
-    for first in (begun["lending"], begun["taking back"]):
-        for records in range(first - 1, first + 4):
-            site = new_site(*lent.changes)
-            assert program.run(site, **after(records)).code == KILLED
-            finish(program, site)
-            require_identical(site, lent.site)
-
-
-def noise_records(whole: Any) -> range:
-    """The records from the first reference's to that of the measured noise."""
-    (last,) = (
-        number
-        for number, event in enumerate(whole.history, start=1)
-        if isinstance(event, events.NoiseMeasured)
-    )
-    return range(places(whole.history)["measuring noise"] - 1, last + 1)
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(3600)
-def test_a_run_killed_after_any_record_of_the_noise_is_resumed(program, new_site, noise_measured):
-    for records in noise_records(noise_measured):
-        site = new_site(*noise_measured.changes)
-        assert program.run(site, **after(records)).code == KILLED
-        finish(program, site)
-        require_identical(site, noise_measured.site)
+        finish(program, site, code=whole.ended.code)
+        require_identical(site, whole.site)
 
 
 INSTANTS = 200

@@ -63,14 +63,6 @@ async def test_all_nodes_are_configured_before_any_is_started(raw, opened):
     assert not any(data[0] >> 5 == 1 for can_id, data in raw.heard[first_start:] if can_id >> 7 == 0xC)
 
 
-async def test_the_identities_describe_the_nodes(bank):
-    identities = await bank.open()
-    assert [identity.serial_number for identity in identities] == [str(500 + leg) for leg in range(1, 7)]
-    assert identities[2].name == "encoder of leg 3 (node 3)"
-    assert identities[2].protocol == "cia406"
-    assert "absolute linear encoder, vendor 0x00000099" in identities[2].description
-
-
 KEPT_ELSEWHERE = {(0x6005, 1): None, (0x6501, 0): "e8030000"}
 UNFIT = [
     ({(0x1000, 0): "96010200"}, r"is no absolute .*0x00020196 .*an encoder, but of class 2"),

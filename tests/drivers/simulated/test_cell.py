@@ -17,7 +17,7 @@ from drivers.interfaces import StartupAction
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.model import CellSettings
 from hexacell.config.toml_format import NativeToml
-from hexacell.errors import FileError, ReachError
+from hexacell.errors import FileError
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose
 from hexacell.plugins import Group, load
@@ -112,13 +112,6 @@ def test_closing_ends_all_threads_and_may_be_repeated(bundled_cell) -> None:
         socket.create_connection(("127.0.0.1", cell.controller.port), 0.2),
     ):
         pass
-
-
-def test_a_first_point_out_of_reach_is_refused_and_nothing_stays_open(bundled_cell) -> None:
-    settings = bundled_cell.settings
-    far = settings.identification.model_copy(update={"points": ((0.0, 0.0, 2000.0), (0.0, 0.0, 550.0))})
-    with pytest.raises(ReachError):
-        serve(bundled_cell, settings.model_copy(update={"identification": far}))
 
 
 def test_a_device_that_cannot_be_simulated_is_refused_and_nothing_stays_open(bundled_cell) -> None:

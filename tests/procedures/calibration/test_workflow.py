@@ -1,4 +1,4 @@
-"""The next step, as a table of past events and the step that follows."""
+"""The next step, as a table of past events and what follows where a run does not go straight on."""
 
 from __future__ import annotations
 
@@ -81,23 +81,16 @@ def refused_twice(told_of: Any) -> list[events.Event]:
 Table = dict[str, tuple[list[events.Event], str | None]]
 TABLE: Table = {
     "nothing": ([], "P1/o01/move"),
-    "at the first point": ([s().arrived()], "P1/place"),
-    "gauges placed": ([s().arrived(), s().placed()], "P1/o01/sample"),
     "zeroed": (s().whole(1)[:3], "P1/o02/move"),
-    "at an orientation": ([*s().whole(1)[:3], s().arrived(2)], "P1/o02/sample"),
-    "sampled there": (s().whole(2)[:-2], "P1/o03/move"),
     "refused there": ([*s().whole(1)[:3], s().arrived(2), s().refused()], "P1/o02/move"),
     "refused too often": (
         [*s().whole(2)[:-2], *[s().arrived(3), s().refused(3)] * (REFUSALS + 1)],
         "P1/o01/move",
     ),
-    "all sampled": (s().whole(ORIENTATIONS)[:-2], "P1/o01/move"),
-    "back at the reference": (s().whole(ORIENTATIONS)[:-1], "P1/close"),
     "back after too many refusals": (
         [*s().whole(2)[:-2], *[s().arrived(3), s().refused(3)] * (REFUSALS + 1), s().arrived(1)],
         "P1/close",
     ),
-    "first point closed": (s().whole(ORIENTATIONS), "P2/o01/move"),
     "closed with few records": (s().whole(1), "P2/o01/move"),
     "interrupted at a pose": ([s().arrived(), INTERRUPTED], "locate"),
     "found after an interruption": ([s().arrived(), INTERRUPTED, LOCATED], "P1/o01/move"),
@@ -115,15 +108,6 @@ TABLE: Table = {
     "a record of a closed set undone": ([*MEASURED, s().undone(3)], "P1/o01/move"),
     "a set voided": ([*s().whole(3)[:-2], s().voided()], "P1/o01/move"),
     "an earlier set voided": ([*MEASURED, s(Phase.IDENTIFY, 1).voided()], "P1/o01/move"),
-    "all points measured": (MEASURED, "identify"),
-    "identified": (FOUND, "before-V1/o01/move"),
-    "at a held-out point": ([*FOUND, s(Phase.BEFORE).arrived()], "before-V1/place"),
-    "zeroed at a held-out point": ([*FOUND, *s(Phase.BEFORE).whole(1)[:3]], "before-V1/o02/move"),
-    "first held-out point closed": ([*FOUND, *s(Phase.BEFORE).whole(HELD_OUT)], "before-V2/o01/move"),
-    "held-out points measured": (BEFORE, "propose"),
-    "proposed": ([*BEFORE, PROPOSED], "commit"),
-    "committed": (WRITTEN, "locate"),
-    "found after committing": ([*WRITTEN, LOCATED], "after-V1/o01/move"),
     "taking it back was interrupted": ([*WRITTEN, WITHDRAWING, INTERRUPTED, LOCATED], "roll back"),
     "taken back without a verdict": ([*WRITTEN, WITHDRAWING, events.RolledBack()], "commit"),
     "refused on the way afterwards": (
@@ -145,7 +129,6 @@ TABLE: Table = {
         [*WRITTEN, *refused_at_a_pose(s(Phase.AFTER)), s(Phase.AFTER).refused(1), LOCATED],
         "judge",
     ),
-    "verified": (AFTER, "judge"),
     "passed": ([*AFTER, PASS], None),
     "worse": ([*AFTER, WORSE], "roll back"),
     "out of limits": ([*AFTER, OUT], "roll back"),

@@ -6,15 +6,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.errors import (
-    DeviceError,
-    ExitCode,
-    FileError,
-    HexacellError,
-    Interruption,
-    SeveralErrors,
-    WriteBackUndone,
-)
+from hexacell.errors import DeviceError, ExitCode, FileError, Interruption, SeveralErrors, WriteBackUndone
 from procedures.engine.commands import Abort, UnattendedOperator
 from procedures.engine.recovery import RecoveryPolicy, Reversal, revert_at_end, revert_unrecorded
 from procedures.journal.journal import read_journal
@@ -171,13 +163,6 @@ async def test_an_unattended_run_ends_and_is_resumed_once_the_edit_is_undone(rec
     rig.cell.config_path.write_bytes(before)
     rig.operator.name = None
     await run_until(rig, events.SetClosed, policy=policy)
-
-
-async def test_an_edit_of_the_written_config_is_noticed_too(recording, replayed) -> None:
-    rig = replayed(recording.until(events.Committed))
-    with pytest.raises(HexacellError, match="Undo the edit and retry"):
-        await rig.run(edits(rig, events.Located, 1))
-    assert not happened(rig, events.ResultValidated)
 
 
 async def test_an_edited_provisional_config_is_not_loaded_in_place_of_the_old_one(recording, replayed):

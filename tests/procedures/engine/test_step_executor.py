@@ -56,18 +56,15 @@ async def zeroed(station: Station) -> RunState:
     return fold([await station.do(SAMPLE)])
 
 
-async def test_the_first_record_of_a_set_is_its_zero(station: Station) -> None:
+async def test_the_first_record_of_a_set_is_the_zero_of_the_others(station: Station) -> None:
     station.shown[:] = [-1.0, 2.0, 3.0]
     event = await station.do(SAMPLE)
     assert isinstance(event, events.RecordTaken)
     assert event.deviation_mm == (0.0, 0.0, 0.0)
     assert event.reading.gauges_mm == (-1.0, 2.0, 3.0)
     assert event.reading.joints == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
-
-
-async def test_later_records_are_differences_from_the_zero(station: Station, zeroed: RunState) -> None:
     station.shown[:] = [-0.5, 1.75, 3.0]
-    event = await station.do(SECOND, zeroed)
+    event = await station.do(SECOND, fold([event]))
     assert event.deviation_mm == (0.5, -0.25, 0.0)
     assert event.reading.gauges_mm == (-0.5, 1.75, 3.0)
 

@@ -70,11 +70,3 @@ async def test_a_person_may_decline_and_approve_later(recording, replayed) -> No
     rig.operator.name = "a tester"
     assert (await rig.run()).exit_code == ExitCode.DONE
     assert len(rig.operator.asked) == 2
-
-
-async def test_a_change_within_limits_is_approved_by_the_cell_file(recording, replayed) -> None:
-    rig = replayed(proposed(recording, GOOD))
-    await rig.run()
-    assert rig.operator.asked == []
-    (committed,) = happened(rig, events.Committed)
-    assert committed.approved_by == "the cell file: within its limits"

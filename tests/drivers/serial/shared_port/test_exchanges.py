@@ -214,10 +214,6 @@ def test_an_answer_that_begins_like_the_request_is_none_of_its_echo():
     assert cut_frame(b"M0,+001.0000\r\n", b"M0\r\n", b"\r") == (b"M0,+001.0000\r", b"\n")
 
 
-def test_bytes_after_the_frame_are_returned_separately():
-    assert cut_frame(b"\n+1.234\r\n+2.345\r", b"?\r", b"\r") == (b"+1.234\r", b"\n+2.345\r")
-
-
 @given(
     ends, st.booleans(), ends, plain.filter(lambda frame: frame not in {b"", b"?"}), st.binary(max_size=20)
 )

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC
 from hexacell.clock import CellClock
-from tests.drivers.simulated.encoders.conftest import EVENTS_ONLY, TWO_MAGNETS
 
 START, STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION = 1, 2, 0x80, 0x81, 0x82
 SYNC, NMT, ALL = 0x80, 0, 0
@@ -36,25 +34,6 @@ def test_a_reset_restores_the_vendors_defaults(make_bank, listen):
     ear.heard()
     assert ear.silence()
     assert ear.sdo(1, "40171000") == "4b17100000000000"
-
-
-@pytest.mark.parametrize(
-    ("vendor", "object_", "value"),
-    [
-        (EVENTS_AND_SYNC, "40001000", "4300100096010800"),
-        (TWO_MAGNETS, "40001000", "4300100096010a00"),
-        (EVENTS_AND_SYNC, "40056001", "43056001e8030000"),
-        (EVENTS_ONLY, "40056001", "8005600100000206"),
-        (EVENTS_ONLY, "40016500", "43016500e8030000"),
-        (EVENTS_AND_SYNC, "40181004", "43181004e9030000"),
-        (EVENTS_AND_SYNC, "40001801", "4300180181010000"),
-        (EVENTS_ONLY, "40011801", "4301180181020080"),
-        (TWO_MAGNETS, "40206000", "4f20600002000000"),
-        (TWO_MAGNETS, "40011a02", "43011a0220012060"),
-    ],
-)
-def test_the_dictionary_answers(make_bank, listen, vendor, object_, value):
-    assert listen(make_bank(vendors=(vendor,) * 6)).sdo(1, object_) == value
 
 
 @pytest.mark.parametrize(

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import replace
 
 import pytest
 
-from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.errors import MotionInterrupted, MoveRefused, PoseRefused
 from drivers.interfaces import StartupAction
-from drivers.simulated.linuxcnc.server import SimulatedController
-from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
-from tests.drivers.simulated.linuxcnc.conftest import QUICK
-from tests.linuxcnc_orders import joints_of, pose_of
 
 ALL = frozenset(StartupAction)
 MOVE_S = 0.1
@@ -41,31 +35,6 @@ async def begin(ready, machine):
     moving = asyncio.create_task(ready.move(TARGET, MOVE_S))
     await asyncio.to_thread(machine.wait_for, "move")
     return moving
-
-
-async def test_a_rotation_that_no_query_tells_does_not_move_the_target(ready, simulated, machine):
-    simulated.state.modes = replace(simulated.state.modes, rotation_deg=30.0)
-    await ready.move(TARGET, MOVE_S)
-    assert machine.pose() == TARGET
-
-
-async def test_an_inch_machine_is_commanded_and_told_in_mm(machine):
-    inches = ControllerSettings(config="machine.ini", unit_mm=25.4)
-    with SimulatedController(machine, inches) as server:
-        controller = LinuxcncrshController(inches.model_copy(update={"port": server.port}), timeouts=QUICK)
-        await controller.open()
-        await controller.prepare(ALL)
-        await controller.move(TARGET, MOVE_S)
-        assert machine.pose() == TARGET
-        assert (await pose_of(controller)).as_tuple() == pytest.approx(TARGET.as_tuple(), abs=2e-5)
-        assert await joints_of(controller) == pytest.approx(TARGET.as_tuple(), abs=2e-5)
-        await controller.close()
-        plain = ControllerSettings(config="machine.ini", port=server.port)
-        controller = LinuxcncrshController(plain, timeouts=QUICK)
-        await controller.open()
-        with pytest.raises(DeviceError, match=r"counts in inch.*Set controller.unit_mm = 25\.4"):
-            await controller.check()
-        await controller.close()
 
 
 async def test_a_stop_that_overtakes_its_move(ready, machine):

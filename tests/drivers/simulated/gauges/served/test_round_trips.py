@@ -7,9 +7,6 @@ from pathlib import Path
 import pytest
 import serial
 
-from drivers.simulated.gauges.bank import SimulatedGaugeBank
-from hexacell.cell.devices import GaugeSettings
-from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError
 from tests.drivers.simulated.gauges.served.cell import (
@@ -35,16 +32,6 @@ async def test_gauges_open_read_and_pass_the_check(protocols, transport):
         assert await made.values() == [1.0, -4.5, 3.0]
         for gauge in made.gauges.values():
             await gauge.check()
-
-
-def test_multiplexers_on_different_ports_are_different_lines():
-    settings = [
-        GaugeSettings(name=name, axis=name, protocol="mux10", channel=1, port=f"/dev/{name}")
-        for name in "xyz"
-    ]
-    plungers = {name: lambda: 0.0 for name in "xyz"}
-    with SimulatedGaugeBank(settings, plungers, SimulatedGauges(), CellClock()) as rack:
-        assert len({rack.line(name).url for name in "xyz"}) == 3
 
 
 @pytest.mark.parametrize("asked", [False, True])

@@ -32,51 +32,26 @@ SupportedObjects=2
 1=0x1000
 2=0x1018
 
-[1000]
-ParameterName=Device type
-ObjectType=0x7
-DataType=0x0007
-AccessType=ro
-DefaultValue={kind}
-PDOMapping=0
-
 [1018]
 ParameterName=Identity
 ObjectType=0x9
 SubNumber=2
 
-[1018sub0]
-ParameterName=Highest sub-index
-ObjectType=0x7
-DataType=0x0005
-AccessType=ro
-DefaultValue=1
-
-[1018sub1]
-ParameterName=Vendor
-ObjectType=0x7
-DataType=0x0007
-AccessType=ro
-
 [OptionalObjects]
 SupportedObjects=2
 1=0x6000
 2=0x6003
-
-[6000]
-ParameterName=Operating parameters
-ObjectType=0x7
-DataType=0x0006
-AccessType=rw
-DefaultValue=0
-
-[6003]
-ParameterName=Preset
-ObjectType=0x7
-DataType=0x0004
-AccessType=rw
-DefaultValue=-5
 """
+ENTRIES = (
+    *(("1000", "Device type", "0x0007", "{kind}"), ("1018sub0", "Highest sub-index", "0x0005", "1")),
+    *(("1018sub1", "Vendor", "0x0007", ""), ("6000", "Operating parameters", "0x0006", "0")),
+    ("6003", "Preset", "0x0004", "-5"),
+)
+"""Sections of variables: names, types, and values as delivered."""
+
+for section, name, of_type, value in ENTRIES:
+    ABOUT += f"\n[{section}]\nParameterName={name}\nObjectType=0x7\nDataType={of_type}\nAccessType=rw\n"
+    ABOUT += f"DefaultValue={value}\n" if value else ""
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ from drivers.gauges.cdi import CdiGauge, Parameter, parse_parameter
 from drivers.gauges.protocol import FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.indicators import Cdi
 from hexacell.cell.devices import GaugeSettings
 
 VALUE = b"+  2.1380, MM\r\n"
@@ -66,13 +65,6 @@ def test_a_value_is_read_with_its_unit(frame, value, unit):
 def test_malformed_values_are_rejected(frame):
     with pytest.raises(FrameRejected):
         parse_value(frame)
-
-
-@given(st.floats(-99, 99), st.booleans())
-def test_values_of_the_simulated_device_are_parsed(value, inch):
-    shown = parse_value(Cdi.format_value(1, value, inch=inch).removesuffix(b"\n"))
-    assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-4)
-    assert shown.unit == ("inch" if inch else "mm")
 
 
 @given(

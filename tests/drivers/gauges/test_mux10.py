@@ -12,7 +12,6 @@ from drivers.gauges.mux10 import MultiplexerBusy, Mux10Gauge, parse_identificati
 from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.indicators import Mux10
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
 
@@ -83,13 +82,6 @@ def test_an_error_is_read(frame, error):
 def test_malformed_values_are_rejected(frame):
     with pytest.raises(FrameRejected):
         parse_value(frame)
-
-
-@given(st.integers(1, 99), st.floats(-99, 99), st.booleans())
-def test_values_of_the_simulated_device_are_parsed(channel, value, inch):
-    shown = parse_value(Mux10.format_value(channel, value, inch=inch), channel)
-    assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
-    assert (shown.apparent_unit == "inch") is inch
 
 
 @given(st.binary(max_size=15) | st.from_regex(rb"0[0-9]A[+\- ][0-9. ]{6,9}\r", fullmatch=True))

@@ -37,14 +37,14 @@ async def test_after_a_rejected_record_another_pose_is_measured(make_rig) -> Non
 
 
 async def test_a_slipped_gauge_stops_the_run_and_the_point_is_measured_again(recording, replayed) -> None:
-    rig = replayed(recording.until(events.SetClosed, count=1))
+    rig = replayed(recording.until(events.SetClosed, count=1), identification__orientations=4)
     real = rig.gauges[1].shown
 
     def slip() -> None:
         rig.gauges[1].shown = lambda: real() + 0.2
 
     with pytest.raises(LimitError, match=r"P2: back at the reference .*y \+0\.[12]"):
-        await rig.run(on(events.RecordTaken, slip, count=5))
+        await rig.run(on(events.RecordTaken, slip, count=2))
     assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.OUT_OF_LIMITS
     assert rig.controller.log[-1] == "stop"
     await run_until(rig, events.SetClosed)

@@ -55,7 +55,9 @@ POINTS = ((100.0, -100.0, 500.0), (0.0, 150.0, 520.0), (-100.0, 100.0, 500.0))
 
 
 async def test_a_point_whose_reference_is_refused_is_left(make_rig) -> None:
-    rig = make_rig(**limits(y=(-120.0, 120.0)), identification__points=POINTS)
+    rig = make_rig(
+        **limits(y=(-120.0, 120.0)), identification__points=POINTS, identification__orientations=7
+    )
     await run_until(rig, events.Identified)
     (refusal,) = [one for one in excluded(rig) if one.orientation == 1]
     assert (refusal.at.phase, refusal.at.point) == (Phase.IDENTIFY, 2)

@@ -10,7 +10,6 @@ from drivers.errors import GaugeAtEnd, ZeroVoid
 from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.gauges.sylvac import BATTERY, ERROR_FRAMES, IDENTIFICATION, PRESET, SylvacGauge
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.indicators import Sylvac
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
 
@@ -56,13 +55,6 @@ def test_an_error_frame_is_an_error(frame, error):
 def test_malformed_frames_are_rejected(frame):
     with pytest.raises(FrameRejected):
         parse_value(frame)
-
-
-@given(st.floats(-999, 999), st.booleans())
-def test_values_of_the_simulated_device_are_parsed(value, inch):
-    shown = parse_value(Sylvac.format_value(1, value, inch=inch))
-    assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
-    assert (shown.apparent_unit == "inch") is inch
 
 
 @given(st.binary(max_size=12) | st.from_regex(rb"[+\- ]?[0-9. ]{1,9}[<=>]?\r", fullmatch=True))

@@ -8,7 +8,6 @@ therefore end with the very bytes that an uninterrupted one ends with.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -103,13 +102,9 @@ def make_site(folder: Path, *changes: dict[str, Any], timeout_s: float = PATIENC
     folder.mkdir(parents=True)
     source = load_cell(bundled_config("simulated-hexaglide"))
     patience = {"encoders.timeout_s": timeout_s, "guards.stale_s": timeout_s}
-    settings = changed(source.settings, merged([SMALL, patience, *changes]))
+    together = {key: value for change in (SMALL, patience, *changes) for key, value in change.items()}
+    settings = changed(source.settings, together)
     gauges = tuple(gauge.model_copy(update={"timeout_s": timeout_s}) for gauge in settings.gauges)
     (folder / "cell.toml").write_text(dump(changed(settings, {"gauges": gauges})))
     shutil.copy(source.config_path, folder)
     return Site(folder)
-
-
-def merged(changes: Iterable[dict[str, Any]]) -> dict[str, Any]:
-    """Later ones before earlier ones."""
-    return {key: value for change in changes for key, value in change.items()}

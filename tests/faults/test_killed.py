@@ -152,20 +152,16 @@ def served(site: Site) -> Iterator[None]:
             process.terminate()
 
 
-def run_over_killed(records: int, program: Any, site: Site, whole: Any) -> None:
-    with served(site):
-        assert program.run(site, **after(records)).code == KILLED
-        finish(program, site, code=whole.ended.code)
-        require_identical(site, whole.site)
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("step", STEPS_OF_A_RUN)
 def test_a_run_killed_at_any_kind_of_step_is_resumed(step, program, new_site, whole_with):
     whole = whole_with(step)
-    records = places(whole.history)[step]
-    run_over_killed(records, program, new_site(*whole.changes), whole)
+    site = new_site(*whole.changes)
+    with served(site):
+        assert program.run(site, **after(places(whole.history)[step])).code == KILLED
+        finish(program, site, code=whole.ended.code)
+        require_identical(site, whole.site)
 
 
 CONFIG = "simulated-hexaglide.controller.toml"

@@ -16,6 +16,7 @@ import pytest
 
 from hexacell.config.change import ConfigChange
 from hexacell.config.write_back import commit
+from procedures.calibration.calibration import Calibration
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
 from tests.made_once import made_once
@@ -34,6 +35,12 @@ def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def make_rig(few_candidates: None, tmp_path: Path) -> MakeRig:
     return partial(new_rig, tmp_path)
+
+
+@pytest.fixture(scope="session")
+def calibration(tmp_path_factory: pytest.TempPathFactory) -> Calibration:
+    """What a run of the recorded cell decides by, for tests that take no step."""
+    return new_rig(tmp_path_factory.mktemp("cell")).calibration
 
 
 @pytest.fixture(scope="session")

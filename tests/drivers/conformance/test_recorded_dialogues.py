@@ -53,17 +53,11 @@ async def test_the_driver_reads_from_the_trace_what_it_read_from_the_gauge(recor
         assert await technician(gauge_settings(protocol, url)) == values
 
 
-async def replayed(recorded, reads: int) -> list[float]:
-    text, line, protocol, _ = recorded
-    with recorded_line(read_trace(text), line) as url:
-        return await technician(gauge_settings(protocol, url), reads=reads)
-
-
 async def test_a_driver_that_asks_more_is_told_where(recorded):
-    with pytest.raises(
-        DialogueDiffers, match=r"asks b'(\?|R)\\r', where request \d+ of the trace, at \d+\.\d+, is b'"
-    ):
-        await replayed(recorded, 4)
+    text, line, protocol, _ = recorded
+    words = r"asks b'(\?|R)\\r', where request \d+ of the trace, at \d+\.\d+, is b'"
+    with pytest.raises(DialogueDiffers, match=words), recorded_line(read_trace(text), line) as url:
+        await technician(gauge_settings(protocol, url), reads=4)
 
 
 async def test_what_comes_unasked_comes_again_before_the_first_request():
@@ -111,12 +105,8 @@ async def test_encoders_are_read_from_a_trace(recorded_encoders):
 
 
 async def test_a_frame_that_the_trace_has_nowhere_is_named(recorded_encoders):
-    with pytest.raises(DialogueDiffers, match=r"asks b'000#800B', which the trace has nowhere"):
-        await opened_with_another_node(recorded_encoders)
-
-
-async def opened_with_another_node(recorded_encoders) -> None:
     entries, line, settings, _ = recorded_encoders
-    with recorded_bus(entries, line) as bus:
+    nowhere = pytest.raises(DialogueDiffers, match=r"asks b'000#800B', which the trace has nowhere")
+    with nowhere, recorded_bus(entries, line) as bus:
         changes = {"nodes": (11, 2, 3, 4, 5, 6), "timeout_s": 0.2, "bus": dict(bus)}
         await Cia406Bank(settings.model_copy(update=changes)).open()

@@ -69,16 +69,12 @@ def test_a_pose_out_of_reach_is_refused_and_nothing_moves(twin, pose: Pose) -> N
     assert twin.machine.pose().as_tuple() == pytest.approx(TILTED.as_tuple(), abs=1e-9)
 
 
-def stop_half_way(twin: Any) -> None:
-    def stop() -> None:
+def test_the_machine_stops_in_place(twin) -> None:
+    def stop_half_way() -> None:
         twin.clock.time_s += 0.15
         twin.machine.stop()
 
-    twin.clock.on_wait = stop
-
-
-def test_the_machine_stops_in_place(twin) -> None:
-    stop_half_way(twin)
+    twin.clock.on_wait = stop_half_way
     twin.machine.move(Pose(4.0, 0.0, 550.0))
     there = Pose(2.0, 0.0, 550.0)
     twin.clock.time_s += 10.0

@@ -75,10 +75,6 @@ def recorder(told: list[Any]) -> Any:
     return record
 
 
-def placed_at(event: Any, *mountings: int) -> bool:
-    return isinstance(event, events.GaugesPlaced) and event.at.point in mountings
-
-
 def less(shown: Callable[[], float], off: float) -> float:
     return shown() - off
 
@@ -171,7 +167,7 @@ async def test_gauges_that_are_zeroed_between_the_seats_are_told(make_length_rig
     rig = make_length_rig()
 
     def press(event: Any, _: RunState) -> None:
-        if placed_at(event, *when):
+        if isinstance(event, events.GaugesPlaced) and event.at.point in when:
             zero_gauges(rig)
 
     found = await stated(rig, press)

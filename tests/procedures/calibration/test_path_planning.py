@@ -30,10 +30,6 @@ ELSEWHERE = (-60.0, 80.0, 520.0, 12.0, -8.0, 5.0)
 INTERRUPTED = events.Interrupted(reason="a power cut", exit_code=130)
 
 
-def found_at(pose: Any) -> events.Event:
-    return located(pose)
-
-
 def spy(monkeypatch: pytest.MonkeyPatch, *blocked: tuple[float, ...]) -> list[tuple[Any, Any, Any]]:
     """Writes down every line that is checked; those to some poses are not clear."""
     asked: list[tuple[Any, Any, Any]] = []
@@ -51,7 +47,7 @@ def test_a_blocked_straight_line_is_replaced_by_a_route_over_a_waypoint(make_rig
     point = rig.cell.settings.identification.points[0]
     blocked = (*point, 0.0, 0.0, 0.0)
     asked = spy(monkeypatch, blocked)
-    state = fold([rig.started(), found_at(ELSEWHERE)])
+    state = fold([rig.started(), located(ELSEWHERE)])
     with pytest.raises(NoSafePath, match="it was not moved"):
         next_step(rig.calibration, state)
     asked.clear()
@@ -64,16 +60,18 @@ def test_a_blocked_straight_line_is_replaced_by_a_route_over_a_waypoint(make_rig
     assert isinstance(step, Move)
     assert (step.key, step.pose) == ("P1/o00/move", (*ELSEWHERE[:3], 0.0, 0.0, 0.0))
     passed = events.Arrived(at=step.at, orientation=0, pose=step.pose)
-    after = fold([rig.started(), found_at(ELSEWHERE), passed])
+    after = fold([rig.started(), located(ELSEWHERE), passed])
     assert after.at_pose is None
     assert next_step(rig.calibration, after).key == "P1/o01/move"
 
 
-def test_a_return_to_the_reference_is_checked_against_the_travel(recording, make_rig, monkeypatch) -> None:
+def test_a_return_to_the_reference_is_checked_against_the_travel(
+    recording, calibration, monkeypatch
+) -> None:
     sampled = recording.until(events.RecordTaken, count=5)
     here = sampled[-1].pose
     asked = spy(monkeypatch)
-    step = next_step(make_rig().calibration, fold([*sampled, INTERRUPTED, found_at(here)]))
+    step = next_step(calibration, fold([*sampled, INTERRUPTED, located(here)]))
     assert step.key == "P1/o01/move"
     ((start, end, reference),) = asked
     assert start.as_tuple() == pytest.approx(here)
@@ -82,19 +80,19 @@ def test_a_return_to_the_reference_is_checked_against_the_travel(recording, make
 
 
 def test_a_robot_away_from_the_ball_returns_on_a_line_checked_without_the_travel(
-    recording, make_rig, monkeypatch
+    recording, calibration, monkeypatch
 ) -> None:
     """The gauges' travel cannot be required of a ball that is outside already."""
     sampled = recording.until(events.RecordTaken, count=5)
     asked = spy(monkeypatch)
-    step = next_step(make_rig().calibration, fold([*sampled, INTERRUPTED, found_at(ELSEWHERE)]))
+    step = next_step(calibration, fold([*sampled, INTERRUPTED, located(ELSEWHERE)]))
     assert step.key == "P1/o01/move"
     assert [reference for *_, reference in asked] == [None]
 
 
-def test_visited_poses_serve_as_waypoints(recording, make_rig, monkeypatch) -> None:
+def test_visited_poses_serve_as_waypoints(recording, calibration, monkeypatch) -> None:
     sampled = recording.until(events.RecordTaken, count=4)
-    state = fold([*sampled, INTERRUPTED, found_at(sampled[-1].pose)])
+    state = fold([*sampled, INTERRUPTED, located(sampled[-1].pose)])
     second = next(s for s in state.samples(sampled[-1].at.phase) if s.orientation == 2)
 
     def over_the_second(_: Any, start: PoseBatch, end: PoseBatch, reference: Any = None) -> bool:
@@ -102,7 +100,7 @@ def test_visited_poses_serve_as_waypoints(recording, make_rig, monkeypatch) -> N
         return second.pose in (pytest.approx(here), pytest.approx(there))
 
     monkeypatch.setattr(route_module, "is_clear", over_the_second)
-    step = next_step(make_rig().calibration, state)
+    step = next_step(calibration, state)
     assert (step.key, step.pose) == ("P1/o02/move", second.pose)
 
 
@@ -153,10 +151,10 @@ class ClearLines:
     [((1,), [1]), ((4, 1), [1]), ((4,), [4, 3, 2, 1]), ((), [8, 7, 6, 5, 4, 3, 2, 1]), ((6, 5, 2), [2, 1])],
 )
 def test_the_return_to_the_reference_uses_clear_lines_or_visited_poses(
-    make_rig, story, monkeypatch, clear_to, way
+    calibration, story, monkeypatch, clear_to, way
 ) -> None:
     ClearLines(monkeypatch, *clear_to)
-    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
+    happened = story().whole(ORIENTATIONS)[:-2]
     visited: list[int] = []
     while isinstance(step := next_step(calibration, fold(happened)), Move):
         visited.append(step.orientation)
@@ -165,11 +163,11 @@ def test_the_return_to_the_reference_uses_clear_lines_or_visited_poses(
     assert step.key == "P1/close"
 
 
-def test_a_return_path_is_not_planned_again_at_its_waypoint(make_rig, story, monkeypatch) -> None:
+def test_a_return_path_is_not_planned_again_at_its_waypoint(calibration, story, monkeypatch) -> None:
     """No line is clear from the waypoint; planning from there would go back and forth endlessly."""
     stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
     stands_in = ClearLines(monkeypatch, 1, stops=(stop,))
-    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
+    happened = story().whole(ORIENTATIONS)[:-2]
     to_stop = next_step(calibration, fold(happened))
     assert isinstance(to_stop, Move)
     asked: list[float] = []
@@ -185,22 +183,22 @@ def test_a_return_path_is_not_planned_again_at_its_waypoint(make_rig, story, mon
     assert asked == pytest.approx([ORIENTATIONS - 1.0])
 
 
-def test_without_a_clear_line_the_return_visits_the_waypoints_passed_before(make_rig, story, monkeypatch):
+def test_without_a_clear_line_the_return_visits_the_waypoints_passed_before(
+    calibration, story, monkeypatch
+):
     ClearLines(monkeypatch)
     stop = (100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
     s = story()
     led = [s.arrived(0, stop), s.arrived(3), s.sampled(3)]
-    step = next_step(
-        make_rig().calibration, fold([*s.whole(2)[:-2], *led, *[s.refused(4)] * (REFUSALS + 1)])
-    )
+    step = next_step(calibration, fold([*s.whole(2)[:-2], *led, *[s.refused(4)] * (REFUSALS + 1)]))
     assert isinstance(step, Move)
     assert (step.key, step.pose) == ("P1/o00/move", stop)
 
 
-def test_the_return_from_a_refused_pose_begins_at_the_last_record(make_rig, story, monkeypatch) -> None:
+def test_the_return_from_a_refused_pose_begins_at_the_last_record(calibration, story, monkeypatch) -> None:
     ClearLines(monkeypatch)
     refusals = [story().arrived(5), story().refused(5)] * (REFUSALS + 1)
-    step = next_step(make_rig().calibration, fold([*story().whole(4)[:-2], *refusals]))
+    step = next_step(calibration, fold([*story().whole(4)[:-2], *refusals]))
     assert step.key == "P1/o04/move"
 
 

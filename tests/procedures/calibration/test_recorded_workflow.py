@@ -54,11 +54,10 @@ def test_measured_deviations_agree_with_the_expected_ones(recording) -> None:
     assert np.median(wrong_by) < 1.5
 
 
-def test_the_next_step_depends_on_the_state_only(recording, make_rig) -> None:
+def test_the_next_step_depends_on_the_state_only(recording, calibration) -> None:
     """A resumed run chooses the same steps as an uninterrupted one."""
     history = recording.history
     places = [n for n, event in enumerate(history) if isinstance(event, events.StepBegun)]
-    calibration = make_rig().calibration
     for place in places[3::9]:
         event = history[place]
         assert isinstance(event, events.StepBegun)
@@ -66,12 +65,11 @@ def test_the_next_step_depends_on_the_state_only(recording, make_rig) -> None:
 
 
 @pytest.mark.parametrize("undone", [(4, 2), (2, 4), (3, 4, 2)])
-def test_several_records_are_taken_again_one_after_the_other(recording, make_rig, undone) -> None:
+def test_several_records_are_taken_again_one_after_the_other(recording, calibration, undone) -> None:
     """Whatever the order in which they were undone; the robot does not go to one and sample another."""
     sampled = recording.until(events.RecordTaken, count=4)
     taken = {event.orientation: event for event in sampled if isinstance(event, events.RecordTaken)}
     at = taken[1].at
-    calibration = make_rig().calibration
     state = fold([*sampled, *(events.RecordDiscarded(at=at, orientation=number) for number in undone)])
     again = []
     for _ in range(4 * len(undone)):
@@ -88,9 +86,8 @@ def test_several_records_are_taken_again_one_after_the_other(recording, make_rig
     assert not state.set(at).again
 
 
-def test_after_a_refusal_another_pose_is_chosen(recording, make_rig) -> None:
+def test_after_a_refusal_another_pose_is_chosen(recording, calibration) -> None:
     sampled = recording.until(events.RecordTaken, count=6)
-    calibration = make_rig().calibration
     first = next_step(calibration, fold(sampled))
     assert isinstance(first, Move)
     arrived = events.Arrived(at=first.at, orientation=first.orientation, pose=first.pose)
@@ -102,7 +99,7 @@ def test_after_a_refusal_another_pose_is_chosen(recording, make_rig) -> None:
     assert second.pose != first.pose
 
 
-def test_the_path_after_a_refusal_begins_at_the_present_pose(recording, make_rig, monkeypatch) -> None:
+def test_the_path_after_a_refusal_begins_at_the_present_pose(recording, calibration, monkeypatch) -> None:
     """Not at the last record: the refused pose is where the straight lines start that are checked."""
     starts: list[Any] = []
 
@@ -119,24 +116,21 @@ def test_the_path_after_a_refusal_begins_at_the_present_pose(recording, make_rig
         events.Arrived(at=key, orientation=5, pose=refused_at),
         events.RecordRejected(at=key, orientation=5, reason="outside"),
     ]
-    next_step(make_rig().calibration, fold(happened))
+    next_step(calibration, fold(happened))
     assert starts[0] == pytest.approx(refused_at)
 
 
-def _passes(step: Any, following: Any) -> bool:
-    """Whether a step is a move to a pose on the way back, where nothing is measured."""
-    return isinstance(step, Move) and isinstance(following, Move)
-
-
-def test_a_run_takes_the_expected_number_of_records(recording, make_rig) -> None:
+def test_a_run_takes_the_expected_number_of_records(recording, calibration) -> None:
     came = sum(isinstance(event, events.RecordTaken | events.SetClosed) for event in recording.history)
-    assert came == expected_records(make_rig().cell.settings, Mode.OPTIMISE)
+    assert came == expected_records(calibration.settings, Mode.OPTIMISE)
 
 
 def test_the_steps_of_a_whole_run_in_their_order(recording) -> None:
     begun = [event.step for event in recording.history if isinstance(event, events.StepBegun)]
     keys = [
-        step.key for step, following in pairwise([*begun, None]) if step and not _passes(step, following)
+        step.key
+        for step, following in pairwise([*begun, None])
+        if step and not (isinstance(step, Move) and isinstance(following, Move))  # on the way back
     ]
 
     def of_set(name: str, orientations: int) -> list[str]:
@@ -204,23 +198,22 @@ def test_chosen_points_keep_their_numbers(make_rig) -> None:
     assert len(openings) == 1
 
 
-def test_listed_poses_are_run(make_rig, story) -> None:
-    rig = make_rig()
+def test_listed_poses_are_run(calibration, story) -> None:
     here = tuple(tuple(Pose(*point, n) for n in (0.5, 0.9, 1.2)) for point in ((1.0, 2.0, 500.0),) * 2)
     listed = PoseList(Path("list.csv"), here)
-    calibration = replace(rig.calibration, listed=listed)
-    step = next_step(calibration, fold([]))
+    listing = replace(calibration, listed=listed)
+    step = next_step(listing, fold([]))
     assert isinstance(step, Move)
     assert step.pose == here[0][0].as_tuple()
-    assert expected_records(rig.cell.settings, rig.calibration.mode, listed) == 6 + 2 + 2 * 2 * 4 + 2 * 2
-    back = next_step(calibration, fold(story().whole(3)[:-2]))
+    assert expected_records(calibration.settings, calibration.mode, listed) == 6 + 2 + 2 * 2 * 4 + 2 * 2
+    back = next_step(listing, fold(story().whole(3)[:-2]))
     assert isinstance(back, Move)
     assert back.orientation < 3
     assert back.expected is None
 
 
 @pytest.mark.parametrize("order", [(1, 2), (2, 1)])
-def test_records_stay_in_the_order_in_which_sets_were_measured(make_rig, story, order) -> None:
+def test_records_stay_in_the_order_in_which_sets_were_measured(story, order) -> None:
     happened = [event for point in order for event in story(point=point).whole(2)]
     situation = campaign_state(fold(happened), None)
     assert situation.measurements.points.tolist() == [point for point in order for _ in range(2)]

@@ -143,11 +143,10 @@ TABLE: Table = {
 
 
 @pytest.mark.parametrize("name", TABLE)
-def test_the_next_step_of_a_calibration(name: str, make_rig, monkeypatch) -> None:
+def test_the_next_step_of_a_calibration(name: str, calibration, monkeypatch) -> None:
     happened, key = TABLE[name]
-    rig = make_rig()
     choices = Choices(monkeypatch)
-    step = next_step(rig.calibration, fold(happened))
+    step = next_step(calibration, fold(happened))
     assert (step.key if step else None) == key
     chosen = {"P1/o02/move", "P1/o03/move", "P1/o04/move"}
     assert choices.made == (1 if key in chosen and "undone" not in name else 0)
@@ -195,25 +194,24 @@ class Choices:
         )
 
 
-def test_a_set_is_closed_at_the_pose_of_its_reference(make_rig, monkeypatch) -> None:
+def test_a_set_is_closed_at_the_pose_of_its_reference(calibration, monkeypatch) -> None:
     Choices(monkeypatch)
     pose = (99.0, -99.0, 501.0, 0.5, 0.0, 0.0)
     happened = [s().arrived(1, pose), s().placed(), s().sampled(1, pose=pose)]
     for orientation in range(2, ORIENTATIONS + 1):
         happened += [s().arrived(orientation), s().sampled(orientation)]
-    step = next_step(make_rig().calibration, fold(happened))
+    step = next_step(calibration, fold(happened))
     assert isinstance(step, Move)
     assert step.pose == pose
 
 
-def test_a_set_without_a_pose_worth_visiting_is_closed(make_rig, monkeypatch) -> None:
+def test_a_set_without_a_pose_worth_visiting_is_closed(calibration, monkeypatch) -> None:
     Choices(monkeypatch, LimitError("no orientation surely keeps the ball inside"))
-    step = next_step(make_rig().calibration, fold(s().whole(3)[:-2]))
+    step = next_step(calibration, fold(s().whole(3)[:-2]))
     assert step.key == "P1/o01/move"
 
 
-def test_held_out_poses_are_those_chosen_when_identified_before_and_after(make_rig) -> None:
-    calibration = make_rig().calibration
+def test_held_out_poses_are_those_chosen_when_identified_before_and_after(calibration) -> None:
     for stage, phase in ((FOUND, Phase.BEFORE), (WRITTEN, Phase.AFTER)):
         happened = [*stage, LOCATED]
         for orientation in range(1, HELD_OUT + 1):
@@ -224,14 +222,14 @@ def test_held_out_poses_are_those_chosen_when_identified_before_and_after(make_r
 
 
 @pytest.mark.parametrize("phase", [Phase.IDENTIFY, Phase.BEFORE, Phase.AFTER])
-def test_gauges_that_cannot_be_zeroed_end_the_run(make_rig, phase: Phase) -> None:
+def test_gauges_that_cannot_be_zeroed_end_the_run(calibration, phase: Phase) -> None:
     happened = {Phase.BEFORE: FOUND, Phase.AFTER: WRITTEN}.get(phase, [])
     refused = [*happened, s(phase).arrived(), s(phase).placed(), s(phase).refused(1)]
     with pytest.raises(LimitError, match=f"{phase.value}1: the gauges cannot be zeroed"):
-        next_step(make_rig().calibration, fold(refused))
+        next_step(calibration, fold(refused))
 
 
-def test_a_held_out_pose_outside_the_travel_ends_the_run_before_anything_is_written(make_rig):
+def test_a_held_out_pose_outside_the_travel_ends_the_run_before_anything_is_written(calibration):
     refused = [*FOUND, *s(Phase.BEFORE).whole(1)[:3], s(Phase.BEFORE).refused()]
     with pytest.raises(LimitError, match="before-V1: the ball left the gauges' travel"):
-        next_step(make_rig().calibration, fold(refused))
+        next_step(calibration, fold(refused))

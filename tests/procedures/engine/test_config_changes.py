@@ -33,11 +33,6 @@ def arrived(orientation: int) -> events.Event:
     return events.Arrived(at=at, orientation=orientation, pose=(0.0,) * 6)
 
 
-def step_at_end(history: list[events.Event], error: BaseException) -> BaseStep | None:
-    reversal = revert_at_end(fold(history), error)
-    return None if reversal is None else reversal.step
-
-
 @pytest.mark.parametrize(
     ("history", "error", "step"),
     [
@@ -55,7 +50,8 @@ def step_at_end(history: list[events.Event], error: BaseException) -> BaseStep |
     ],
 )
 def test_an_early_end_reverts_unverified_and_provisional_geometries(history, error, step):
-    assert step_at_end(history, error) == step
+    reversal = revert_at_end(fold(history), error)
+    assert (reversal.step if reversal else None) == step
 
 
 @pytest.mark.parametrize(("event", "step"), [(COMMITTED, ROLL_BACK), (APPLIED, TAKE_BACK)])

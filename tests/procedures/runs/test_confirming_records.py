@@ -39,7 +39,9 @@ async def test_confirming_records_that_agree_end_the_run_with_a_pass(recording, 
     assert [sample.pose for sample in state.samples(Phase.CONFIRM)] == [
         pose for poses in planned.poses for pose in poses
     ]
-    assert not set(planned.poses[0][1:]) & set(recording_poses(state)), "they are new ones"
+    phases = (Phase.IDENTIFY, Phase.BEFORE, Phase.AFTER)
+    earlier = {sample.pose for phase in phases for sample in state.samples(phase)}
+    assert not set(planned.poses[0][1:]) & earlier, "they are new ones"
     assert state.judged is not None
     assert state.judged.verdict is Verdict.PASS
     verification = state.judged.verification
@@ -48,11 +50,6 @@ async def test_confirming_records_that_agree_end_the_run_with_a_pass(recording, 
     assert all(test.passed for test in verification.tests)
     assert any(test.sentence.endswith("new records do not confirm that.") for test in verification.tests)
     assert rig.config == recording.config_after
-
-
-def recording_poses(state: RunState) -> list[Any]:
-    phases = (Phase.IDENTIFY, Phase.BEFORE, Phase.AFTER)
-    return [sample.pose for phase in phases for sample in state.samples(phase)]
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
 from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Replayer, ReplayReport
-from procedures.run.keys import Phase, SetKey, SixNumbers
+from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events
 from procedures.steps.assess_noise import AssessNoise
@@ -110,7 +109,8 @@ def test_the_reference_is_left_for_pilot_poses(quiet: Rig) -> None:
     assert departures[:2] == ["..."] * 2
     assert max(map(len, departures)) == 3, "fewer where no further one is safe from there"
     assert len(departures) == 6
-    turned = [Pose(*visits_pose(history)).angle_to(Pose(*one.pose)) for one in pilots]
+    reference = Pose(*happened(quiet, events.RecordTaken)[0].pose)
+    turned = [reference.angle_to(Pose(*one.pose)) for one in pilots]
     assert np.mean(turned[6:]) > 2.0 * np.mean(turned[:3])
     state = fold(history)
     assert len(state.pilots) == len(pilots)
@@ -118,11 +118,6 @@ def test_the_reference_is_left_for_pilot_poses(quiet: Rig) -> None:
     assert max(np.abs(one.deviation).max() for one in state.pilots) < travel
     assert {one.orientation for one in state.measurements().records} == {1, 2}
     assert len(visits) == 6
-
-
-def visits_pose(history: Sequence[events.Event]) -> SixNumbers:
-    """The pose of the first reference."""
-    return next(event.pose for event in history if isinstance(event, events.RecordTaken))
 
 
 async def test_a_pilot_pose_outside_the_travel_is_the_last_one(asked: Rig) -> None:

@@ -138,7 +138,7 @@ def test_another_display_is_refused(machine: Machine) -> None:
         restart(machine.ini)
 
 
-@pytest.fixture(params=["axis", "another"])
+@pytest.fixture(params=["axis", pytest.param("another", marks=pytest.mark.slow)])
 def with_screen(machine: Machine, monkeypatch: pytest.MonkeyPatch, request) -> Machine:
     """LinuxCNC with a screen, which ends with it, and linuxcncrsh as an application beside it."""
     monkeypatch.setenv("DISPLAY", ":0")

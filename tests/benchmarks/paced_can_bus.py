@@ -19,7 +19,7 @@ import pytest
 from drivers.encoders import bank as plausibility
 from drivers.encoders import can_bus, node_monitor
 from drivers.encoders import node_monitor as alarm_poll
-from tests.drivers.encoders.raw_node import (
+from tests.drivers.encoders.conftest import (
     HEARTBEAT,
     NMT,
     SDO_ANSWER,

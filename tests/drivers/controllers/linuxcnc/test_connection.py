@@ -9,7 +9,7 @@ import pytest
 from drivers.controllers.linuxcnc.protocol import Timeouts
 from drivers.errors import MoveRefused, ResponseTimeout
 from hexacell.errors import DeviceError
-from tests.drivers.controllers.linuxcnc.dialogue import (
+from tests.drivers.controllers.linuxcnc.conftest import (
     ACK,
     AGAIN_IN_CONTROL,
     ARRIVED,

@@ -10,7 +10,7 @@ import pytest
 from drivers.errors import CommandRefused, ConnectionLost, MotionInterrupted, MoveRefused, PoseRefused
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
-from tests.drivers.controllers.linuxcnc.dialogue import (
+from tests.drivers.controllers.linuxcnc.conftest import (
     ABORT,
     ACK,
     AGAIN_IN_CONTROL,

@@ -14,8 +14,7 @@ from drivers.controllers.linuxcnc.startup import run_reload_command
 from drivers.errors import ConnectionLost, StartupNotPermitted
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
-from tests.drivers.controllers.linuxcnc.conftest import OPENING, Then
-from tests.drivers.controllers.linuxcnc.dialogue import (
+from tests.drivers.controllers.linuxcnc.conftest import (
     HOMED,
     HOMING,
     IN_ESTOP,
@@ -27,9 +26,11 @@ from tests.drivers.controllers.linuxcnc.dialogue import (
     NO_ESTOP,
     NOT_HOMED,
     OFF,
+    OPENING,
     OWN_COORDINATES,
     READY,
     SWITCHING_ON,
+    Then,
     said,
 )
 from tests.waiting import until

@@ -15,8 +15,7 @@ from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import WireTrace
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError, ExitCode, UsageError
-from tests.drivers.controllers.linuxcnc.dialogue import said
-from tests.linuxcnc_orders import joints_of, pose_of
+from tests.drivers.controllers.linuxcnc.conftest import said
 
 HELLO = "hello EMC hexacell 1.0"
 

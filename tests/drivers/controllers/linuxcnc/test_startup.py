@@ -10,7 +10,7 @@ from drivers.errors import CommandRefused, MotionInterrupted, MoveRefused, Start
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
-from tests.drivers.controllers.linuxcnc.dialogue import (
+from tests.drivers.controllers.linuxcnc.conftest import (
     CODES,
     HOMED,
     HOMING,

@@ -9,10 +9,10 @@ import pytest
 from drivers.errors import MotionInterrupted, MoveRefused
 from drivers.interfaces import ControllerStatus, StartupAction
 from hexacell.errors import DeviceError
-from tests.drivers.controllers.linuxcnc.conftest import GREETING
-from tests.drivers.controllers.linuxcnc.dialogue import (
+from tests.drivers.controllers.linuxcnc.conftest import (
     ACK,
     AGAIN_IN_CONTROL,
+    GREETING,
     HALF_WAY,
     MDI,
     MDI_MODE,

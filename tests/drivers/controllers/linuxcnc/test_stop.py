@@ -8,7 +8,7 @@ import pytest
 
 from drivers.errors import MotionInterrupted
 from hexacell.errors import DeviceError
-from tests.drivers.controllers.linuxcnc.dialogue import (
+from tests.drivers.controllers.linuxcnc.conftest import (
     ACK,
     AGAIN_IN_CONTROL,
     HALF_WAY,

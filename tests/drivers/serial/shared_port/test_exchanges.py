@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from drivers.serial.framing import FRAME_LIMIT, LINE_ENDS, cut_frame
 from drivers.serial.request_port import NoAnswer
 from hexacell.errors import DeviceError
-from tests.drivers.serial.shared_port.fake_port import (
+from tests.drivers.serial.shared_port.conftest import (
     FOREVER_S,
     LONG_S,
     SOON_S,

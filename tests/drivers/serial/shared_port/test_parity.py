@@ -14,7 +14,7 @@ from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError
 from tests.drivers.gauges.sylvac.conftest import OPENING
-from tests.drivers.serial.shared_port.fake_port import LONG_S, WORST_LATENCY_S, FakePort
+from tests.drivers.serial.shared_port.conftest import LONG_S, WORST_LATENCY_S, FakePort
 
 characters = st.binary(max_size=20).map(lambda data: bytes(byte & 0x7F for byte in data))
 

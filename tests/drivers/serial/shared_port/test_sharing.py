@@ -10,7 +10,7 @@ import serial
 from drivers.errors import PortLost
 from drivers.serial.opening import opening_errors
 from hexacell.errors import DeviceError, ExitCode, FileError
-from tests.drivers.serial.shared_port.fake_port import LONG_S, FakePort, link_to, opened
+from tests.drivers.serial.shared_port.conftest import LONG_S, FakePort, link_to, opened
 
 
 async def test_settings_reach_pyserial_unchanged(fake):

@@ -5,12 +5,11 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-import numpy as np
 import pytest
 
-from drivers.errors import GaugeAtEnd, WrongAnswer
+from drivers.errors import WrongAnswer
 from drivers.interfaces import GaugeReading
-from hexacell.errors import DeviceError, HexacellError
+from hexacell.errors import DeviceError
 from hexacell.limits.gauge_travel import GaugeRoom
 from procedures.guards.polling import DevicePoller, LineActivity, PolledDevices
 from procedures.guards.rules.base import GuardLimits
@@ -189,21 +188,6 @@ async def test_gauges_are_not_read_during_a_move_to_another_point(scene) -> None
     assert isinstance(await stage.do(sample(1, P2)), events.RecordTaken)
 
 
-async def test_a_move_that_begins_off_the_plate_may_lead_back_onto_it(scene) -> None:
-    stage = await reference(scene())
-    stage.shift["x"] = 5.9
-    assert isinstance(await stage.do(sample(2)), events.RecordRejected)
-
-    async def creep_back() -> None:
-        while stage.shift["x"] > 0.0:
-            await stage.rig.clock.sleep(0.05)
-            stage.shift["x"] -= 0.5
-
-    creeping = asyncio.ensure_future(creep_back())
-    await stage.do(move(1))
-    await creeping
-
-
 @pytest.mark.parametrize("from_elsewhere", [False, True])
 async def test_gauges_are_not_monitored_on_the_return_from_elsewhere(scene, from_elsewhere: bool) -> None:
     """There a gauge may show something, and be at its end on the way."""
@@ -298,21 +282,3 @@ async def test_a_delay_of_the_process_is_no_silence_of_its_devices(scene) -> Non
         clock.time_s += 5.0
         await clock.sleep(0.2)
         assert monitor.trip is None
-
-
-async def test_an_error_keeps_the_latest_value() -> None:
-    answers: list[Any] = [1.0, GaugeAtEnd("end", subject="g"), HexacellError("off", subject="g"), 2.0]
-
-    async def ask() -> float:
-        answer = answers.pop(0)
-        if isinstance(answer, HexacellError):
-            raise answer
-        return float(answer)
-
-    poller = DevicePoller("g", ask)
-    seen = []
-    for _ in range(4):
-        await poller.poll()
-        seen.append((poller.value, poller.first, str(poller.error or "")))
-    assert seen == [(1.0, 1.0, ""), (1.0, 1.0, "g: end"), (1.0, 1.0, "g: off"), (2.0, 1.0, "")]
-    assert np.isclose(poller.line.silent_s, 0.0)

@@ -70,6 +70,7 @@ def synced(monkeypatch) -> list[tuple[str, int]]:
 
 def test_every_event_is_forced_to_the_disk_before_append_returns(path: Path, synced) -> None:
     with Journal(path) as journal:
+        assert str(path.parent) in [name for name, _ in synced], "so is the journal's name"
         synced.clear()
         for event in TOLD:
             journal.append(event)
@@ -77,17 +78,9 @@ def test_every_event_is_forced_to_the_disk_before_append_returns(path: Path, syn
     assert len(synced) == len(TOLD)
 
 
-def test_the_journals_name_is_forced_to_the_disk_too(path: Path, synced) -> None:
-    with Journal(path):
-        assert str(path.parent) in [name for name, _ in synced]
-
-
-def test_a_journal_that_is_absent_cannot_be_read(path: Path) -> None:
+def test_a_journal_that_is_absent_or_in_no_folder_is_told(path: Path) -> None:
     with pytest.raises(FileError, match="does not exist"):
         read_journal(path)
-
-
-def test_a_journal_in_no_folder_cannot_be_opened(path: Path) -> None:
     with pytest.raises(FileError, match="cannot be opened"):
         Journal(path / "nowhere")
 

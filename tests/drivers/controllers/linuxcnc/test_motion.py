@@ -202,13 +202,6 @@ REFUSED_TO_RESTORE = said("set mdi G94 G1 F250: NAK | get enable: ON")
 STATE = said("get error: OK | get estop: OFF | get machine: ON")
 
 
-async def test_the_modes_of_before_are_restored_after_a_move(play):
-    driver = await play.opened([*READY, *CHECKED, *MOVED, RESTORED_HERE])
-    await driver.prepare(frozenset())
-    await driver.move(TARGET, MOVE_S)
-    await driver.close()
-
-
 async def test_modes_that_are_not_restored_for_a_reason_are_not_asked_for_again(play):
     reason = said("get error: must be in MDI mode | get error: OK")
     driver = await play.opened([*READY, *CHECKED, *MOVED, *REFUSED_TO_RESTORE, *reason, RESTORED_HERE])

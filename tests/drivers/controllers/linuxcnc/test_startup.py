@@ -179,16 +179,6 @@ async def test_a_refusal_quotes_the_controllers_error_messages(play):
     assert caught.value.problem == f"refuses 'set machine on': {four}; and 1 more"
 
 
-async def test_the_explanations_of_2_10_come_with_the_refusal(play):
-    refused = b"error: Waiting for 'SET MACHINE ON' failed\r\nSET MACHINE NAK\r\n"
-    why = said("get enable: ON | get error: OK")
-    driver = await play.opened([*TAKING_CONTROL, *OFF, ("set machine on", refused), *why])
-    with pytest.raises(
-        CommandRefused, match="refuses 'set machine on': Waiting for 'SET MACHINE ON' failed"
-    ):
-        await driver.prepare(ALL)
-
-
 async def test_a_refusal_of_2_10_without_a_nak(play):
     refused = b"error: Cannot issue SET MODE command while SET MDI command is still active\r\n"
     why = said("get enable: ON | get error: OK")

@@ -42,14 +42,6 @@ async def test_six_positions_are_read_with_the_factor_of_the_file(simulated):
     assert sample.counts == (20000, 40000, 60000, 80000, 100000, 120000)
 
 
-async def test_a_sample_is_newer_than_its_request(simulated):
-    cell = simulated()
-    await cell.driver.open()
-    for step in range(20):
-        cell.positions[:] = [10.0 + 0.01 * step] * 6
-        assert (await cell.driver.read()).positions == pytest.approx((10.0 + 0.01 * step,) * 6)
-
-
 async def test_the_request_is_on_the_wire(settings, wire):
     bank = DbcBank(settings(wire.settings, request="123#A0B1"))
     opening = asyncio.create_task(bank.open())

@@ -25,16 +25,6 @@ async def test_an_echo_without_an_answer_is_reported_as_silence(dialogue, gauge)
         await gauge.open()
 
 
-async def test_another_protocol_is_quoted_beside_what_was_expected(dialogue, gauge):
-    dialogue.expect(*[(b"UNI?\r", b"NOT FOUND\r\n")] * 3)
-    with pytest.raises(WrongAnswer) as caught:
-        await gauge.open()
-    assert str(caught.value) == (
-        "gauge y: answers b'NOT FOUND\\r' where protocol sylvac has answers like '+12.345\\r'. "
-        "Correct protocol or port in the cell file"
-    ).replace("'+12.345\r'", "'+12.345\\r'")
-
-
 async def test_even_parity_read_as_eight_bits_is_recognised(dialogue, gauge):
     with_parity = bytes(byte | (byte.bit_count() % 2) << 7 for byte in b"MM\r")
     dialogue.expect(*[(b"UNI?\r", with_parity)] * 3)

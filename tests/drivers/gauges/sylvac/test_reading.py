@@ -68,11 +68,6 @@ async def test_the_request_is_repeated_after_a_frame_that_does_not_match(dialogu
     assert (await opened.read()).value_mm == 1.234
 
 
-async def test_the_request_is_repeated_after_an_incomplete_frame(dialogue, opened):
-    dialogue.expect((b"?\r", b"+1.23"), (b"?\r", b"+1.234\r"), (b"?\r", b"+1.234\r"))
-    assert (await opened.read()).value_mm == 1.234
-
-
 async def test_read_once_does_not_repeat_a_garbled_answer(dialogue, opened):
     dialogue.expect((b"?\r", b"+1.2x4\r"), (b"?\r", b"+1.234\r"))
     with pytest.raises(WrongAnswer, match="gauge y"):

@@ -8,7 +8,7 @@ from functools import partial
 
 import pytest
 
-from drivers.errors import BusError, SilentNodeError
+from drivers.errors import BusError
 from drivers.interfaces import EncoderSample
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC
@@ -79,16 +79,6 @@ async def test_late_answers_are_never_mixed_with_later_samples(make_bank, driver
         else:
             assert isinstance(outcome, EncoderSample)
             assert len(set(outcome.counts)) == 1
-
-
-async def test_an_error_of_the_simulation_silences_the_bus(make_bank, driver, caplog):
-    positions = [0.0] * 6
-    bank = driver(make_bank(positions=lambda: positions).bus_settings)
-    await bank.open()
-    positions.pop()
-    with short_timeout(bank), pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 "):
-        await bank.read()
-    assert "the simulated encoders have failed" in caplog.text
 
 
 @pytest.mark.parametrize("line", [partial(PtyLine, "slcan"), SocketLine], ids=["pty", "socket"])

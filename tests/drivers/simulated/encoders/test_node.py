@@ -52,14 +52,3 @@ def test_changes_of_pdos_against_the_rules_are_refused(make_bank, listen, before
     answer = ear.sdo(1, request_)
     assert answer[:2] == "80"
     assert int.from_bytes(bytes.fromhex(answer[8:]), "little") == code
-
-
-def test_an_emergency_is_a_frame_and_a_register(make_bank, listen):
-    simulated = make_bank()
-    ear = listen(simulated)
-    simulated.faults(2)["alarm"](on=True)
-    assert ear.heard() == [(0x82, "00ff210000000000")]
-    assert ear.sdo(2, "40011000") == "4f01100021000000"
-    simulated.faults(2)["alarm"](on=False)
-    assert ear.heard() == [(0x82, "0000000000000000")]
-    assert ear.sdo(2, "40011000") == "4f01100000000000"

@@ -92,9 +92,12 @@ class FakeGauge(Fake):
         self.reads += 1
         if self.failures:
             raise self.failures.pop(0)
-        return await self.read_once()
+        return self._reading()
 
     async def read_once(self) -> GaugeReading:
+        return self._reading()
+
+    def _reading(self) -> GaugeReading:
         value = self.shown()
         if abs(value) > HALF_TRAVEL_MM:
             raise GaugeAtEnd("is at an end of its travel", subject=f"gauge {self.name}")

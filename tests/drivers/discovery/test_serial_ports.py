@@ -14,8 +14,8 @@ from drivers.errors import GaugeSilent
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.protocol import Probe
 from drivers.interfaces import DeviceIdentity, GaugeReading
-from drivers.serial import adapters
-from drivers.serial.adapters import adapter_at, serial_ports
+from drivers.serial import opening
+from drivers.serial.opening import adapter_at, serial_ports
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.discovery import SearchTimeouts, node_ids
+from drivers.discovery import SearchTimeouts, encoders
 from drivers.discovery.encoders import (
     MAX_IDENTIFIERS,
     FoundFrame,
@@ -110,7 +110,7 @@ def test_frames_of_all_nodes_are_told_only_where_there_are_none(number: int) -> 
     assert frames_of_no_node([one], [5]) == ()
 
 
-set_node_id = partial(node_ids.set_node_id, timeouts=SearchTimeouts(adapter=0.3, node=0.1))
+set_node_id = partial(encoders.set_node_id, timeouts=SearchTimeouts(adapter=0.3, node=0.1))
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import GaugeAtEnd
-from drivers.gauges.modbus import ModbusGauge
+from drivers.gauges.described import ModbusGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import instrument_class
 from drivers.simulated.gauges.described import crc

@@ -159,7 +159,7 @@ async def test_the_robot_stops_within_the_limit_for_each_guard_and_step(stage, s
     at_s, ended = await struck(scene, fault, doing)
     goes_on = step == "reload" and step not in fault.steps
     assert (scene.rig.config == config) is not goes_on
-    assert scene.rig.physics.motion_end_s <= at_s + MUST_S or (step in OUTSIDE and step not in fault.steps)
+    assert scene.rig.physics._motion.end_s <= at_s + MUST_S or (step in OUTSIDE and step not in fault.steps)
     if step == "move afterwards" and fault.guard in {Guard.GAUGE_END, Guard.PLATE}:
         assert isinstance(ended, events.RecordRejected), "a verdict on the new geometry"
         assert scene.rig.performer.guards.supervisor.latched is None
@@ -183,7 +183,7 @@ async def test_no_step_begins_without_free_disk_space(stage: Any, step: str, mon
     scene = stage(step)
     config = scene.rig.config
     doing = await come_to(scene, step)
-    orders, still_since_s = len(scene.controller.log), scene.rig.physics.motion_end_s
+    orders, still_since_s = len(scene.controller.log), scene.rig.physics._motion.end_s
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=49_900_000))
     with pytest.raises(HexacellError) as refusal:
         await doing()

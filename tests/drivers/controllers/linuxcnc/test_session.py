@@ -16,6 +16,7 @@ from drivers.wire_trace import WireTrace
 from hexacell.cell.robot import ControllerSettings
 from hexacell.errors import DeviceError, ExitCode, UsageError
 from tests.drivers.controllers.linuxcnc.conftest import said
+from tests.linuxcnc_orders import pose_of
 
 HELLO = "hello EMC hexacell 1.0"
 

@@ -30,7 +30,6 @@ from tests.drivers.controllers.linuxcnc.conftest import (
     UNITS,
     said,
 )
-from tests.linuxcnc_orders import joints_of, pose_of
 
 ALL = frozenset(StartupAction)
 RESETTING = [*IN_ESTOP, *NOT_HOMED, *said("set estop off"), *NO_ESTOP]

@@ -192,7 +192,7 @@ MANIPULATIONS: dict[str, tuple[type[Any], dict[str, Any], int, Scope, str]] = {
     ),
     "a gate": (events.Proposed, {"gates": ()}, 1, Scope.RESULTS, "gates"),
     "the verdict": (events.ResultValidated, {"verdict": Verdict.FAIL}, 1, Scope.RESULTS, "verdict"),
-    "the end": (events.Ended, {"exit_code": 1}, 1, Scope.RESULTS, "exit_code"),
+    "the end": (events.Ended, {"exit_code": 1}, 1, Scope.ALL, "exit_code"),
 }
 
 

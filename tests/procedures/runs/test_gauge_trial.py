@@ -23,6 +23,7 @@ from tests.procedures.runs.listening import at_step, happened, on, run_until, st
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 
 
+@pytest.mark.sample("x and y exchanged", "? reversed", "z in inches", "x dead")
 @pytest.mark.parametrize("mistake", MISTAKES)
 async def test_a_mistake_is_named_at_the_first_station(make_rig, mistake: str) -> None:
     rig = make_rig(stations__trial_mm=1.0)

@@ -9,13 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.conformance import served_encoder_twin, served_twin
-from drivers.encoders.cia406 import Cia406Bank
-from drivers.errors import GaugeSilent, SilentNodeError
+from drivers.conformance import served_twin
+from drivers.errors import GaugeSilent
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.wire_trace import ENTRY_BYTES, TraceEntry, TrafficDirection, WireTrace, read_trace
-from hexacell.cell.devices import GaugeSettings, LinearEncoderSettings
+from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import FileError
 
 
@@ -36,12 +35,6 @@ def test_the_latest_bytes_are_kept_and_the_rest_is_counted():
     assert trace.dropped == {"/dev/ttyUSB0": 3}
     assert trace.text().splitlines()[0] == "# 3 earlier entries of /dev/ttyUSB0 were forgotten"
     assert len(trace.text().splitlines()) == 3
-
-
-def test_no_dropped_entries_are_not_mentioned():
-    trace = WireTrace()
-    trace(entry(b"?\r"))
-    assert trace.text() == "1.500000 /dev/ttyUSB0 > 3f 0d  ?.\n"
 
 
 def test_more_than_fits_at_once_is_not_kept():
@@ -119,18 +112,3 @@ async def test_a_gauge_logs_under_its_name_and_its_bytes_at_debug(caplog: pytest
     [first, *_] = logged(caplog, "drivers.wire")
     assert first[0] == "DEBUG"
     assert first[1].endswith("> 55 4e 49 3f 0d  UNI?.")
-
-
-async def test_encoders_log_openings_and_missing_samples(caplog: pytest.LogCaptureFixture) -> None:
-    caplog.set_level(logging.INFO, "drivers")
-    settings = LinearEncoderSettings(bus={}, timeout_s=0.2, heartbeat_ms=0)
-    with served_encoder_twin(settings) as twin:
-        bank = Cia406Bank(twin.settings)
-        await bank.open()
-        twin.inject("silent", on=True)
-        with pytest.raises(SilentNodeError):
-            await bank.read()
-        await bank.close()
-    levels = [(level, text.split(":")[0]) for level, text in logged(caplog, "drivers.encoders")]
-    assert levels == [("INFO", "opened"), ("WARNING", "no sample")]
-    assert logged(caplog, "drivers.wire") == []

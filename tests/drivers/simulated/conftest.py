@@ -112,13 +112,11 @@ def bundled_cell(tmp_path: Path) -> Cell:
     return load_cell(tmp_path / source.name)
 
 
-def served(bundled_cell: Cell, settings: CellSettings, *, other_processes: bool = False) -> SimulatedCell:
+def served(bundled_cell: Cell, settings: CellSettings) -> SimulatedCell:
     """The simulated devices of these settings, with the config of the bundled cell."""
     assert settings.simulation is not None
     config = (bundled_cell.config_path,)
-    return SimulatedCell(
-        settings, settings.simulation, Hexaglide(), NATIVE, config, other_processes=other_processes
-    )
+    return SimulatedCell(settings, settings.simulation, Hexaglide(), NATIVE, config, other_processes=False)
 
 
 @pytest.fixture

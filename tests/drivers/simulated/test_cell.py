@@ -17,7 +17,6 @@ from drivers.interfaces import StartupAction
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.model import CellSettings
 from hexacell.config.toml_format import NativeToml
-from hexacell.errors import FileError
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose
 from hexacell.plugins import Group, load
@@ -29,9 +28,8 @@ ALL = frozenset(StartupAction)
 MOVE_S = 1.0
 
 
-def serve(bundled_cell: Any, settings: CellSettings | None = None, *, other_processes: bool = False) -> Any:
-    settings = settings or quick(bundled_cell.settings)
-    return served(bundled_cell, settings, other_processes=other_processes)
+def serve(bundled_cell: Any, settings: CellSettings | None = None) -> Any:
+    return served(bundled_cell, settings or quick(bundled_cell.settings))
 
 
 def quick(settings: CellSettings) -> CellSettings:
@@ -112,10 +110,3 @@ def test_closing_ends_all_threads_and_may_be_repeated(bundled_cell) -> None:
         socket.create_connection(("127.0.0.1", cell.controller.port), 0.2),
     ):
         pass
-
-
-def test_a_device_that_cannot_be_simulated_is_refused_and_nothing_stays_open(bundled_cell) -> None:
-    settings = bundled_cell.settings
-    strange = (settings.gauges[0].model_copy(update={"protocol": "telepathy"}), *settings.gauges[1:])
-    with pytest.raises(FileError, match="telepathy"):
-        serve(bundled_cell, settings.model_copy(update={"gauges": strange}))

@@ -5,17 +5,16 @@ from __future__ import annotations
 import asyncio
 import logging
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import pytest
 
 from drivers.errors import GaugeSilent
 from drivers.interfaces import DeviceIdentity
-from hexacell.cell.devices import GaugeAxis
 from hexacell.errors import DeviceError, ExitCode, SeveralErrors
 from procedures.calibration.calibration import Mode
-from procedures.devices.device_set import Devices, MountedGauge, Thermometers, gather_errors
-from procedures.devices.reconnection import DeviceReplaced, reconnect, require_known
+from procedures.devices.device_set import Thermometers, gather_errors
+from procedures.devices.reconnection import DeviceReplaced, require_known
 from procedures.journal.journal import read_journal
 from procedures.run.readings import Temperature
 from procedures.steps import events
@@ -166,26 +165,3 @@ def test_what_a_journal_of_before_does_not_tell_is_not_compared() -> None:
 
 def test_a_remark_is_not_compared() -> None:
     require_known([replace(BEFORE, remark="it reports a warning")], [BEFORE])
-
-
-class Answering:
-    """A gauge that counts how often it was opened."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.opened = 0
-
-    async def open(self) -> DeviceIdentity:
-        self.opened += 1
-        return DeviceIdentity(self.name, "mine", "from elsewhere")
-
-    async def close(self) -> None:
-        """Nothing to release."""
-
-
-async def test_a_gauge_whose_driver_has_no_better_word_for_it_is_opened_again() -> None:
-    gauges = [Answering(name) for name in "xyz"]
-    mounted = tuple(MountedGauge(cast("Any", gauge), GaugeAxis(n, 1)) for n, gauge in enumerate(gauges))
-    devices = Devices(mounted, encoders=cast("Any", None), controller=cast("Any", None))
-    assert await reconnect(devices, DeviceError("has failed", subject="gauge y"), [])
-    assert [gauge.opened for gauge in gauges] == [0, 1, 0]

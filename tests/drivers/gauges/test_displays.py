@@ -10,7 +10,10 @@ from hypothesis import strategies as st
 
 from drivers.errors import EmptyChannel, GaugeAtEnd, WrongAnswer, WrongSetting, ZeroVoid
 from drivers.gauges.cdi import CdiGauge
-from drivers.gauges.displays import DigimaticUsbGauge, HeidenhainGauge, IdHGauge, KeyenceGauge
+from drivers.gauges.digimatic_usb import DigimaticUsbGauge
+from drivers.gauges.heidenhain_nd import HeidenhainGauge
+from drivers.gauges.keyence_dl_rs1a import KeyenceGauge
+from drivers.gauges.mitutoyo_id_h import IdHGauge
 from drivers.gauges.mux10 import MultiplexerBusy, Mux10Gauge
 from drivers.gauges.protocol import FrameRejected
 from drivers.gauges.sylvac import SylvacGauge

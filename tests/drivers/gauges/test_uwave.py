@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import EmptyChannel, GaugeSilent
-from drivers.gauges.displays import UwaveGauge, channel_of
+from drivers.gauges.uwave import UwaveGauge, channel_of
 from drivers.interfaces import GaugeReading
 from drivers.serial.opening import SLICE_S
 from drivers.serial.shared_port import SharedSerialPorts

@@ -19,7 +19,7 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.state import fold
 from procedures.steps import events
 from procedures.steps.move import Move
-from procedures.steps.write_back import RollBack
+from procedures.steps.roll_back import RollBack
 from procedures.workflow import sets as path_planning
 from procedures.workflow.points import IdentificationSteps
 from tests.procedures.story import Story, an_identification, located, next_step

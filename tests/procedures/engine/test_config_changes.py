@@ -14,8 +14,9 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.state import RunState, fold
 from procedures.steps import events
 from procedures.steps.base import BaseStep
-from procedures.steps.provisional import Lend, TakeBack
-from procedures.steps.write_back import RollBack
+from procedures.steps.lend import Lend
+from procedures.steps.roll_back import RollBack
+from procedures.steps.take_back import TakeBack
 from tests.procedures.runs.listening import UNATTENDED, failing, happened, on, run_until
 
 ROLL_BACK, TAKE_BACK = RollBack(), TakeBack()

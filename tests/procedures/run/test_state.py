@@ -23,12 +23,13 @@ from procedures.run.readings import (
 )
 from procedures.run.state import RunState, apply, fold
 from procedures.steps import events
+from procedures.steps.close import CloseSet
 from procedures.steps.events import EVENTS
 from procedures.steps.move import Move
-from procedures.steps.reference import CloseSet
+from procedures.steps.pilot import Pilot
 from procedures.steps.registry import STEPS, Step
-from procedures.steps.sample import Pilot, Sample
-from procedures.steps.write_back import RollBack
+from procedures.steps.roll_back import RollBack
+from procedures.steps.sample import Sample
 from tests.procedures.story import READING, an_identification, located
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)

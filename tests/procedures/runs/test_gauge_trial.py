@@ -15,8 +15,8 @@ from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
 from procedures.run.keys import Phase, SetKey
 from procedures.steps import events
-from procedures.steps.gauges import MountingError
 from procedures.steps.move import Move
+from procedures.steps.place import MountingError
 from tests.procedures.runs.gauge_mistakes import MISTAKES, corrected, make_mistake
 from tests.procedures.runs.listening import at_step, happened, on, run_until, steps_of
 

@@ -18,13 +18,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.faults.killing import history_of
-
 from hexacell.cell.bundled import bundled_config
 from procedures.journal.journal import read_journal
 from tests.benchmarks.figures import NEVER
 from tests.benchmarks.samples import sample
 from tests.faults.cell import Site
+from tests.faults.promises import history_of
 from tests.faults.steps import step_of
 from tests.faults.test_killed import instants
 

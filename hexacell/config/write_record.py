@@ -126,12 +126,12 @@ def recorded_write(
         layout: how the geometry is read from them.
         cause: what the record says of the cause.
     """
-    before = _Version.now(paths, layout)
+    before = _version(paths, layout)
     recording = Recording()
     yield recording
     try:
-        after = _Version.now(paths, layout)
-        if after.sha256 != before.sha256:
+        after = _version(paths, layout)
+        if after[0] != before[0]:
             atomic_files.create_folder_durably(folder)
             line = _record(paths, before, after, cause).model_dump_json().encode()
             append_line(folder / RECORDS, line)
@@ -156,24 +156,19 @@ def read_records(folder: Path) -> tuple[tuple[WriteRecord, ...], tuple[int, ...]
     return tuple(records), tuple(damaged)
 
 
-@dataclass(frozen=True, slots=True)
-class _Version:
-    """A config at one moment; without a geometry where it cannot be read."""
+_Version = tuple[str, Geometry | None]
 
-    sha256: str
-    geometry: Geometry | None
 
-    @classmethod
-    def now(cls, paths: tuple[Path, ...], layout: ConfigLayout) -> _Version:
-        geometry = geometry_if_readable(paths, layout)
-        try:
-            return cls(fingerprint(*paths), geometry)
-        except FileError:
-            return cls("", geometry)
+def _version(paths: tuple[Path, ...], layout: ConfigLayout) -> _Version:
+    """The fingerprint of a config now, and its geometry; empty and None where it cannot be read."""
+    try:
+        return fingerprint(*paths), geometry_if_readable(paths, layout)
+    except FileError:
+        return "", None
 
 
 def _record(paths: tuple[Path, ...], before: _Version, after: _Version, cause: WriteCause) -> WriteRecord:
-    changes = _changes(before.geometry, after.geometry)
+    changes = _changes(before[1], after[1])
     return WriteRecord(
         at=datetime.now(UTC),
         kind=cause.kind,
@@ -182,8 +177,8 @@ def _record(paths: tuple[Path, ...], before: _Version, after: _Version, cause: W
         host=socket.gethostname(),
         run=cause.run,
         files=tuple(path.absolute() for path in paths),
-        sha256_before=before.sha256,
-        sha256_after=after.sha256,
+        sha256_before=before[0],
+        sha256_after=after[0],
         numbers_changed=None if changes is None else len(changes),
         largest=changes[0] if changes else None,
         why=cause.why,

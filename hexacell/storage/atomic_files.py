@@ -147,9 +147,8 @@ def require_creatable(path: Path) -> None:
         folder = _resolved(path).parent
         if not stat.S_ISDIR(folder.stat().st_mode):
             raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
-        descriptor, name = tempfile.mkstemp(prefix=".hexacell-", suffix=".tmp", dir=folder)
-        os.close(descriptor)
-        os.unlink(name)  # noqa: PTH108 - the name as mkstemp gives it
+        with tempfile.NamedTemporaryFile(prefix=".hexacell-", suffix=".tmp", dir=folder):
+            pass
 
 
 def sync_folder(folder: Path) -> None:

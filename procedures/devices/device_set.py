@@ -33,19 +33,17 @@ SAMPLE_PERIOD_S = 0.1
 OTHERS_PERIOD_S = 1.0
 """Encoders and controller may be guarded meanwhile, which reads them more often."""
 
-T = TypeVar("T")
-
 Result = TypeVar("Result")
 Opened = DeviceIdentity | tuple[DeviceIdentity, ...] | None
 
 _log = logging.getLogger(__name__)
 
 
-class LiveValue(Generic[T]):
+class LiveValue(Generic[Result]):
     """The latest value of one device, or the problem that it had after that."""
 
     def __init__(self, live: LiveValues) -> None:
-        self.value: T | None = None
+        self.value: Result | None = None
         self.problem = ""
         self._live = live
         self.at_s = float("-inf")
@@ -60,7 +58,7 @@ class LiveValue(Generic[T]):
         self.problem = problem
         self._live.notify()
 
-    async def of(self, read: Callable[[], Awaitable[T]]) -> T:
+    async def of(self, read: Callable[[], Awaitable[Result]]) -> Result:
         """Ask for a value and keep it, or why there is none."""
         try:
             value = await read()

@@ -73,8 +73,7 @@ class HeldOutSteps:
         if step := self.sets.at_reference(state, key):
             return step
         # The poses were chosen with a safe straight line back from each of them.
-        is_in_order = self.sets.paths.is_in_order(state, key)
-        return reference_move(state, key) if is_in_order else self._to_reference(state, key)
+        return self.way_back(state, key)
 
     def _next_orientation(self, state: RunState, key: SetKey) -> int | None:
         """The lowest one without a record that the controller does not refuse; None if there is none."""

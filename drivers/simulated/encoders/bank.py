@@ -103,7 +103,7 @@ class SimulatedEncoderBank(_CanBank):
             "reversed": encoder.set_reversed,
             "zeroed": encoder.set_zeroed,
             "frozen": setting(encoder, "is_frozen"),
-            "jumped": partial(encoder.set_shifted, round(JUMP / self._settings.step)),
+            "jumped": setting(encoder, "shift", round(JUMP / self._settings.step), 0),
         }
 
         def locked(switch: Switch, *, on: bool) -> None:

@@ -43,6 +43,7 @@ class SimulatedEncoder:
         counts: the position of its last sample.
         is_silent: it responds to no SYNC, but to everything else.
         is_frozen: it sends the position of its last sample for ever.
+        shift: so much more it counts, as after a lost revolution.
         is_doubled: it answers a SYNC twice, as where another device has the same node id.
     """
 
@@ -52,7 +53,7 @@ class SimulatedEncoder:
         self.data = data
         self.counts = 0
         self.is_silent = self.is_frozen = self.is_doubled = False
-        self._shift = 0
+        self.shift = 0
         self._has_reported_sync = False
         self._bus = bus
         self._vendor = vendor
@@ -80,10 +81,6 @@ class SimulatedEncoder:
             self._bus.subscribe(_NMT, self._on_nmt)
             self.boot()
 
-    def set_shifted(self, counts: int, *, on: bool) -> None:
-        """Count so much more, as after a lost revolution, or as before."""
-        self._shift = counts if on else 0
-
     def set_reversed(self, *, on: bool) -> None:
         """Count in the other direction, or as it should."""
         self._set(object_dictionary.OPERATING_PARAMETERS, struct.pack("<H", REVERSED * on))
@@ -91,8 +88,8 @@ class SimulatedEncoder:
     def set_zeroed(self, *, on: bool) -> None:
         """Press the preset: the present position becomes 0; what it did stays."""
         if on:
-            self._shift -= self.counts
-            self._set(object_dictionary.OFFSET, struct.pack("<i", self._shift))
+            self.shift -= self.counts
+            self._set(object_dictionary.OFFSET, struct.pack("<i", self.shift))
 
     def set_two_steps(self, *, on: bool) -> None:
         """Report two measuring steps, one a tenth of the other, or one."""
@@ -116,7 +113,7 @@ class SimulatedEncoder:
     def sample(self, counts: int) -> None:
         if not self.is_frozen:
             is_reversed = self._value(object_dictionary.OPERATING_PARAMETERS, 0) & REVERSED
-            self.counts = (-counts if is_reversed else counts) + self._shift
+            self.counts = (-counts if is_reversed else counts) + self.shift
 
     def set_alarm(self, *, on: bool) -> None:
         """Report that there is no magnet, or that it is back, and set the error register."""

@@ -108,11 +108,7 @@ class SerialGauge(ABC):
             except ZeroVoid:  # the request has switched it on; it is not zeroed yet
                 self._void = None
                 state = await self._read_state()
-            for _ in range(MORE_STATES):  # a damaged answer is no setting
-                if not self._unusable(state):
-                    break
-                state = await self._read_state()
-            self._require_usable(state)
+            state = await self._confirmed(state)
             if self.settings.resolution_mm is not None:  # its decimals tell inches from millimetres
                 with suppress(GaugeAtEnd):
                     await self._read_value()
@@ -160,12 +156,7 @@ class SerialGauge(ABC):
     async def check(self) -> None:
         """Query the settings again; a ``ZeroVoid`` if one has changed since ``open``."""
         before = self._opened_state()
-        now = await self._read_state()
-        for _ in range(MORE_STATES):  # a damaged answer is no change
-            if not (self._unusable(now) or now.changes_since(before)):
-                break
-            now = await self._read_state()
-        self._require_usable(now)
+        now = await self._confirmed(await self._read_state(), before)
         if changes := now.changes_since(before):
             raise self._voided(f"was set differently: {', '.join(changes)}")
 
@@ -270,9 +261,15 @@ class SerialGauge(ABC):
             action = "Correct protocol or port in the cell file"
         return self._error(WrongAnswer, problem, action)
 
-    def _require_usable(self, state: GaugeState) -> None:
+    async def _confirmed(self, state: GaugeState, before: GaugeState | None = None) -> GaugeState:
+        """The state, asked again while it is unusable or not as before: a damaged answer is no setting."""
+        for _ in range(MORE_STATES):
+            if not (self._unusable(state) or (before and state.changes_since(before))):
+                break
+            state = await self._read_state()
         if error := self._unusable(state):
             raise error
+        return state
 
     def _unusable(self, state: GaugeState) -> WrongSetting | None:
         """Why readings in these settings are wrong; None if they are right."""

@@ -138,11 +138,9 @@ class NumberKeys:
         every = parameters.parameters
         keys = {one.name: default(one) for one in every} | _keys_by(options.names, every)
         branch = None if is_part and options.branch is None else _branch_of(parameters, options)
-        found = cls(keys, _keys_by(options.corrections, every), branch)
-        found._require_different()
-        return found
+        return cls(keys, _keys_by(options.corrections, every), branch)
 
-    def _require_different(self) -> None:
+    def __post_init__(self) -> None:
         named = [one for one in self.branch or () if isinstance(one, str)]
         every = [*self.values.values(), *self.corrections.values(), *named]
         if twice := next((one for one in every if every.count(one) > 1), None):

@@ -132,8 +132,8 @@ def _replace(receipt: Receipt, replacement: Replacement) -> None:
     try:
         replacement.write()
     except BaseException as error:
-        # Undo only if a new text is in place; otherwise nothing was replaced.
-        if replacement.has_begun:
+        # Undo only if a new text is in place, or may be; otherwise nothing was replaced.
+        if any(one.present in {one.new, None} for one in replacement.changed):
             _undo(receipt, replacement, error, all_of_them=False)
         with suppress(FileError):
             replacement.forget()
@@ -232,11 +232,6 @@ class Replacement:
         for one in self.changed:
             require_written(one.path, one.new)
         self.forget()
-
-    @property
-    def has_begun(self) -> bool:
-        """Whether a file has its new content, or may have it."""
-        return any(one.present in {one.new, None} for one in self.changed)
 
     def restore(self, *, all_of_them: bool, keep: Callable[[bytes], None] = lambda _: None) -> None:
         """Give the files their old content again and remove the note.

@@ -106,12 +106,8 @@ class Archive:
             ARCHIVE_TABLE.c.place == self._place, ARCHIVE_TABLE.c.kind == kind.value
         )
 
-        def read(connection: Connection) -> dict[str, StampedDocument]:
-            return {
-                run: StampedDocument(stamp, content) for run, stamp, content in connection.execute(query)
-            }
-
-        return self._transact(read)
+        rows = self._transact(lambda connection: connection.execute(query).all())
+        return {run: StampedDocument(stamp, content) for run, stamp, content in rows}
 
     def store(self, kind: DocumentKind, documents: Mapping[str, StampedDocument]) -> None:
         """Keep documents, in the place of older ones.
@@ -130,11 +126,8 @@ class Archive:
         fresh = {name: insert.excluded[name] for name in ("cell", "stamp", "content")}
         upsert = insert.on_conflict_do_update(index_elements=["place", "run", "kind"], set_=fresh)
 
-        def write(connection: Connection) -> None:
-            connection.execute(upsert, rows)
-
         if rows:
-            self._transact(write)
+            self._transact(lambda connection: connection.execute(upsert, rows))
 
     def forget(self, runs: Sequence[str]) -> None:
         """Drop everything about runs that are gone.

@@ -65,7 +65,9 @@ def _lock_of_file(config: Path) -> Iterator[None]:
     descriptor = _open(lock_path(config))
     try:
         _acquire(descriptor, config)
-        _note(descriptor, _this_process())
+        since = datetime.now(UTC).astimezone().isoformat(timespec="seconds")  # local time
+        holder = {"pid": os.getpid(), "user": user_name(), "host": socket.gethostname(), "since": since}
+        _note(descriptor, json.dumps(holder) + "\n")
         _log.info("this process holds the cell of %s", config)
         try:
             yield
@@ -150,13 +152,6 @@ def _note(descriptor: int, text: str) -> None:
     with suppress(OSError):
         os.pwrite(descriptor, data, 0)
         os.ftruncate(descriptor, len(data))
-
-
-def _this_process() -> str:
-    """The note of this process as the holder from now on; ``since`` is local time, ISO 8601."""
-    since = datetime.now(UTC).astimezone().isoformat(timespec="seconds")
-    holder = {"pid": os.getpid(), "user": user_name(), "host": socket.gethostname(), "since": since}
-    return json.dumps(holder) + "\n"
 
 
 def _holder(descriptor: int) -> str:

@@ -15,13 +15,10 @@ from hexacell.cell.loader import load_cell
 from hexacell.config.interface import ControllerGeometry
 from hexacell.config.toml_format import NativeToml
 from hexacell.errors import FileError
-from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Tolerances
 from hexacell.kinematics.mechanism import FrameTransform, inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.measurements.records import MeasurementSet
-from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import make_robot, robot_of
 
 CELL = Path(__file__).parents[2] / "configs" / "simulated-hexaglide.toml"
@@ -153,28 +150,6 @@ def test_a_geometry_returns_to_the_configs_frames(on_floor, hexaglide, paper):
     )
     same = on_floor.for_controller(hexaglide.normalize_frames(on_floor.controller)[0])
     np.testing.assert_allclose(same.vector, on_floor.controller.vector, atol=1e-9)
-
-
-def test_records_of_before_a_write_back_give_the_same_geometry_after_it(cell, on_floor, paper, visit):
-    """The controller has other frames by then; what was commanded with the taught config keeps its own."""
-    exact = visit(seed=2).measured(0.01, 1)
-    commands, deviations = TO_FLOOR.poses(exact.poses), TO_FLOOR.deviations(exact.deviations)
-    told = MeasurementSet(
-        tuple(
-            replace(r, pose=commands.pose(row), deviation=tuple(deviations[row].tolist()))
-            for row, r in enumerate(exact.records)
-        )
-    )
-    on_floor = replace(on_floor, taught=on_floor.controller)
-    found = identify(on_floor.problem(told))
-    written = as_written(cell.settings, on_floor, found.geometry).geometry
-    assert written.largest_difference(on_floor.for_controller(found.geometry)) > 1.0
-    later = make_robot(
-        cell.settings, ControllerGeometry(written, paper.branch), taught=on_floor.controller
-    ).problem(told)
-    np.testing.assert_allclose(later.commands.joints, on_floor.problem(told).commands.joints, atol=1e-6)
-    again = identify(later)
-    np.testing.assert_allclose(again.geometry.vector, found.geometry.vector, atol=1e-6)
 
 
 def test_the_belief_before_measuring_is_the_drawing_with_its_tolerances(robot, on_floor, paper):

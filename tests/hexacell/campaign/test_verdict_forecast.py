@@ -22,7 +22,7 @@ from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.forward import continue_solution
 from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.verdict.decision import ErrorLimits, Verdict, decide, worst_verdict
+from hexacell.verdict.decision import ErrorLimits, Verdict
 
 MACHINES = 60
 SCALE_UM_M = 60.0
@@ -112,22 +112,6 @@ def test_what_will_be_stated_is_as_large_as_in_simulated_verifications(cell, sim
         error = np.std(expected) / np.sqrt(MACHINES)
         assert np.mean(seen) == pytest.approx(np.mean(expected), abs=4.0 * error + 0.05 * np.mean(expected))
         assert np.std(seen) == pytest.approx(np.std(expected), rel=0.4)
-
-
-@pytest.mark.slow
-def test_as_many_simulated_machines_get_each_verdict_as_forecast(cell, simulated, forecast) -> None:
-    middle = float(np.median([one.position.value + one.position.expanded for one in simulated]))
-    limits = ErrorLimits(middle, 1.0)
-    stated = stated_errors(cell.found, cell.updated, cell.first, cell.second)
-    told = forecast_verdicts(stated, cell.second, limits).probabilities
-    seen = [
-        worst_verdict([decide(one.position, middle), decide(one.orientation, 1.0)]) for one in simulated
-    ]
-    assert 0.3 < told[Verdict.PASS] < 0.7
-    for verdict in Verdict:
-        share = told[verdict]
-        spread = np.sqrt(max(share * (1.0 - share), 0.01) / MACHINES)
-        assert seen.count(verdict) / MACHINES == pytest.approx(share, abs=4.0 * spread)
 
 
 def test_95_percent_pass_the_limits_that_are_proposed(cell, forecast) -> None:

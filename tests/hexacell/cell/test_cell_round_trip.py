@@ -2,110 +2,46 @@
 
 from __future__ import annotations
 
-from typing import Any, get_args
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hexacell.cell import devices, limits, measuring, model, simulation
-from hexacell.cell import robot as controller
-from hexacell.cell.by_mechanism import cell_model
+from hexacell.cell import model
 from hexacell.cell.loader import describe, dump, schema
-from hexacell.cell.robot import DEFAULT_MECHANISM
+from tests.small_cell import changed
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
-numbers = st.floats(-1e6, 1e6)
-positive = st.floats(1e-9, 1e6)
 texts = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=12)
 printable = st.text(st.characters(categories=["L", "N", "P", "S"]), min_size=1, max_size=12)
-points = st.tuples(numbers, numbers, numbers)
-six = st.tuples(*[numbers] * 6)
-cones = st.floats(1e-9, 180) | st.tuples(*[st.floats(1e-9, 180)] * 6)
-signs = st.sampled_from([1, -1])
-scalars = st.one_of(st.booleans(), st.integers(), finite, texts)
+scalars = st.one_of(st.booleans(), st.integers(), st.floats(allow_nan=False, allow_infinity=False), texts)
 anything = st.recursive(
     scalars, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(texts, inner, max_size=3)
 )
-tables = st.dictionaries(texts, anything, max_size=3)
-MODEL = cell_model("hexaglide")
-ROBOT: Any = MODEL.model_fields["robot"].annotation
-SIMULATION: Any = get_args(MODEL.model_fields["simulation"].annotation)[0]
-geometries = st.builds(
-    ROBOT.model_fields["nominal"].annotation,
-    S=st.tuples(*[points] * 6),
-    B=st.tuples(*[points] * 6),
-    l=st.tuples(*[positive] * 6),
+numbers = st.floats(-1e6, 1e6)
+six = st.tuples(*[numbers] * 6)
+changes = st.fixed_dictionaries(
+    {
+        "name": st.text(st.characters(categories=["L", "Nd"]), min_size=1, max_size=12),
+        "robot.nominal.S": st.tuples(*[st.tuples(numbers, numbers, numbers)] * 6),
+        "robot.nominal.l": st.tuples(*[st.floats(1e-9, 1e6)] * 6),
+        "controller.config": printable,
+        "controller.port": st.none() | st.integers(1, 65535),
+        "controller.reload_command": st.lists(printable, max_size=3).map(tuple),
+        "encoders.bus": st.none() | st.dictionaries(texts, anything, max_size=3),
+        "encoders.direction": st.tuples(*[st.sampled_from([1, -1])] * 6),
+        "encoders.offset": six,
+        "encoders.serial_numbers": st.none() | st.tuples(*[st.integers(0, 2**32 - 1)] * 6),
+        "limits.tilt_deg": st.floats(1e-9, 80),
+        "limits.passive_joints.base_cone_deg": st.floats(1e-9, 180)
+        | st.tuples(*[st.floats(1e-9, 180)] * 6),
+        "task.poses": st.lists(six, max_size=2).map(tuple),
+        "task.work_frame": st.sampled_from(["", "z", "xyz"]),
+    }
 )
 
 
-def _gauges(axes: tuple[str, ...]) -> st.SearchStrategy[tuple[Any, ...]]:
-    return st.tuples(
-        *(
-            st.builds(
-                devices.GaugeSettings,
-                name=st.just(f"gauge {axis}"),
-                axis=st.just(axis),
-                sign=signs,
-                protocol=printable,
-                port=st.just(f"/dev/{axis}") if place else st.none() | st.just("loop://"),
-                serial=tables,
-                channel=st.integers(1, 99),
-                timeout_s=positive,
-            )
-            for place, axis in enumerate(axes)
-        )
-    )
-
-
-cells = st.builds(
-    MODEL,
-    name=st.text(st.characters(categories=["L", "Nd"]), min_size=1, max_size=12),
-    robot=st.builds(ROBOT, mechanism=st.just(DEFAULT_MECHANISM), nominal=geometries),
-    controller=st.builds(
-        controller.ControllerSettings,
-        config=printable,
-        port=st.none() | st.integers(1, 65535),
-        reload_command=st.lists(printable, max_size=3).map(tuple),
-    ),
-    gauges=st.permutations("xyz").flatmap(lambda axes: _gauges(tuple(axes))),
-    encoders=st.builds(
-        devices.LinearEncoderSettings,
-        bus=st.none() | tables,
-        nodes=st.permutations(range(1, 128)).map(lambda ids: tuple(ids[:6])),
-        signed=st.booleans(),
-        direction=st.tuples(*[signs] * 6),
-        offset_mm=six,
-        serial_numbers=st.none() | st.tuples(*[st.integers(0, 2**32 - 1)] * 6),
-    ),
-    limits=st.builds(
-        limits.LimitSettings,
-        tilt_deg=st.floats(1e-9, 80),
-        passive_joints=st.builds(limits.PassiveJointSettings, base_cone_deg=cones, platform_cone_deg=cones),
-    ),
-    identification=st.builds(
-        measuring.IdentificationSettings,
-        points=st.lists(points, min_size=2, max_size=4).map(tuple),
-        orientations=st.integers(2, 1000),
-    ),
-    verification=st.builds(
-        measuring.VerificationSettings, points=st.lists(points, min_size=1, max_size=2).map(tuple)
-    ),
-    task=st.builds(
-        measuring.TaskSettings,
-        poses=st.lists(six, max_size=2).map(tuple),
-        work_frame=st.sampled_from(["", "z", "xyz"]),
-    ),
-    simulation=st.builds(
-        SIMULATION,
-        geometry=geometries,
-        gauges=st.builds(simulation.SimulatedGauges, baudrate=st.none() | st.integers(300, 10**6)),
-    ),
-)
-
-
-@settings(max_examples=20)
-@given(stated=cells)
-def test_settings_dumped_and_described_load_as_the_same(load_text, stated):
+@settings(max_examples=30)
+@given(changes=changes)
+def test_settings_dumped_and_described_load_as_the_same(load_text, cell_text, changes):
+    stated = changed(load_text(cell_text).settings, changes)
     cell = load_text(dump(stated))
     assert cell.settings == stated
     assert load_text(describe(cell)).settings == stated

@@ -244,16 +244,6 @@ def test_what_a_measured_scale_does_at_the_task_is_known(laboratory, paper, name
     assert after.errors_of(nothing).estimated[:, :3] == pytest.approx(true[:, :3], abs=0.01)
 
 
-def test_a_length_check_takes_the_stated_scale_out_of_u(laboratory, exact, paper) -> None:
-    before, after, _ = measured_budget(laboratory, exact, ideal(paper), seats(), EFFECTS)
-    assert after.expanded_mm < 0.8 * before.expanded_mm
-    (stated, left) = (budget.lines[0] for budget in (before, after))
-    assert (stated.effect.size, left.effect.source) == (1000.0, "length check")
-    assert left.effect.size < 50.0
-    assert left.is_visible
-    assert left.effect.name not in {line.effect.name for line in after.unseen}
-
-
 def test_what_the_check_shares_with_the_estimate_is_not_counted_as_independent(
     laboratory, exact, paper
 ) -> None:

@@ -34,29 +34,21 @@ class Noon(datetime):
         return datetime(2026, 11, 20, 12, 0, 0, tzinfo=UTC).astimezone(tz)
 
 
-def test_naming_a_run_makes_nothing(cell: Cell) -> None:
-    new_run(cell)
-    assert not runs_folder(cell).exists()
-
-
 def test_runs_of_the_same_second_get_folders_of_their_own(cell: Cell, monkeypatch) -> None:
     monkeypatch.setattr(run_folder, "datetime", Noon)
     names = []
     for _ in range(3):
         run = new_run(cell)
+        assert not run.path.exists(), "a name makes nothing"
         run.create(cell)
         names.append(run.path.name)
     assert names == ["2026-11-20T120000Z", "2026-11-20T120000Z-2", "2026-11-20T120000Z-3"]
     assert sorted(names) == names
 
 
-def test_a_run_keeps_the_cell_file_as_it_was(cell: Cell, folder: RunFolder) -> None:
-    folder.create(cell)
-    assert (folder.path / "cell.toml").read_bytes() == cell.text.encode()
-
-
 def test_a_folder_that_holds_a_run_takes_no_other(cell: Cell, folder: RunFolder) -> None:
     folder.create(cell)
+    assert (folder.path / "cell.toml").read_bytes() == cell.text.encode()
     folder.journal.write_text("something happened\n")
     (folder.path / "cell.toml").write_text("as it was")
     with pytest.raises(UsageError, match=r"holds a run already.*Resume") as refusal:

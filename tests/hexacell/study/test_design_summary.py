@@ -13,8 +13,6 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.study import design_study as design_trials
 from hexacell.study.design_records import ChosenRecords, OrientationChoice, chosen_records
 from hexacell.study.design_study import (
-    SWEEPS,
-    SWEPT,
     DesignOutcome,
     DesignTrial,
     RecordsAccuracy,
@@ -50,13 +48,6 @@ def test_each_figure_is_of_its_own_trials() -> None:
     assert found.noise_ratio == pytest.approx(
         {"best fixed": 2.0, "sifted random": 3.0, "random": 4.0, "paper": 5.0}
     )
-
-
-def test_sweeps_have_fewer_robots_and_none_is_calibrated_twice() -> None:
-    trials = design_trials_of(SWEPT + 5)
-    values = sum(len(values) for _, values in SWEEPS.values())
-    assert len(trials) == len(OrientationChoice) * (SWEPT + 5) + SWEPT * (values - len(SWEEPS))
-    assert {one.key for one in trials.values()} == set(trials)
 
 
 def test_robots_that_are_not_identified_are_counted() -> None:

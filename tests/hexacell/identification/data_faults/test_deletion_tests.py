@@ -35,7 +35,7 @@ def waves(seed, amplitude_mm):
     return lambda joints: amplitude_mm * np.sin(joints / 60.0 + phases)
 
 
-IMPERFECT = [waves(2, 0.03), waves(5, 0.03), waves(5, 0.1)]
+IMPERFECT = [waves(2, 0.03), waves(5, 0.1)]
 
 
 @pytest.mark.parametrize("error", IMPERFECT)
@@ -54,25 +54,14 @@ def test_a_large_gross_error_in_an_imperfect_machine_is_named(noisy, make_proble
     assert fault.left_out == ((4, 4),)
 
 
-@pytest.mark.parametrize(
-    "error", [IMPERFECT[0], *(pytest.param(one, marks=pytest.mark.slow) for one in IMPERFECT[1:])]
-)
-def test_gauges_reversed_in_an_imperfect_machine_are_named(noisy, make_problem, error):
-    wrong = altered(with_encoders(noisy, error), lambda r: {"deviation": np.negative(r.deviation)})
+def test_gauges_reversed_in_an_imperfect_machine_are_named(noisy, make_problem):
+    wrong = altered(with_encoders(noisy, IMPERFECT[0]), lambda r: {"deviation": np.negative(r.deviation)})
     with pytest.raises(GaugeFaultError) as raised:
         identify(make_problem(wrong))
     assert raised.value.fault.kind is DataFaultKind.REVERSED
 
 
-@pytest.mark.parametrize(
-    ("records", "named"),
-    [
-        pytest.param(7, False, marks=pytest.mark.slow),
-        (8, False),
-        pytest.param(9, False, marks=pytest.mark.slow),
-        (10, True),
-    ],
-)
+@pytest.mark.parametrize(("records", "named"), [(8, False), (10, True)])
 def test_a_slip_is_named_only_with_equations_to_spare(visit, make_problem, records, named):
     """Split at the slip, 2 x 10 records give 51 equations for 35 parameters; 2 x 9 only 45."""
     few = visit(points=2, orientations=records, seed=81).measured(0.01, seed=81)

@@ -7,8 +7,6 @@ import pytest
 
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise, Tolerances
-from hexacell.identification.solver import fit as levenberg_marquardt
-from hexacell.identification.solver.result import Termination
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.study import reference_solvers
@@ -40,20 +38,6 @@ def test_the_papers_solvers_find_the_same_geometry(visit, make_problem):
     ours = identify(problem).geometry
     assert reference_solvers.gauss_newton(problem).largest_difference(ours) < EXACT_MM
     assert least_squares_without_jacobian(problem).largest_difference(ours) < EXACT_MM
-
-
-def test_some_of_these_data_need_the_solver_around_singularities(visit, make_problem):
-    """Without the detour the search stops where a record comes next to one; with it, it never does."""
-    ends = []
-    for seed in SEEDS:
-        problem = make_problem(visit(seed=seed).measured())
-        start = {"free": problem.prior.free, "poses": problem.start}
-        ends.append(levenberg_marquardt.solve(problem, problem.prior.precision, **start))
-    blocked = [end for end in ends if end.termination is Termination.SINGULAR]
-    assert blocked
-    assert len(blocked) < len(ends)
-    for end in blocked:
-        assert 0 < end.singular.sum() < 5
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -9,7 +9,6 @@ from scipy.stats import chi2
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
-from hexacell.study import reference_solvers
 
 
 @pytest.fixture(scope="session")
@@ -55,18 +54,6 @@ def test_a_wrongly_stated_noise_fails_the_chi_square_test_and_rejects_no_record(
     assert found.data_faults == ()
     assert within(found.chi2 * factor**2, found.dof)
     assert not within(found.chi2, found.dof)
-
-
-def test_weights_do_better_than_the_papers_ordinary_least_squares(visit, make_problem, truth):
-    """On the same data; method.md measured a factor of two."""
-    exact = visit(seed=2)
-    weighted, ordinary = [], []
-    for seed in range(5):
-        problem = make_problem(exact.measured(0.01, seed))
-        plain = problem.mechanism.convention.free_parameters(reference_solvers.gauss_newton(problem))
-        ordinary.append(np.abs(plain - truth).max())
-        weighted.append(np.abs(identify(problem).free - truth).max())
-    assert np.mean(weighted) < 0.7 * np.mean(ordinary)
 
 
 def test_the_full_covariance_follows_from_the_free_one(identified, hexaglide):

@@ -39,9 +39,6 @@ class DaskProcesses:
         alone = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(self._folder))
         self.workers.append(self._start("worker", self.address, *alone, **settings))
 
-    def said_by_worker(self, number: int) -> str:
-        return (self._folder / f"worker-{number}").read_text()
-
     def end(self) -> None:
         for process in (self.scheduler, *self.workers):
             process.kill()

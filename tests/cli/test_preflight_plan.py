@@ -62,7 +62,7 @@ WIDE = (
 """Limits that any robot of the cell passes."""
 
 
-@pytest.mark.usefixtures("one_robot")
+@pytest.mark.usefixtures("few_candidates", "one_robot")
 def test_limits_that_a_good_machine_fails_are_warned_of(typed_here: Any, cell_folder: Any) -> None:
     cell_folder.edit(
         ("orientations = 11", "orientations = 7"),
@@ -76,7 +76,7 @@ def test_limits_that_a_good_machine_fails_are_warned_of(typed_here: Any, cell_fo
     assert "is the load at work (" in said
 
 
-@pytest.mark.usefixtures("one_robot")
+@pytest.mark.usefixtures("few_candidates", "one_robot")
 def test_the_predicted_accuracy_is_printed_before_any_motion(typed_here: Any, cell_folder: Any) -> None:
     cell_folder.edit(("orientations = 11", "orientations = 7"), *WIDE)
     before = cell_folder.snapshot()

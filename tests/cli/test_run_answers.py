@@ -12,6 +12,7 @@ from procedures.steps import events
 from tests.cli.cell_folder import ASK, BY_HAND
 from tests.cli.terminal import ended, start_at
 
+PLACED = "Press Enter when they are in place, or type a to abort: "
 FAST = (("clock_factor = 150.0", "clock_factor = 600.0"), ("give_up_s = 60.0", "give_up_s = 6000.0"))
 
 
@@ -100,37 +101,26 @@ class TestAPersonAtTheTerminal:
         assert "left without an answer" in terminal.shown
         assert cell.controller.read_bytes() == (demo.run / "config-before").read_bytes()
 
-    def test_moves_the_gauges_from_point_to_point(self, quick_cell, start, terminal):
-        quick_cell.edit(BY_HAND)
-        process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
-        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
-        terminal.type("\n\n")  # an Enter too many must not answer the next question
-        second = terminal.read_until("Press Enter when they are in place, or type a to abort: ")
-        assert "Point 2: the robot is at X0.000 Y-200.000 Z550.000" in second
-        [run] = quick_cell.runs()
-        placed = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.GaugesPlaced)]
-        assert len(placed) == 1
-        terminal.type("yes\n")  # no answer, and no letter known
-        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
-        terminal.type("\n")
-        assert ended(process, terminal) == 1
-        assert process.out.count("Letters, each with Enter") == 2, "at the beginning, and at the question"
-        assert ": fail" in process.out
-        assert "/45" in terminal.shown  # the bar
-        assert re.search(r"point 1  +\d+ records", process.out), "not swallowed by the bar's terminal"
-
-    def test_is_asked_how_to_go_on_after_a_fault(self, quick_cell, start, terminal):
+    def test_places_gauges_and_is_asked_how_to_go_on_after_a_fault(self, quick_cell, start, terminal):
         quick_cell.edit(BY_HAND, ("[acceptance]", "[acceptance]\ndrift_mm = 0.00001"))
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
-        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
-        terminal.type("\n")
+        first = terminal.read_until(PLACED)
+        assert "Point 1: the robot is at X0.000 Y0.000 Z550.000" in first
+        terminal.type("\n\n")  # an Enter too many must not answer the next question
         terminal.read_until("How to continue (retry, measure-again, redo-set, abort)? ")
         terminal.type("re\n")
         terminal.read_until("Type one of retry, measure-again, redo-set, abort: ")
         terminal.type("redo\n")
-        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
+        terminal.read_until(PLACED)
+        [run] = quick_cell.runs()
+        placed = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.GaugesPlaced)]
+        assert len(placed) == 1
+        terminal.type("yes\n")  # no answer, and no letter known
+        terminal.read_until(PLACED)
         terminal.type("\n")
         terminal.read_until("How to continue (retry, measure-again, redo-set, abort)? ")
         terminal.type("abort\n")
         assert ended(process, terminal) in {1, 3}
+        assert process.out.count("Letters, each with Enter") == 3, "at first, and where nothing is answered"
         assert "measured again" in process.out
+        assert "/45" in terminal.shown  # the bar

@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.cell.recovery import UnattendedRecovery
 from hexacell.cell.simulation import FaultKind, SimulatedFault
-from hexacell.errors import ExitCode, HexacellError
+from hexacell.errors import ExitCode
 from hexacell.services.run.calibration_run import preflight
 from procedures.calibration.calibration import Mode
 from procedures.run.trips import Guard, GuardTripped
@@ -96,9 +96,3 @@ async def test_preflight_fails_while_the_stop_file_exists(make_cell) -> None:
         await preflight(cell, Mode.OPTIMISE, unattended=True)
     (cell.path.parent / "stop").unlink()
     await preflight(cell, Mode.OPTIMISE, unattended=True)
-
-
-async def test_preflight_fails_without_free_disk_space(make_cell) -> None:
-    cell = make_cell(guards__free_disk_mb=1e12)
-    with pytest.raises(HexacellError, match=r"MB are free where the run is kept, less than 1e\+12 MB"):
-        await preflight(cell, Mode.OPTIMISE, unattended=True)

@@ -148,6 +148,7 @@ async def test_encoders_that_the_controller_reads_need_not_be_homed_before_a_run
     assert located.joints == pytest.approx(located.encoders, abs=0.1)
 
 
+@pytest.mark.slow
 async def test_zeros_that_the_controller_does_not_run_are_not_calibrated_with(make_site) -> None:
     """No report contradicts another before they are written; then the held-out records do."""
     zeros = {"controller.joints_include_zeros": True}

@@ -7,12 +7,7 @@ import pytest
 from hexacell.cell.operation import Occasion
 from hexacell.services.notify.delivery import deliver
 from hexacell.services.notify.notice import Notice, NoticeUndelivered
-from tests.hexacell.services.notify.local_servers import (
-    broker,
-    closed_port,
-    make_certificate,
-    silent_server,
-)
+from tests.hexacell.services.notify.local_servers import broker, make_certificate
 from tests.hexacell.services.notify.notices import a_notice, an_address
 
 LOGIN = ("robot", "hidden-password")
@@ -59,10 +54,3 @@ def test_a_wrong_password_is_told_and_not_shown() -> None:
 def test_what_is_not_acknowledged_is_not_told() -> None:
     with broker(acknowledges=False) as server, pytest.raises(NoticeUndelivered, match=r"acknowledge|taken"):
         deliver(at(server.port), a_notice(), longest_s=0.5)
-
-
-def test_where_nobody_listens_or_answers() -> None:
-    with pytest.raises(NoticeUndelivered, match="refused"):
-        deliver(at(closed_port()), a_notice())
-    with silent_server() as port, pytest.raises(NoticeUndelivered, match=r"not (answer|taken)"):
-        deliver(at(port), a_notice(), longest_s=0.2)

@@ -52,7 +52,7 @@ def test_a_difference_of_an_angle_counts_in_mrad(robot: Robot) -> None:
 
 def test_robots_within_their_tolerances_are_not_refused(robot: Robot) -> None:
     random = np.random.default_rng(8)
-    for _ in range(8):
+    for _ in range(4):
         built = random_robot(robot.mechanism, robot.drawing, robot.tolerances, random)
         assert robot.tolerance_violations(identified(robot, built).estimate) == ()
 

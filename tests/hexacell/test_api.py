@@ -52,7 +52,7 @@ main(sys.argv[3:])
 """
 
 
-@pytest.mark.sample("api", "fit by the api")
+@pytest.mark.sample("api")
 @pytest.mark.parametrize(
     ("program", "command", "not_loaded"),
     [

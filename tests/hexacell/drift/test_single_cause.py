@@ -20,9 +20,9 @@ def outcome(seed: int, change: np.ndarray | None = None, records: int = 9) -> Si
 
 
 def test_scores_are_standard_normal() -> None:
-    scores = np.array([outcome(seed).scores for seed in range(200)])
-    assert np.abs(scores.mean(axis=0)).max() < 0.2
-    assert np.abs(scores.std(axis=0) - 1.0).max() < 0.15
+    scores = np.array([outcome(seed).scores for seed in range(100)])
+    assert np.abs(scores.mean(axis=0)).max() < 0.3
+    assert np.abs(scores.std(axis=0) - 1.0).max() < 0.22
 
 
 def test_a_change_is_estimated_with_its_sigma() -> None:

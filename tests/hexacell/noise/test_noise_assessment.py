@@ -145,7 +145,7 @@ def test_the_measured_noise_is_rarely_below_the_true_one(plan) -> None:
     """It is an upper limit with 95 % confidence."""
     allowed = allowing(plan, figures="measured")
     found = [
-        records_of(assess_noise(allowed, readings(plan, stops=0.004, seed=seed)))[4] for seed in range(60)
+        records_of(assess_noise(allowed, readings(plan, stops=0.004, seed=seed)))[4] for seed in range(40)
     ]
     assert np.mean(np.array(found) >= 0.004) >= 0.88
     assert np.median(found) < 0.007

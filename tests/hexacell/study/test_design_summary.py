@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from math import isnan
-from typing import Any
 
 import pytest
 
-from hexacell.measurements.records import MeasurementSet
-from hexacell.study import design_study as design_trials
-from hexacell.study.design_records import ChosenRecords, OrientationChoice, chosen_records
+from hexacell.study.design_records import OrientationChoice
 from hexacell.study.design_study import (
     DesignOutcome,
     DesignTrial,
     RecordsAccuracy,
     design_summary,
     design_trials_of,
-    run_design_trial,
 )
 from hexacell.text.studies import design_document, design_lines
 
@@ -65,15 +60,3 @@ def test_robots_that_are_not_identified_are_counted() -> None:
     text = "\n".join(design_lines(found))
     assert "none of 2 robots" in text
     assert json.dumps(design_document(found), allow_nan=False)
-
-
-def test_a_robot_that_is_measured_at_one_point_only_is_not_identified(monkeypatch) -> None:
-    def at_one_point(*arguments: Any) -> ChosenRecords:
-        chosen = chosen_records(*arguments)
-        some = MeasurementSet(chosen.measurements.records[:2])
-        return replace(chosen, measurements=some)
-
-    monkeypatch.setattr(design_trials, "chosen_records", at_one_point)
-    found = run_design_trial(DesignTrial(0, OrientationChoice.RANDOM, points=2))
-    assert found.last is None
-    assert "no second point" in found.reason

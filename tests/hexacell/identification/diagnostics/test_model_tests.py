@@ -15,7 +15,7 @@ from hexacell.measurements.records import MeasurementSet
 from tests.hexacell.altered_records import later
 
 NOISE_MM = 0.01
-REPETITIONS = 24
+REPETITIONS = 16
 
 
 @pytest.fixture(scope="module")

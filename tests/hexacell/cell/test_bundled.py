@@ -20,11 +20,6 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("name", ["simulated-hexaglide", "paper-experiment"])
-def test_the_promised_configs_are_there(name: str) -> None:
-    assert bundled.bundled_config(name).is_file()
-
-
 @pytest.mark.parametrize("name", ["simulated-hexaglide", "simulated-hexaglide.toml"])
 def test_a_config_by_name(installed: Path, name: str) -> None:
     assert bundled.bundled_config(name) == installed / "simulated-hexaglide.toml"

@@ -33,17 +33,9 @@ def test_arrays_are_read_only_copies():
         geometry.vector[0] = 5.0
 
 
-@pytest.mark.parametrize(
-    ("S", "B", "l", "name"),
-    [
-        (np.zeros((3, 6)), np.zeros((6, 3)), np.ones(6), "S"),
-        (np.zeros((6, 3)), np.zeros((5, 3)), np.ones(6), "B"),
-        (np.zeros((6, 3)), np.zeros((6, 3)), np.ones((6, 1)), "l"),
-    ],
-)
-def test_a_wrong_shape_is_refused_by_name(S, B, l, name):  # noqa: E741
-    with pytest.raises(ValueError, match=f"^{name} has the shape"):
-        hexaglide_geometry(S, B, l)
+def test_a_wrong_shape_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"^B has the shape"):
+        hexaglide_geometry(np.zeros((6, 3)), np.zeros((5, 3)), np.ones(6))
 
 
 def test_differences_and_the_way_between_two_geometries(paper):

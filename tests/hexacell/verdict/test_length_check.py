@@ -140,11 +140,3 @@ def test_the_sources_add_up_to_u(verified) -> None:
     length = length_of(verified()[0])
     squares = sum(source.um_m**2 for source in length.sources)
     assert length.expanded_um_m == pytest.approx(2.0 * np.sqrt(squares))
-    assert {source.name for source in length.sources} >= {
-        "certificate",
-        "temperature of the fixture",
-        "angle between the seats",
-        "seating of the gauges",
-        "noise of the readings",
-        "covariance of the geometry",
-    }

@@ -13,22 +13,19 @@ from hexacell.errors import ExitCode, ReachError
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from tests.geometries import hexaglide_geometry
+from tests.hexacell.kinematics.numeric import POSES
 
-degrees = st.floats(-30.0, 30.0)
-poses = st.builds(
-    Pose, st.floats(-100, 100), st.floats(-200, 100), st.floats(450, 600), degrees, degrees, degrees
-)
 BRANCHES = list(product((-1, 1), repeat=6))
 
 
-@given(poses)
+@given(POSES)
 def test_inverse_is_the_closed_form(hexaglide, paper, legs, vector_of, pose):
     expected = legs(paper.actual).joints(vector_of(pose))
     found = hexaglide.inverse(paper.actual, paper.branch, PoseBatch.of([pose]))[0]
     np.testing.assert_allclose(found, expected, atol=1e-9)  # NaN where NaN is expected
 
 
-@given(poses, st.sampled_from(BRANCHES))
+@given(POSES, st.sampled_from(BRANCHES))
 def test_every_branch_closes_the_legs_and_is_recognised(hexaglide, paper, pose, branch):
     at = PoseBatch.of([pose])
     joints = hexaglide.inverse(paper.nominal, branch, at)

@@ -13,11 +13,13 @@ from hexacell.campaign.decisions import CampaignState, Decision, Finished, Finis
 from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
+from hexacell.checks.check import Check, identified_before
 from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import Robot, config_layout, make_robot
 from hexacell.robot.virtual_robot import VirtualRobot
+from hexacell.verdict.decision import ErrorLimits
 
 FEW = SearchEffort(candidates=64, dry_run_robots=1)
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
@@ -47,6 +49,28 @@ def calibrated_to(robot: Robot, geometry: Geometry) -> Robot:
     """The robot with this geometry in its controller."""
     normal, frames = robot.mechanism.normalize_frames(geometry)
     return replace(robot, controller=normal, frames=frames)
+
+
+def check_of(
+    plan: Plan, truth: Geometry, known_mm: float | None, *, budget: int = 40, drift_mm: float = 0.02
+) -> Check:
+    """A check of a robot that was calibrated, so that each parameter is known to ``known_mm``; or not."""
+    robot, before = plan.robot, None
+    if known_mm is not None:
+        robot = calibrated_to(robot, truth)
+        covariance = known_mm**2 * np.eye(len(robot.mechanism.parameters))
+        before = identified_before(robot, covariance, drift_mm)
+    limits = ErrorLimits(position_mm=0.15, orientation_deg=0.05)
+    return Check(plan.settings, robot, before, limits, budget, effort=SearchEffort(candidates=32))
+
+
+def measured_by(plan: Plan, truth: Geometry, random: np.random.Generator) -> CampaignState:
+    """The end of a campaign in which the ball never left the travel."""
+    virtual = VirtualRobot(plan.robot, truth, random)
+    campaign = VirtualCampaign(replace(plan, with_forecast=False), virtual)
+    campaign.carry_out()
+    assert campaign.outside == 0
+    return campaign.state
 
 
 @dataclass(frozen=True)

@@ -9,31 +9,23 @@ import pytest
 
 from hexacell.campaign.decisions import Finished
 from hexacell.checks.change_alarm import FIRST_RECORDS, change_alarm
-from hexacell.checks.check import Check, identified_before
+from hexacell.checks.check import Check
 from hexacell.checks.check_result import check_result
-from hexacell.design.search_effort import SearchEffort
 from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.text.verdict import alarm_sentence
 from hexacell.uncertainty.effect_kinds import encoder_scales
-from hexacell.verdict.decision import ErrorLimits
-from tests.hexacell.campaign.conftest import calibrated_to
+from tests.hexacell.campaign.conftest import check_of
 
-SIGMA_MM = 0.005
 SCALE_UM_M = 100.0
 
 
 @pytest.fixture(scope="module")
 def check(make_plan, paper) -> Check:
     """Of the paper's robot, whose controller has its true geometry."""
-    plan = make_plan()
-    robot = calibrated_to(plan.robot, paper.actual)
-    before = identified_before(robot, SIGMA_MM**2 * np.eye(len(robot.mechanism.parameters)), 0.02)
-    return Check(
-        plan.settings, robot, before, ErrorLimits(0.15, 0.05), 40, effort=SearchEffort(candidates=32)
-    )
+    return check_of(make_plan(), paper.actual, 0.005)
 
 
 def measured(check: Check, name: str = "", change_mm: float = 0.0, seed: int = 1) -> MeasurementSet:

@@ -10,20 +10,13 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState
-from hexacell.checks.check import FEWEST_POINTS, Check, identified_before
-from hexacell.design.search_effort import SearchEffort
-from hexacell.dry_run.campaign import VirtualCampaign
+from hexacell.checks.check import FEWEST_POINTS, Check
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot.virtual_robot import VirtualRobot
 from hexacell.uncertainty.effect_kinds import common_encoder_scale, encoder_scales
 from hexacell.verdict.check_statement import CheckStatement
-from hexacell.verdict.decision import ErrorLimits, Verdict
-from tests.hexacell.campaign.conftest import TWO_POINTS, calibrated_to
-
-LIMITS = ErrorLimits(position_mm=0.15, orientation_deg=0.05)
-SIGMA_MM = 0.005
-"""Of each parameter by the calibration."""
+from hexacell.verdict.decision import Verdict
+from tests.hexacell.campaign.conftest import TWO_POINTS, check_of, measured_by
 
 MakeCheck = Callable[..., Check]
 
@@ -38,22 +31,13 @@ def make_check(make_plan, paper) -> MakeCheck:
             "noise__encoder": 0.002,
             "noise__gauge_mm": 0.002,
         } | changes
-        plan = make_plan(**changes)
-        robot = calibrated_to(plan.robot, paper.actual) if calibrated else plan.robot
-        parameters = len(robot.mechanism.parameters)
-        covariance = SIGMA_MM**2 * np.eye(parameters)
-        before = identified_before(robot, covariance, 0.02) if calibrated else None
-        return Check(plan.settings, robot, before, LIMITS, budget, effort=SearchEffort(candidates=32))
+        return check_of(make_plan(**changes), paper.actual, 0.005 if calibrated else None, budget=budget)
 
     return make
 
 
 def carried_out(check: Check, truth: Geometry, seed: int = 1) -> CampaignState:
-    robot = VirtualRobot(check.robot, truth, np.random.default_rng(seed))
-    campaign = VirtualCampaign(replace(check.plan, with_forecast=False), robot)
-    campaign.carry_out()
-    assert campaign.outside == 0
-    return campaign.state
+    return measured_by(check.plan, truth, np.random.default_rng(seed))
 
 
 def changed(check: Check, change: np.ndarray) -> Geometry:

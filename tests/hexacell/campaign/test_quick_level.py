@@ -9,21 +9,12 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState
-from hexacell.checks.check import Check, identified_before
 from hexacell.checks.quick_level import AS_ACCURATE, QuickLevel
-from hexacell.design.search_effort import SearchEffort
-from hexacell.dry_run.campaign import VirtualCampaign
 from hexacell.dry_run.quick_level import try_quick_level
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.mechanism import free_parameter_derivatives
 from hexacell.measurements.records import MeasurementSet
-from hexacell.robot.virtual_robot import VirtualRobot
-from hexacell.verdict.decision import ErrorLimits
-from tests.hexacell.campaign.conftest import calibrated_to
-
-LIMITS = ErrorLimits(position_mm=0.15, orientation_deg=0.05)
-CALIBRATED_MM = 0.02
-"""Of each parameter by the calibration."""
+from tests.hexacell.campaign.conftest import check_of, measured_by
 
 DRIFT_MM = 0.05
 MakeQuick = Callable[..., QuickLevel]
@@ -31,32 +22,22 @@ MakeQuick = Callable[..., QuickLevel]
 
 @pytest.fixture(scope="module")
 def make_quick(make_plan, paper) -> MakeQuick:
-    def make(*, budget: int = 24, calibrated_mm: float = CALIBRATED_MM) -> QuickLevel:
+    def make(*, budget: int = 24, calibrated_mm: float = 0.02) -> QuickLevel:
         plan = make_plan(noise__encoder=0.002, noise__gauge_mm=0.002)
-        robot = calibrated_to(plan.robot, paper.actual)
-        covariance = calibrated_mm**2 * np.eye(len(robot.mechanism.parameters))
-        before = identified_before(robot, covariance, DRIFT_MM)
-        return QuickLevel(
-            Check(plan.settings, robot, before, LIMITS, budget, effort=SearchEffort(candidates=32)), budget
-        )
+        check = check_of(plan, paper.actual, calibrated_mm, budget=budget, drift_mm=DRIFT_MM)
+        return QuickLevel(check, budget)
 
     return make
 
 
-def carried_out(
-    quick: QuickLevel, seed: int = 1, drift_mm: float = DRIFT_MM
-) -> tuple[CampaignState, np.ndarray]:
+def carried_out(quick: QuickLevel) -> tuple[CampaignState, np.ndarray]:
     """On a robot that drifted; and its free parameters."""
-    robot, random = quick.check.robot, np.random.default_rng(seed)
+    robot, random = quick.check.robot, np.random.default_rng(1)
     convention = robot.mechanism.convention
     by_every = free_parameter_derivatives(robot.mechanism, robot.commanding)
     free = convention.free_parameters(robot.commanding)
-    free = free + drift_mm * random.standard_normal(len(by_every)) @ by_every
-    virtual = VirtualRobot(robot, convention.geometry(free), random)
-    campaign = VirtualCampaign(replace(quick.plan, with_forecast=False), virtual)
-    campaign.carry_out()
-    assert campaign.outside == 0
-    return campaign.state, free
+    free = free + DRIFT_MM * random.standard_normal(len(by_every)) @ by_every
+    return measured_by(quick.plan, convention.geometry(free), random), free
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""[[notifications]] in a cell file."""
+"""Addresses in a cell file: of notifications and of a shared archive."""
 
 from __future__ import annotations
 
@@ -7,7 +7,13 @@ from typing import get_args
 import pytest
 from pydantic import ValidationError
 
-from hexacell.cell.operation import USUAL_OCCASIONS, NotificationSettings, Occasion, OccasionWord
+from hexacell.cell.operation import (
+    USUAL_OCCASIONS,
+    ArchiveSettings,
+    NotificationSettings,
+    Occasion,
+    OccasionWord,
+)
 from hexacell.errors import FileError
 
 OPEN_ADDRESSES = [
@@ -81,3 +87,25 @@ def test_a_word_that_is_no_occasion_is_answered_with_each_that_is_once(load_with
 def test_names_differ(load_with) -> None:
     with pytest.raises(FileError, match="the same name"):
         load_with(ONE * 2)
+
+
+@pytest.mark.parametrize(
+    "url", ["postgresql://me@host/cells", "postgresql://host:5433/cells", "postgresql://me@/db?host=/run"]
+)
+def test_a_database_of_the_archive_is_named(url: str) -> None:
+    assert ArchiveSettings(url=url).url == url
+
+
+@pytest.mark.parametrize(
+    ("url", "problem"),
+    [
+        ("postgresql://me:secret@host/cells", "a password does not belong here"),
+        ("postgresql://me@host/cells?password=secret", "a password does not belong here"),
+        ("postgresql://host", "no address"),
+        ("mysql://host/cells", "no address"),
+        ("index.sqlite", "no address"),
+    ],
+)
+def test_any_other_archive_is_refused(url: str, problem: str) -> None:
+    with pytest.raises(ValidationError, match=problem):
+        ArchiveSettings(url=url)

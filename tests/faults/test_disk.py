@@ -122,7 +122,8 @@ def the(writes: Sequence[Write], name: str, file: str, step: str = "") -> Write:
 
 
 def test_a_disk_full_while_measuring_is_reported_as_the_journal(disk, writes):
-    words = disk.fail(the(writes, "write", "journal.jsonl", "sampling"), errno.ENOSPC)
+    write = the(writes, "write", "journal.jsonl", "sampling")
+    words = disk.fail(write, errno.ENOSPC, and_resume=False)
     assert "journal.jsonl: the journal cannot be written" in words, "not what failed afterwards"
 
 

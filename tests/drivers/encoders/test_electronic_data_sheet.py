@@ -66,17 +66,12 @@ def sheet(tmp_path: Path):
     return write
 
 
-def test_its_values_are_those_that_a_node_sends(tmp_path: Path) -> None:
-    (tmp_path / "encoder.eds").write_text(ABOUT.format(vendor="0x99", kind="0x00080196"))
+def test_its_values_are_those_that_a_node_sends_and_names_in_any_encoding(tmp_path: Path) -> None:
+    text = ABOUT.format(vendor="0x99", kind="0x00080196").replace("Maker", "M\u00e4ker")
+    (tmp_path / "encoder.eds").write_text(text, encoding="latin-1")
     values = read_data_sheet(tmp_path / "encoder.eds").values
     assert (values[DEVICE_TYPE], values[VENDOR], values[PRODUCT]) == (0x0008_0196, 0x99, 8)
     assert values[PRESET] == 2**32 - 5
-
-
-def test_names_may_be_in_any_encoding(sheet) -> None:
-    path = sheet()
-    path.write_bytes(path.read_bytes().replace(b"Maker", "M\u00e4ker".encode("latin-1")))
-    assert read_data_sheet(path).values[VENDOR] == 0x99
 
 
 async def test_devices_that_are_as_delivered_have_no_remark(raw, make_bank, sheet) -> None:

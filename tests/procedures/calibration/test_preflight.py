@@ -90,29 +90,22 @@ async def test_a_cancelled_plan_check_ends_before_its_next_part(make_rig, monkey
     assert len(calls) == 1
 
 
-async def test_devices_that_answer_are_fine_and_nothing_is_asked_to_move(bench) -> None:
+async def test_every_device_that_does_not_answer_is_named_and_nothing_is_asked_to_move(bench) -> None:
     assert await device_failures(bench.devices) == []
-    assert bench.controller.log == []
-
-
-async def test_every_device_that_does_not_answer_is_named(bench) -> None:
     bench.gauges[0].failures = [GaugeSilent("does not answer", subject="gauge x")]
     bench.gauges[2].failures = [GaugeUnsteady("readings do not agree", subject="gauge z")]
     bench.encoders.failure = DeviceError("no round", subject="encoders")
     found = await device_failures(bench.devices)
     assert [error.subject for error in found] == ["gauge x", "gauge z", "encoders"]
+    assert bench.controller.log == []
 
 
-async def test_a_gauge_away_from_the_ball_is_no_failure(bench) -> None:
+async def test_a_gauge_away_from_the_ball_and_joints_that_are_not_homed_are_no_failures(bench) -> None:
     bench.gauges[1].shown = lambda: 12.0
+    bench.encoders.failure = NotHomedError("are not homed", subject="encoders")
     assert await device_failures(bench.devices) == []
     bench.encoders.failure = DeviceError("no round", subject="encoders")
     assert [error.subject for error in await device_failures(bench.devices)] == ["encoders"]
-
-
-async def test_joints_that_are_not_homed_are_no_failure_of_the_encoders(bench) -> None:
-    bench.encoders.failure = NotHomedError("are not homed", subject="encoders")
-    assert await device_failures(bench.devices) == []
 
 
 def test_one_failure_is_raised_as_it_is_and_several_in_one_report() -> None:

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from enum import Enum, auto
+from typing import Any
 
 import pytest
 
@@ -214,27 +215,18 @@ class Play:
         server = ScriptedServer(*conversations)
         self.servers.append(server)
         await server.start()
-        return self.driver_at(server.port, trace=trace, **settings)
-
-    async def opened(
-        self,
-        conversation: list[Exchange],
-        *others: list[Exchange],
-        trace: WireTrace | None = None,
-        **settings: object,
-    ) -> LinuxcncrshController:
-        """The same, connected: ``conversation`` goes on after the opening."""
-        driver = await self.driver([*OPENING, *conversation], *others, trace=trace, **settings)
-        await driver.open()
-        return driver
-
-    def driver_at(
-        self, port: int, trace: WireTrace | None = None, **settings: object
-    ) -> LinuxcncrshController:
-        """A driver for whatever is at ``port``; keywords are controller settings."""
-        values = ControllerSettings.model_validate({"config": "machine.ini", "port": port, **settings})
+        stated = {"config": "machine.ini", "port": server.port, **settings}
+        values = ControllerSettings.model_validate(stated)
         self._drivers.append(LinuxcncrshController(values, trace=trace, timeouts=self.patience))
         return self._drivers[-1]
+
+    async def opened(
+        self, conversation: list[Exchange], *others: list[Exchange], **settings: Any
+    ) -> LinuxcncrshController:
+        """The same, connected: ``conversation`` goes on after the opening."""
+        driver = await self.driver([*OPENING, *conversation], *others, **settings)
+        await driver.open()
+        return driver
 
     async def end(self) -> None:
         """Close everything; fail unless every conversation was played to its end."""

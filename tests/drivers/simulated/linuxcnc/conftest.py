@@ -15,7 +15,7 @@ from drivers.simulated.linuxcnc.server import HOST, SimulatedController
 from drivers.simulated.linuxcnc.state import MotionRefused
 from hexacell.cell.robot import ControllerSettings
 from hexacell.clock import CellClock
-from hexacell.errors import DeviceError, FileError
+from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
 from tests.waiting import wait_until
 
@@ -28,26 +28,15 @@ class FakeMachine:
     def __init__(self) -> None:
         self.duration_s = 0.01
         self.config: float | None = 0.0
-        self.jump_mm = 0.0
-        self.ignored_stops = 0
-        self.refusal = ""
-        self.ignored_moves = 0
         self.events: list[str] = []
-        self.durations_s: list[float | None] = []
         self._geometry = 0.0
         self._joints: tuple[float, ...] = (0.0,) * 6
         self._stop = threading.Event()
         self._lock = threading.Lock()
 
     def move(self, pose: Pose, duration_s: float | None) -> None:
-        self.durations_s.append(duration_s)
         if pose.z > 1000.0:
             raise MotionRefused("fails kinematicsInverse")
-        if self.refusal:
-            raise DeviceError(self.refusal)
-        if self.ignored_moves:
-            self.ignored_moves -= 1
-            return
         self._stop.clear()
         self.events.append("move")
         start, clock = self._joints, CellClock()
@@ -59,16 +48,10 @@ class FakeMachine:
                 self._joints = tuple(a + share * (b - a) for a, b in zip(start, target, strict=True))
 
     def stop(self) -> None:
-        if self.ignored_stops > 0:
-            self.ignored_stops -= 1
-        else:
-            self._stop.set()
-
-    def wait_until(self, condition: Callable[[FakeMachine], bool]) -> None:
-        wait_until(lambda: condition(self))
+        self._stop.set()
 
     def wait_for(self, event: str) -> None:
-        self.wait_until(lambda machine: event in machine.events)
+        wait_until(lambda: event in self.events)
 
     def pose(self) -> Pose:
         return Pose(*(joint - self._geometry for joint in self.joints()))
@@ -82,7 +65,6 @@ class FakeMachine:
             raise FileError("has no geometry", subject="machine.ini")
         self.events.append("on")
         self._geometry = self.config
-        self._joints = (self._joints[0] + self.jump_mm, *self._joints[1:])
 
     def home(self) -> None:
         self._stop.clear()

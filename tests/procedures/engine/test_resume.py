@@ -38,18 +38,8 @@ KILLED = {"in the first set", "at a held-out point afterwards"}
 """Here the process ended without a word; in the other places it could still write one."""
 
 
-SELDOM = {
-    "at the second point",
-    "with everything measured",
-    "at a held-out point",
-    "with everything verified",
-}
-"""Tried in ``make test-full`` only."""
-
-
-@pytest.mark.parametrize(
-    "place", [pytest.param(one, marks=[pytest.mark.slow] * (one in SELDOM)) for one in PLACES]
-)
+@pytest.mark.sample("with the geometry *", "at a held-out point afterwards", "with the verdict given")
+@pytest.mark.parametrize("place", PLACES)
 async def test_a_run_resumes_after_an_interruption_at_any_stage(recording, replayed, place: str) -> None:
     kind, count = PLACES[place]
     done = recording.until(kind, count=count)

@@ -18,7 +18,7 @@ from drivers.simulated.gauges.described import crc
 from drivers.simulated.gauges.instruments import Indicator
 from hexacell.cell.described_devices import ModbusSettings
 from hexacell.cell.devices import GaugeSettings
-from hexacell.errors import DeviceError, FileError, UsageError
+from hexacell.errors import DeviceError, UsageError
 from tests.drivers.simulated.gauges.served.cell import cell
 
 
@@ -117,8 +117,3 @@ async def test_without_the_extra_the_command_that_installs_it_is_told(monkeypatc
     async with bench() as made:
         with pytest.raises(UsageError, match=r"Type: pip install 'hexacell\[modbus\]'"):
             await made.gauges["x"].open()
-
-
-def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file():
-    with pytest.raises(FileError, match="gauge x: does not say in which register"):
-        ModbusGauge(GaugeSettings(name="x", axis="x", protocol="modbus"), SharedSerialPorts())

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer
-from drivers.gauges.described import RequestGauge, StreamGauge
+from drivers.gauges.described import ModbusGauge, RequestGauge, StreamGauge
 from drivers.gauges.streaming import Origin
+from drivers.gauges.visa import VisaGauge
 from drivers.interfaces import GaugeReading
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import instrument_class
@@ -74,6 +75,10 @@ async def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file(links,
         RequestGauge(settings("request"), links)
     with pytest.raises(FileError, match="gauge y: does not say what it sends"):
         StreamGauge(settings("stream"), links)
+    with pytest.raises(FileError, match="gauge y: does not say in which register"):
+        ModbusGauge(settings("modbus"), links)
+    with pytest.raises(FileError, match="gauge y: does not say what is asked"):
+        VisaGauge(settings("visa"), links)
 
 
 @pytest.mark.parametrize(

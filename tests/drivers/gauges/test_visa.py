@@ -14,7 +14,7 @@ from drivers.gauges.visa import VisaGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.described_devices import VisaSettings
 from hexacell.cell.devices import GaugeSettings
-from hexacell.errors import DeviceError, FileError, UsageError
+from hexacell.errors import DeviceError, UsageError
 from tests.drivers.simulated.gauges.served.cell import cell
 
 SCPI = VisaSettings(ask="READ? (@{channel})", mm_per_unit=1000.0, expect={"UNIT:LENG?": "M", "AVER?": "4"})
@@ -107,11 +107,6 @@ async def test_without_the_extra_the_command_that_installs_it_is_told(monkeypatc
     with pytest.raises(UsageError, match=r"needs pyvisa, .*Type: pip install 'hexacell\[visa\]'"):
         await VisaGauge(settings, ports).open()
     await ports.close()
-
-
-def test_a_gauge_that_is_not_described_is_an_error_of_the_cell_file():
-    with pytest.raises(FileError, match="gauge x: does not say what is asked"):
-        VisaGauge(GaugeSettings(name="x", axis="x", protocol="visa"), SharedSerialPorts())
 
 
 class Usb:

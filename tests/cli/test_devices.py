@@ -213,9 +213,7 @@ def test_ports_of_nothing_and_of_nobody_are_told(typed_here, tmp_path) -> None:
         (("--write", "new.toml"), 4, "asks what no device reports"),
     ],
 )
-def test_what_cannot_be_is_refused(
-    typed_here, cell_folder, monkeypatch, arguments, code: int, told: str
-) -> None:
+def test_what_cannot_be_is_refused(typed_here, cell_folder, monkeypatch, arguments, code, told) -> None:
     monkeypatch.setattr("hexacell.cli.commands.devices.is_interactive", lambda: False)
     monkeypatch.chdir(cell_folder.path)
     refused = typed_here("devices", *arguments)

@@ -151,9 +151,7 @@ LISTS: dict[str, tuple[Callable[[list[str]], list[str]], tuple[str, ...]]] = {
 
 
 @pytest.mark.parametrize("name", LISTS)
-def test_a_list_of_poses_goes_through_the_same_preflight(
-    typed_here: Any, cell_folder: Any, name: str
-) -> None:
+def test_a_list_of_poses_goes_through_the_same_preflight(typed_here, cell_folder, name) -> None:
     change, words = LISTS[name]
     listed(cell_folder, change)
     cell_folder.edit(*FREE)

@@ -6,7 +6,6 @@ import asyncio
 import os
 import signal
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 
@@ -70,9 +69,7 @@ INT, TERM, HUP = ENDING_SIGNALS
         ((TERM, HUP), [STOP, STOP]),
     ],
 )
-def test_the_first_signal_stops_and_a_second_ctrl_c_aborts(
-    signals, numbers: Any, commands: Any, capsys
-) -> None:
+def test_the_first_signal_stops_and_a_second_ctrl_c_aborts(signals, numbers, commands, capsys) -> None:
     assert signals.run(commands_after(signals, *numbers)) == commands
     hint = "Stopping after this step; Ctrl-C again stops motion at once.\n"
     assert capsys.readouterr().out == (hint if numbers[0] is INT else "")

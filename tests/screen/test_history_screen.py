@@ -155,9 +155,7 @@ async def test_an_open_proposal_is_written_once_it_is_approved(cell: Cell, left:
     assert cell.config_path.read_bytes() == left.after
 
 
-async def test_a_run_that_is_looked_at_again_is_approved_from_its_review(
-    cell: Cell, left: ProposedRun
-) -> None:
+async def test_a_run_that_is_looked_at_again_is_approved_from_its_review(cell, left) -> None:
     async with opened_history(cell) as pilot:
         await press(pilot, "enter")
         await until_shown(pilot, "recorded calibration 2026-11-22T100000Z")

@@ -9,12 +9,10 @@ from textual.events import Paste
 from textual.pilot import Pilot
 from textual.widgets import Input
 
-from hexacell.cell.loader import Cell
 from hexacell.screen.overlays import QuestionOverlay, QuitOverlay
 from hexacell.verdict.acceptance_gates import AcceptanceGate
 from procedures.run.questions import ask_approval
-from procedures.steps import events
-from tests.screen.conftest import Opened, settled
+from tests.screen.conftest import settled
 from tests.screen.test_job import press, until_shown, workplace_of
 from tests.screen.test_plan_screen import tried
 from tests.screen.test_snapshots import idle
@@ -42,9 +40,7 @@ async def press_everything(pilot: Pilot[int], tab: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("tab", list("12345"))
 @pytest.mark.parametrize("is_running", [False, True], ids=["idle", "running"])
-async def test_every_key_on_every_screen_twice(
-    tab: str, is_running: bool, cell: Cell, history: tuple[events.Event, ...], opened: Opened
-) -> None:
+async def test_every_key_on_every_screen_twice(tab, is_running, cell, history, opened) -> None:
     run = ToldRun()
     workplace = workplace_of(cell, run, history[:300]) if is_running else idle(cell)
     workplace.plan, workplace.opened = tried(cell), ToldRun()
@@ -55,9 +51,7 @@ async def test_every_key_on_every_screen_twice(
         assert "Preflight" in "".join(str(one.render()) for one in pilot.app.screen.query("TabLine"))
 
 
-async def test_what_is_pasted_into_a_name_is_no_consent(
-    cell: Cell, history: tuple[events.Event, ...], opened: Opened
-) -> None:
+async def test_what_is_pasted_into_a_name_is_no_consent(cell, history, opened) -> None:
     grave = AcceptanceGate(
         name="within tolerance", passed=False, sentence="Far.", needs_person=True, needs_cell_name=True
     )
@@ -78,9 +72,7 @@ async def test_what_is_pasted_into_a_name_is_no_consent(
         await until(lambda: len(run.given) == 1)
 
 
-async def test_each_way_to_quit_asks_about_the_run(
-    cell: Cell, history: tuple[events.Event, ...], opened: Opened
-) -> None:
+async def test_each_way_to_quit_asks_about_the_run(cell, history, opened) -> None:
     run = ToldRun()
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         await until_shown(pilot, "point 5")

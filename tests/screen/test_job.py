@@ -75,9 +75,7 @@ def workplace_of(cell: Cell, run: ToldRun, history: Sequence[events.Event]) -> T
     return ToldWorkplace(cell, run=run)
 
 
-async def test_from_mounting_to_approval(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
+async def test_from_mounting_to_approval(cell, run, history, opened) -> None:
     proposed = next(event for event in history if isinstance(event, events.Proposed))
     async with opened(workplace_of(cell, run, history[:PLACED_AT])) as pilot:
         run.tell(snapshot(x={"shown_mm": -1.2}))
@@ -111,9 +109,7 @@ async def test_from_mounting_to_approval(
         assert "S1y       -155.000    -160.751    -5.751    0.095  changed (60." in shown(pilot)
 
 
-async def test_one_key_each_for_who_is_in_control(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
+async def test_one_key_each_for_who_is_in_control(cell, run, history, opened) -> None:
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         await until_shown(pilot, "point 5")
         await press(pilot, "P", "u", "m", "p", "a")
@@ -169,9 +165,7 @@ async def test_motion_begins_on_an_explicit_yes_and_a_recovery_has_a_number(
         assert run.given == [Answer("yes"), Answer("retry")]
 
 
-async def test_each_fault_is_shown_with_what_to_do(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
-) -> None:
+async def test_each_fault_is_shown_with_what_to_do(cell, run, history, opened) -> None:
     async with opened(workplace_of(cell, run, history[:300])) as pilot:
         run.record([tripped_by(Guard.GAUGE_END)])
         await until_shown(pilot, f"Stopped by a guard: {Guard.GAUGE_END.value}")
@@ -184,9 +178,7 @@ def tripped_by(guard: Guard) -> events.Tripped:
     return events.Tripped(guard=guard, device="gauge y", problem="it is so", action="Mend it")
 
 
-async def test_a_fault_that_the_run_has_left_behind_is_not_shown_on_attaching(
-    cell: Cell, run: ToldRun, history: tuple[events.Event, ...]
-) -> None:
+async def test_a_fault_that_the_run_has_left_behind_is_not_shown_on_attaching(cell, run, history) -> None:
     interrupted = events.Interrupted(reason="it drifts", exit_code=1)
     told = [*history[:100], tripped_by(Guard.DRIFT), interrupted, *history[100:300]]
     async with attended(workplace_of(cell, run, told)) as model:
@@ -252,9 +244,7 @@ async def test_quitting_asks_what_becomes_of_the_run(
         await until(lambda: run.left == [keeps_running])
 
 
-async def test_a_run_begins_after_everything_was_looked_at(
-    cell: Cell, run: ToldRun, opened: Opened
-) -> None:
+async def test_a_run_begins_after_everything_was_looked_at(cell, run, opened) -> None:
     run.begin(cell)
     workplace = ToldWorkplace(cell, live=[snapshot()], started=run)
     async with opened(workplace) as pilot:
@@ -266,9 +256,7 @@ async def test_a_run_begins_after_everything_was_looked_at(
         assert pilot.app.current_mode == "measure"
 
 
-async def test_no_run_begins_while_something_does_not_hold(
-    cell: Cell, run: ToldRun, opened: Opened
-) -> None:
+async def test_no_run_begins_while_something_does_not_hold(cell, run, opened) -> None:
     found = ChecklistItem(Mark.FAILED, "gauge y", "it answers in inch", "Press the in/mm key")
     workplace = ToldWorkplace(cell, started=run, preflight=Preflight(items=(found,), is_ready=False))
     async with opened(workplace) as pilot:

@@ -6,12 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.cell.loader import Cell
 from hexacell.errors import FileError
 from hexacell.screen.preferences import KEYS, ScreenPreferences, preferences_path, read_preferences
 from procedures.engine.commands import Pause
-from procedures.steps.events import Event
-from tests.screen.conftest import Opened, settled
+from tests.screen.conftest import settled
 from tests.screen.told_run import ToldRun, ToldWorkplace
 from tests.waiting import until
 
@@ -46,9 +44,7 @@ def test_the_file_is_where_configs_are(monkeypatch: pytest.MonkeyPatch, tmp_path
     assert preferences_path() == tmp_path / "hexacell" / "screen.toml"
 
 
-async def test_a_chosen_key_takes_the_place_of_the_other(
-    cell: Cell, history: tuple[Event, ...], opened: Opened
-) -> None:
+async def test_a_chosen_key_takes_the_place_of_the_other(cell, history, opened) -> None:
     run = ToldRun()
     run.begin(cell)
     run.record(history[:300])

@@ -19,7 +19,7 @@ from hexacell.screen.overlays import FaultOverlay
 from hexacell.screen.preferences import ONCE, ScreenAction
 from hexacell.screen.widgets import RowList
 from hexacell.services.preflight import toggle_exclusion
-from tests.screen.conftest import Opened, attended
+from tests.screen.conftest import attended
 from tests.screen.test_job import press, shown, until_shown
 from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot
 from tests.waiting import until
@@ -60,9 +60,7 @@ def rows(pilot: Pilot[int]) -> list[str]:
     return [str(one.prompt) for one in pilot.app.screen.query_one(RowList).options]
 
 
-async def test_a_key_excludes_in_the_cell_file_and_the_plan_is_tried_anew(
-    cell: Cell, opened: Opened, tmp_path: Path
-) -> None:
+async def test_a_key_excludes_in_the_cell_file_and_the_plan_is_tried_anew(cell, opened, tmp_path) -> None:
     workplace = FileWorkplace(cell, tmp_path)
     before = workplace.cell.path.read_text()
     async with opened(workplace) as pilot:
@@ -96,9 +94,7 @@ async def test_nothing_is_excluded_while_a_run_goes_on(cell: Cell, tmp_path: Pat
         assert not workplace.cell.settings.exclusions
 
 
-async def test_the_latest_trial_counts_and_keys_are_heard_meanwhile(
-    cell: Cell, opened: Opened, tmp_path: Path
-) -> None:
+async def test_the_latest_trial_counts_and_keys_are_heard_meanwhile(cell, opened, tmp_path) -> None:
     workplace = FileWorkplace(cell, tmp_path, is_slow=True)
     async with opened(workplace) as pilot:
         await press(pilot, "2", "v", "x")

@@ -27,7 +27,7 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import ask_approval, ask_placement
 from procedures.run.trips import Guard
 from procedures.steps import events
-from tests.screen.conftest import SNAPSHOTS, UPDATE, Opened, compare_with_snapshot, settled
+from tests.screen.conftest import SNAPSHOTS, UPDATE, compare_with_snapshot, settled
 from tests.screen.test_job import until_shown
 from tests.screen.test_plan_screen import tried
 from tests.screen.told_run import ToldRun, ToldWorkplace, past_run, snapshot
@@ -192,9 +192,7 @@ async def test_the_assistant_looks_as_it_did(size: str, tmp_path: Path) -> None:
 @pytest.mark.sample("*-80x24")
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("scene", SCENES)
-async def test_it_looks_as_it_did(
-    scene: str, size: str, cell: Cell, history: History, opened: Opened
-) -> None:
+async def test_it_looks_as_it_did(scene, size, cell, history, opened) -> None:
     workplace, keys = SCENES[scene](cell, history)
     async with opened(workplace, SIZES[size]) as pilot:
         for key in keys:

@@ -79,13 +79,8 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskProcesses]:
         yield processes
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [{}, pytest.param(GIVEN_UP_AT_ONCE, marks=pytest.mark.slow)],
-    ids=["by the scheduler", "by this program"],
-)
-def test_tasks_of_a_killed_worker_are_done_again(tmp_path: Path, settings: dict[str, str]) -> None:
-    with dask_processes(tmp_path, 3, **settings) as cluster:
+def test_tasks_of_a_killed_worker_are_done_again(tmp_path: Path) -> None:
+    with dask_processes(tmp_path, 3) as cluster:
         carry_out = partial(square_unless_killed, folder=tmp_path)
         found = list(results_of(SQUARES, carry_out, dask_cluster(cluster.address, patience_s=LATE_S)))
         wait_until(lambda: any(worker.poll() == -signal.SIGKILL for worker in cluster.workers))

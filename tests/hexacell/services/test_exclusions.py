@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -82,9 +81,7 @@ def test_what_leaves_too_little_is_refused_with_its_line(make_cell: Callable[...
         assert refused.value.line == line
 
 
-def test_of_a_list_the_pose_itself_is_left_out_and_no_other(
-    make_cell: Callable[..., Cell], tmp_path: Path
-) -> None:
+def test_of_a_list_the_pose_itself_is_left_out_and_no_other(make_cell, tmp_path) -> None:
     rows = [
         f"{point},{row},{x},{y},{z},{tilt},0,0"
         for point, (x, y, z) in enumerate(THREE_POINTS, start=1)

@@ -162,9 +162,7 @@ async def test_what_is_not_forged_is_resumed(finished, make_site) -> None:
 
 
 @pytest.mark.parametrize("name", ["proposal.json", "write-back.json", "lent/write-back.json"])
-async def test_a_file_that_names_another_config_leads_nowhere(
-    finished, make_site, tmp_path, name: str
-) -> None:
+async def test_a_file_that_names_another_config_leads_nowhere(finished, make_site, tmp_path, name) -> None:
     """Otherwise a rollback, or a proposal, would be written there."""
     victim = tmp_path / "victim"
     victim.write_bytes(finished.config_before)

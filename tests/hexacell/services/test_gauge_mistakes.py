@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 from hexacell.cell.simulation import FaultKind, SimulatedFault
@@ -21,9 +19,7 @@ MISTAKES: list[tuple[FaultKind, str, str, int]] = [
 
 
 @pytest.mark.parametrize(("kind", "gauge", "words", "records"), MISTAKES)
-async def test_a_mistake_at_the_start_is_named(
-    make_site: Any, kind: FaultKind, gauge: str, words: str, records: int
-) -> None:
+async def test_a_mistake_at_the_start_is_named(make_site, kind, gauge, words, records) -> None:
     fault = SimulatedFault(kind=kind, device=gauge)
     site = make_site(stations__trial_mm=1.0, simulation__faults=(fault,))
     with pytest.raises(HexacellError, match=words) as refusal:

@@ -44,9 +44,7 @@ def stated(found: LengthResult, verdict: Verdict = Verdict.PASS) -> LengthStatem
 @pytest.mark.parametrize(
     ("sign", "direction", "factor"), [(1, "long", "0.999001"), (-1, "short", "1.001001")]
 )
-def test_a_scale_is_one_line_and_a_significant_one_has_its_remedy(
-    sign: int, direction: str, factor: str
-) -> None:
+def test_a_scale_is_one_line_and_a_significant_one_has_its_remedy(sign, direction, factor) -> None:
     said = f"encoders read 12 +- 20 um/m {direction}"
     assert scale_lines(length_of(sign * 12.0)) == [f"length scale: checked over 300.000 mm: {said}"]
     assert earlier_scale_line(length_of(sign * 12.0)).endswith(f"as checked in that run: {said}")

@@ -66,12 +66,12 @@ HOSTILE = [
 ]
 
 
-@pytest.mark.parametrize("text", HOSTILE)
-def test_hostile_texts_stay_texts(text) -> None:
-    page = html_of(report(text))
-    assert read(page).tags == read(html_of(report("plain"))).tags
-    assert "".join(read(page).text).count(text) >= 9
-    assert pdf_of(report(text)).startswith(b"%PDF")
+def test_hostile_texts_stay_texts() -> None:
+    for text in HOSTILE:
+        page = html_of(report(text))
+        assert read(page).tags == read(html_of(report("plain"))).tags
+        assert "".join(read(page).text).count(text) >= 9
+        assert pdf_of(report(text)).startswith(b"%PDF")
 
 
 @settings(max_examples=20)

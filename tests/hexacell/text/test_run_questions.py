@@ -72,13 +72,6 @@ def test_approval_and_acceptance_say_what_must_be_taught_anew_before_it_asks() -
         assert asked.startswith(asks)
 
 
-def test_a_failure_names_the_choices() -> None:
-    assert (
-        question_text(FAILURE) == "\nIt broke.\nHow to continue (retry, measure-again, redo-set, abort)? "
-    )
-    assert request_text(FAILURE) == "Type one of retry, measure-again, redo-set, abort: "
-
-
 def test_what_a_question_offers_is_an_answer_and_nothing_else() -> None:
     offered: list[tuple[Question, dict[str, str | None], tuple[str, ...]]] = [
         (placement(Phase.IDENTIFY), {"\n": "placed"}, ("a\n", "m\n", "yes\n", "no\n", "placed\n")),
@@ -94,6 +87,8 @@ def test_what_a_question_offers_is_an_answer_and_nothing_else() -> None:
         ),
         (GRAVE, {"bench\n": "somebody", "no\n": None}, ("\n", "yes\n", "y\n", "benc\n")),
     ]
+    assert question_text(FAILURE).endswith("(retry, measure-again, redo-set, abort)? ")
+    assert request_text(FAILURE) == "Type one of retry, measure-again, redo-set, abort: "
     for question, answers, others in offered:
         for typed, answer in answers.items():
             assert typed_answer(typed, question, "somebody") == TypedAnswer(answer)

@@ -63,9 +63,6 @@ def aimed_at(legs, estimate, choice, at):
     return stands(legs, estimate.geometry, choice.record.targets.joints[0], start)
 
 
-# --- what is chosen ---
-
-
 def test_the_prediction_keeps_the_travel_with_three_sigma(stage):
     _, _, choice = stage
     deviation, sigma = choice.record.deviation[0], choice.record.sigma[0]
@@ -142,9 +139,6 @@ def test_a_record_like_one_that_is_planned_is_not_selected(know, much):
     assert second.gain < first.gain  # beside what is known now
 
 
-# --- the way there ---
-
-
 @pytest.mark.parametrize("present", [0, 2])
 def test_the_path_from_the_present_pose_is_clear_and_inside_the_travel(
     know, much, paper, legs, vector_of, present
@@ -212,9 +206,6 @@ def test_the_jacobian_of_the_record_is_that_of_the_forward_kinematics(stage, leg
     assert (np.linalg.eigvalsh(by_encoders) > 0.0).all()
 
 
-# --- nothing to choose ---
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -228,9 +219,6 @@ def test_without_a_safe_pose_the_error_gives_the_reason(know, much, limits, chan
     with pytest.raises(LimitError, match=message) as caught:
         selected(belief, at, TURNS)
     assert caught.value.exit_code is ExitCode.OUT_OF_LIMITS
-
-
-# --- the station ---
 
 
 def test_the_estimated_zero_is_the_position_of_the_ball_when_zeroed(know, paper, visit):

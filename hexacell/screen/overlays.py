@@ -50,7 +50,7 @@ class AnswerOverlay(ModalScreen[ScreenResultType]):
         with Vertical(id="question", classes=f"overlay overlay-{view.urgency}"):
             yield TextPanel(view.title, classes="overlay-title")
             with VerticalScroll(id="question-text"):
-                yield TextPanel("\n\n".join(view.paragraphs))
+                yield TextPanel("\n\n".join(filter(None, (*view.paragraphs, view.change))))
             if view.shows_gauges:
                 yield DevicePanel(id="mounting")
             if view.refusal:

@@ -6,21 +6,14 @@ import shlex
 from pathlib import Path
 
 from hexacell.errors import HexacellError
-from hexacell.kinematics.pose import Pose
 from hexacell.services.run.calibration_run import RunRequest
 from hexacell.text.layout import duration, wrapped
 from hexacell.text.line_face import request_text
-from hexacell.text.verdict import gate_lines, improvement_sentence, teaching_line, teaching_sentence
+from hexacell.text.screens.questions import question_view
+from hexacell.text.verdict import teaching_line
 from procedures.calibration.calibration import Mode
 from procedures.replay.replayer import Aspect, ReplayReport
-from procedures.run.questions import (
-    GaugePlacement,
-    PendingChange,
-    Question,
-    StepFailure,
-    UnreadyController,
-    WrittenResult,
-)
+from procedures.run.questions import Question
 from procedures.steps import events
 
 REPEATED = "The check raised an alarm, which one unchanged machine in 100 does: it is made once more."
@@ -76,44 +69,15 @@ def closing_lines(request: RunRequest, ended: events.Ended) -> tuple[str, ...]:
 
 
 def question_text(question: Question) -> str:
-    """The question for a terminal that reads one line as the answer."""
-    match question.subject:
-        case GaugePlacement(point=mounting, pose=pose, seat=int(seat)):
-            return _mounting_text(mounting, seat, pose) + request_text(question)
-        case GaugePlacement(station=station, pose=pose):
-            return (
-                f"\n{station[0].upper()}{station[1:]}: the robot is at {pose}.\n"
-                "Put the three gauges around the ball, plungers in the middle of their travel.\n"
-                f"{request_text(question)}"
-            )
-        case PendingChange(gates=gates, diff=diff, displacement=moved, improvement=improvement):
-            sentences = filter(None, (improvement_sentence(improvement), teaching_sentence(moved)))
-            facts = [gate_lines(gates), *(wrapped(one, indent=4) for one in sentences)]
-            asked = f"Write this into the controller's config? {request_text(question)}"
-            return "\n".join(["", diff, *filter(None, facts), asked])
-        case WrittenResult(line=line, displacement=moved):
-            keep = f"The new geometry is in the controller's config. Keep it? {request_text(question)}"
-            taught = wrapped(teaching_sentence(moved), indent=4)
-            return "\n".join(["", f"{line}.", *filter(None, [taught]), keep])
-        case UnreadyController(problem=problem, request=request):
-            return f"\n{wrapped(f'{problem}. {request}')}\n{request_text(question)}"
-        case StepFailure(problem=problem):
-            return f"\n{problem}\nHow to continue ({', '.join(question.choices)})? "
+    """The question for a terminal that reads one line as the answer, as the screen asks it.
 
-
-def _mounting_text(mounting: int, seat: int, pose: Pose) -> str:
-    """Instructions for mounting the fixture and the gauges in a length check."""
-    where = f"\nLength check, mounting {mounting}: the robot holds the ball at {pose}.\n"
-    if mounting == 1:
-        return (
-            f"{where}Clamp the fixture with its first seat there, the second in the stated direction.\n"
-            "Mount the gauges in the first seat around the ball, plungers in the middle of\n"
-            "their travel, and zero them.\n"
-        )
-    return (
-        f"{where}Mount the gauges in seat {seat}, the same way round. Do not zero them, and leave the\n"
-        "fixture where it is.\n"
-    )
+    The change of a config comes first: what decides about it is then in sight beside the question.
+    """
+    view, request = question_view(question, None), request_text(question)
+    about = [text if "\n" in text else wrapped(text, indent=4) for text in view.paragraphs]
+    if view.title.endswith("?"):
+        return "\n".join(["", *filter(None, [view.change]), *about, f"{view.title}\n{request}"])
+    return "\n".join(["", view.title, *about, request])
 
 
 def replay_report(replayed: ReplayReport) -> str:

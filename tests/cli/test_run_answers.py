@@ -70,7 +70,7 @@ class TestAPersonAtTheTerminal:
         fast_cell.edit(ASK)
         run = fast_cell.rewound(demo.run, before="propose")
         process = start_at(terminal, start, "run", fast_cell.cell, "--resume", run)
-        question = terminal.read_until("Write this into the controller's config? Type yes or no: ")
+        question = terminal.read_until("Type yes or no: ")
         return process, question, fast_cell
 
     def test_sees_the_change_and_approves_it(self, waiting, terminal, demo):
@@ -105,9 +105,9 @@ class TestAPersonAtTheTerminal:
         quick_cell.edit(BY_HAND, ("[acceptance]", "[acceptance]\ndrift_mm = 0.00001"))
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
         first = terminal.read_until(PLACED)
-        assert "Point 1: the robot is at X0.000 Y0.000 Z550.000" in first
+        assert "The robot holds the ball at X0.000 Y0.000 Z550.000" in first
         terminal.type("\n\n")  # an Enter too many must not answer the next question
-        terminal.read_until("How to continue (retry, measure-again, redo-set, abort)? ")
+        terminal.read_until("Type one of retry, measure-again, redo-set, abort: ")
         terminal.type("re\n")
         terminal.read_until("Type one of retry, measure-again, redo-set, abort: ")
         terminal.type("redo\n")
@@ -118,7 +118,7 @@ class TestAPersonAtTheTerminal:
         terminal.type("yes\n")  # no answer, and no letter known
         terminal.read_until(PLACED)
         terminal.type("\n")
-        terminal.read_until("How to continue (retry, measure-again, redo-set, abort)? ")
+        terminal.read_until("Type one of retry, measure-again, redo-set, abort: ")
         terminal.type("abort\n")
         assert ended(process, terminal) in {1, 3}
         assert process.out.count("Letters, each with Enter") == 3, "at first, and where nothing is answered"

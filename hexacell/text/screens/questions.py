@@ -39,8 +39,8 @@ def question_view(question: Question, live: LiveSnapshot | None) -> QuestionView
         case PendingChange(gates=gates, diff=diff, displacement=moved, improvement=improvement):
             facts = (gate_lines(gates), improvement_sentence(improvement), teaching_sentence(moved))
             view = _consenting(question, "write it", "Write the new geometry into the controller's config?")
-            shown = (*filter(None, facts), f"The change:\n{diff.rstrip()}")
-            return replace(view, paragraphs=shown, refusal=approval_refusal(gates))
+            change, refusal = f"The change:\n{diff.rstrip()}", approval_refusal(gates)
+            return replace(view, paragraphs=tuple(filter(None, facts)), change=change, refusal=refusal)
         case WrittenResult(line=line, displacement=moved):
             title, otherwise = "The result did not pass. Keep it all the same?", "restore the old config"
             view = _consenting(question, "keep it", title, otherwise)
@@ -78,7 +78,12 @@ def _placement(place: GaugePlacement, live: LiveSnapshot | None) -> QuestionView
         how = "Put them around the ball, then bring each plunger to the middle of its travel:"
     else:
         title = f"Mount the gauges in seat {place.seat} of the fixture ({place.station})"
-        how = "Zero them." if place.point == 1 else "Do not zero them, and leave the fixture where it is."
+        how = "Mount them the same way round. Do not zero them, and leave the fixture where it is."
+        if place.point == 1:
+            how = (
+                "Clamp the fixture with its first seat there, the second in the stated direction. Bring "
+                "each plunger to the middle of its travel, and zero the gauges."
+            )
     sides = [
         f"the {one.name} gauge on its {'+' if one.sign > 0 else '-'}{one.axis} side"
         for one in (live.gauges if live is not None else ())

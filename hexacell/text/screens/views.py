@@ -82,6 +82,7 @@ class QuestionView:
 
     Attributes:
         paragraphs: what is asked, and what there is to know for it.
+        change: the change of a config that it is about, as a diff with a heading; empty without.
         instruction: what to do to answer.
         choices: answers of one key each.
         typed: the text that must be typed to consent; empty if one key is enough.
@@ -94,6 +95,7 @@ class QuestionView:
     paragraphs: tuple[str, ...]
     instruction: str
     choices: tuple[Choice, ...]
+    change: str = ""
     typed: str = ""
     consent: str | None = None
     refusal: str = ""

@@ -79,10 +79,10 @@ def test_a_check_that_contradicts_itself_says_why() -> None:
 
 def test_a_mounting_is_asked_for_with_what_not_to_do() -> None:
     for mounting, seat, words in (
-        (1, 1, "Mount the gauges in the first seat around the ball"),
-        (3, 1, "Mount the gauges in seat 1, the same way round. Do not zero them"),
+        (1, 1, "Clamp the fixture with its first seat there"),
+        (3, 1, "Mount them the same way round. Do not zero them"),
     ):
         text = question_text(ask_mounting(mounting, seat, Pose(150.0, 0.0, 500.0)))
-        assert f"Length check, mounting {mounting}: the robot holds the ball at " in text
+        assert f"Mount the gauges in seat {seat} of the fixture (mounting {mounting})\nThe robot holds" in text
         assert words in text
-        assert ("and zero them" in text) == (mounting == 1)
+        assert ("and zero the gauges" in " ".join(text.split())) == (mounting == 1)

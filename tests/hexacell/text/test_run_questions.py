@@ -38,12 +38,13 @@ def placement(phase: Phase) -> Question:
 
 
 def test_placing_gauges_names_the_point_and_the_pose() -> None:
-    for phase, beginning in (
-        (Phase.IDENTIFY, "\nPoint 3: the robot is at X1.000 "),
-        (Phase.BEFORE, "\nHeld-out point 3: "),
-        (Phase.AFTER, "\nHeld-out point 3 with the new geometry: "),
+    for phase, place in (
+        (Phase.IDENTIFY, "point 3"),
+        (Phase.BEFORE, "held-out point 3"),
+        (Phase.AFTER, "held-out point 3 with the new geometry"),
     ):
         text = question_text(placement(phase))
+        beginning = f"\nPut the gauges around the ball at {place}\nThe robot holds the ball at X1.000 "
         assert text.startswith(beginning)
         assert text.endswith("Press Enter when they are in place, or type a to abort: ")
 
@@ -55,10 +56,10 @@ def test_an_approval_shows_the_change_then_every_gate() -> None:
     ]
     improvement = ExpectedImprovement(now_mm=4.931, expanded_mm=0.0581)
     assert question_text(ask_approval(gates, "-1\n+2", None, improvement, cell="bench")) == (
-        "\n-1\n+2\nok  The solver ended.\nNO  It is 9 mm.\n"
+        "\nThe change:\n-1\n+2\nok  The solver ended.\nNO  It is 9 mm.\n"
         "Largest position error at the task poses: 4.93 mm with the current config, 0 +-\n"
         "    0.058 mm with this one.\n"
-        "Write this into the controller's config? Type yes or no: "
+        "Write the new geometry into the controller's config?\nType yes or no: "
     )
 
 
@@ -66,10 +67,11 @@ def test_approval_and_acceptance_say_what_must_be_taught_anew_before_it_asks() -
     moved = TaskDisplacement(position_mm=30.8, orientation_deg=4.0, poses=6, is_within_limits=False)
     whether_written = ask_approval([], "-1\n+2", moved, cell="bench")
     whether_kept = ask_acceptance("all ill", Verification(verdict=Verdict.FAIL), moved)
-    for question, asks in ((whether_written, "Write this"), (whether_kept, "The new geometry is in")):
-        *_, first, second, asked = question_text(question).splitlines()
-        assert f"{first} {second.strip()}" == teaching_sentence(moved)
+    for question, asks in ((whether_written, "Write the new"), (whether_kept, "The result did not pass.")):
+        *about, asked, request = question_text(question).splitlines()
+        assert teaching_sentence(moved) in " ".join(line.strip() for line in about)
         assert asked.startswith(asks)
+        assert request == "Type yes or no: "
 
 
 def test_what_a_question_offers_is_an_answer_and_nothing_else() -> None:
@@ -87,8 +89,9 @@ def test_what_a_question_offers_is_an_answer_and_nothing_else() -> None:
         ),
         (GRAVE, {"bench\n": "somebody", "no\n": None}, ("\n", "yes\n", "y\n", "benc\n")),
     ]
-    assert question_text(FAILURE).endswith("(retry, measure-again, redo-set, abort)? ")
     assert request_text(FAILURE) == "Type one of retry, measure-again, redo-set, abort: "
+    what = "The robot stands still: this went wrong"
+    assert question_text(FAILURE) == f"\n{what}\nIt broke.\n{request_text(FAILURE)}"
     for question, answers, others in offered:
         for typed, answer in answers.items():
             assert typed_answer(typed, question, "somebody") == TypedAnswer(answer)
@@ -99,7 +102,8 @@ def test_what_a_question_offers_is_an_answer_and_nothing_else() -> None:
 def test_the_controller_is_made_ready_on_an_explicit_yes_only() -> None:
     question = ask_startup(StartupAction.HOME, "controller: is not homed", is_theirs=False)
     assert question_text(question) == (
-        "\ncontroller: is not homed. Is its way free? Home it, which moves the machine?\nType yes or no: "
+        "\nThe controller is not ready\ncontroller: is not homed.\n"
+        "Is its way free? Home it, which moves the machine?\nType yes or no: "
     )
     for typed, answer in (("y", YES), ("Yes", YES), ("n", NO), ("no", NO)):
         assert typed_answer(typed, question, "a person") == TypedAnswer(answer)

@@ -10,7 +10,6 @@ from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.services.schedule.scheduled_run import crontab_line
 from hexacell.services.schedule.schedules import (
-    ScheduleRequest,
     present_schedule,
     remove_schedule,
     scheduled_run,
@@ -43,22 +42,22 @@ def main(options: argparse.Namespace) -> ExitCode:
 
 
 def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
-    request = ScheduleRequest(
+    run = scheduled_run(
+        cell,
         options.daily,
         options.mode,
-        options.longest,
-        options.retry,
-        options.retries,
-        options.on_failure,
-        options.metrics,
+        longest_minutes=options.longest,
+        retry_minutes=options.retry,
+        retries=options.retries,
+        on_failure=options.on_failure,
+        metrics=options.metrics,
     )
+    stated = cell.settings.unattended
     if options.cron:
         if options.on_failure is not None:
             raise UsageError("only systemd starts a unit on a failure", action="Leave --on-failure away")
-        line = crontab_line(scheduled_run(cell, request))
-        console.show({"crontab": line}, crontab_text(line, cell.settings.unattended))
+        line = crontab_line(run)
+        console.show({"crontab": line}, crontab_text(line, stated))
         return
-    written = write_schedule(cell, request, options.folder)
-    console.document(schedule_document(written))
-    run, stated = scheduled_run(cell, request), cell.settings.unattended
-    console.print(written_schedule_text(written, run, stated))
+    written = write_schedule(run, options.folder)
+    console.show(schedule_document(written), written_schedule_text(written, run, stated))

@@ -33,6 +33,7 @@ class ScheduledRun:
         retries: how often.
         writable: the folders that it writes into: of the cell, of the controller's config, of metrics.
         metrics: the file that they are written to after each run, if any.
+        on_failure: the unit that systemd starts after a failure, if any.
     """
 
     cell: Path
@@ -46,6 +47,7 @@ class ScheduledRun:
     retries: int
     writable: tuple[Path, ...]
     metrics: Path | None = None
+    on_failure: str | None = None
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -120,10 +122,10 @@ controllers and CAN."""
 TEMPORARY = (Path("/tmp"), Path("/var/tmp"))  # noqa: S108 - what PrivateTmp hides
 
 
-def service_text(run: ScheduledRun, user: str | None, groups: Sequence[str], on_failure: str | None) -> str:
+def service_text(run: ScheduledRun, user: str | None, groups: Sequence[str]) -> str:
     """The service; of the system for a ``user`` with some ``groups``, else of the user who enables it."""
     unit = ["[Unit]", f"Description=hexacell: {_plain(run.mode)} of {_plain(run.name)}"]
-    unit += [f"OnFailure={on_failure}"] if on_failure else []
+    unit += [f"OnFailure={run.on_failure}"] if run.on_failure else []
     unit += [f"StartLimitIntervalSec={(run.retries + 1) * (run.longest_minutes + run.retry_minutes)}min"]
     unit += [f"StartLimitBurst={run.retries + 1}"]
     service = [

@@ -10,12 +10,12 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
 
 from hexacell.cell.loader import Cell
-from hexacell.cell.operation import DAY_MINUTES
+from hexacell.cell.operation import DAY_MINUTES, UnattendedSettings
 from hexacell.errors import FileError, UsageError
 from hexacell.services.schedule.scheduled_run import (
     MOST_MINUTES,
@@ -39,19 +39,6 @@ _UNIT_NAME = re.compile(r"[A-Za-z0-9:_.@%\\-]+\.[a-z]+")
 
 
 @dataclass(frozen=True, slots=True)
-class ScheduleRequest:
-    """What a person asks for; times in minutes."""
-
-    daily: str
-    mode: str = "check"
-    longest_minutes: int = 120
-    retry_minutes: int = 15
-    retries: int = 3
-    on_failure: str | None = None
-    metrics: Path | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Schedule:
     """The units of one cell.
 
@@ -66,48 +53,56 @@ class Schedule:
     complaints: tuple[str, ...] = ()
 
 
-def scheduled_run(cell: Cell, request: ScheduleRequest) -> ScheduledRun:
-    """What is to be started.
+def scheduled_run(
+    cell: Cell,
+    daily: str,
+    mode: str,
+    *,
+    longest_minutes: int,
+    retry_minutes: int,
+    retries: int,
+    on_failure: str | None,
+    metrics: Path | None,
+) -> ScheduledRun:
+    """What is to be started, each day at the time ``daily``; ``on_failure`` is the unit of a failure.
 
     Raises:
         UsageError: it cannot run without a person, or a number or the time makes no sense.
     """
-    _require_possible(cell, request)
-    hour, minute = time_of_day(request.daily)
-    _require_not_quiet(cell, hour, minute)
-    longest, retries = _times(cell, request)
-    if (retries + 1) * (longest + request.retry_minutes) > MOST_MINUTES:
-        raise UsageError("all tries together last longer than a day", action="Lower --longest or --retries")
-    path = cell.path.resolve()
-    configs = [path.resolve().parent for path in cell.config_paths]
-    metrics = None if request.metrics is None else request.metrics.resolve()
-    return ScheduledRun(
+    hour, minute = time_of_day(daily)
+    path, metrics = cell.path.resolve(), metrics and metrics.resolve()
+    folders = (path.parent, *(config.resolve().parent for config in cell.config_paths))
+    run = ScheduledRun(
         cell=path,
         name=cell.settings.name,
         program=(sys.executable, "-m", "hexacell"),
-        mode=request.mode,
+        mode=mode,
         hour=hour,
         minute=minute,
-        longest_minutes=longest,
-        retry_minutes=request.retry_minutes,
+        longest_minutes=longest_minutes,
+        retry_minutes=retry_minutes,
         retries=retries,
+        writable=tuple(dict.fromkeys((*folders, *([] if metrics is None else [metrics.parent])))),
         metrics=metrics,
-        writable=tuple(
-            dict.fromkeys((path.parent, *configs, *([] if metrics is None else [metrics.parent])))
-        ),
+        on_failure=on_failure,
     )
+    _require_possible(cell, run)
+    _require_not_quiet(cell, hour, minute)
+    run = _within_hours(cell.settings.unattended, run)
+    if (run.retries + 1) * (run.longest_minutes + retry_minutes) > MOST_MINUTES:
+        raise UsageError("all tries together last longer than a day", action="Lower --longest or --retries")
+    return run
 
 
-def write_schedule(cell: Cell, request: ScheduleRequest, folder: Path | None) -> Schedule:
+def write_schedule(run: ScheduledRun, folder: Path | None) -> Schedule:
     """Write the units, into a folder or where this user's units are.
 
     Those that the cell had under an earlier name are removed: a cell has one schedule.
 
     Raises:
-        UsageError: as :func:`scheduled_run`, or another cell's units have this name.
+        UsageError: another cell's units have this name.
         FileError: they cannot be written.
     """
-    run = scheduled_run(cell, request)
     place, is_of_system = _place(folder)
     service, timer = place / f"{run.unit}.service", place / f"{run.unit}.timer"
     for path in (service, timer):
@@ -119,7 +114,7 @@ def write_schedule(cell: Cell, request: ScheduleRequest, folder: Path | None) ->
             groups.append(grp.getgrnam(group).gr_name)
     atomic_files.create_folder_durably(place)
     _remove_units([path for path in _units_of(run.cell, place) if path not in {service, timer}])
-    atomic_files.write_atomically(service, service_text(run, user, groups, request.on_failure).encode())
+    atomic_files.write_atomically(service, service_text(run, user, groups).encode())
     atomic_files.write_atomically(timer, timer_text(run).encode())
     return Schedule(run.unit, (service, timer), is_of_system, _verified((service, timer)))
 
@@ -155,7 +150,7 @@ def _remove_units(files: Sequence[Path]) -> None:
             path.unlink(missing_ok=True)
 
 
-def _require_possible(cell: Cell, request: ScheduleRequest) -> None:
+def _require_possible(cell: Cell, run: ScheduledRun) -> None:
     settings = cell.settings
     if settings.stations.placement == "by-hand":
         raise UsageError(
@@ -163,33 +158,31 @@ def _require_possible(cell: Cell, request: ScheduleRequest) -> None:
             subject=cell.path,
             action='Fix gauges at every point and write placement = "fixed" in [stations]',
         )
-    if not str(cell.path.resolve()).isprintable():
+    if not str(run.cell).isprintable():
         raise UsageError("a path with control characters cannot be scheduled", subject=cell.path)
-    for what, minutes in (("longest", request.longest_minutes), ("retry", request.retry_minutes)):
+    for what, minutes in (("longest", run.longest_minutes), ("retry", run.retry_minutes)):
         if not 1 <= minutes <= MOST_MINUTES:
             action = f"Give 1 to {MOST_MINUTES} minutes"
             raise UsageError(f"--{what} {minutes} is no duration", action=action)
-    if request.metrics is not None and not request.metrics.resolve().parent.is_dir():
+    if run.metrics is not None and not run.metrics.parent.is_dir():
+        raise UsageError("the folder of the metrics does not exist", subject=run.metrics, action="Make it")
+    if run.on_failure is not None and not _UNIT_NAME.fullmatch(run.on_failure):
         raise UsageError(
-            "the folder of the metrics does not exist", subject=request.metrics, action="Make it"
-        )
-    if request.on_failure is not None and not _UNIT_NAME.fullmatch(request.on_failure):
-        raise UsageError(
-            f"'{request.on_failure}' is no name of a unit", action="Write it as mail-me@%n.service"
+            f"'{run.on_failure}' is no name of a unit", action="Write it as mail-me@%n.service"
         )
 
 
-def _times(cell: Cell, request: ScheduleRequest) -> tuple[int, int]:
-    """After how many minutes a service is stopped, and how often it is tried again.
+def _within_hours(stated: UnattendedSettings, run: ScheduledRun) -> ScheduledRun:
+    """The run with the time and the tries that the hours of the cell leave for the service.
 
     What the cell file says of window and longest duration the run itself keeps: a service must leave it the
     time for that, and does not try again what was tried for a whole window.
     """
-    stated = cell.settings.unattended
-    needed = stated.window_minutes + (stated.longest_minutes or request.longest_minutes) + SPARE_MINUTES
-    has_hours = stated.window_minutes > 0.0 or stated.longest_minutes is not None
-    longest = max(request.longest_minutes, ceil(needed)) if has_hours else request.longest_minutes
-    return longest, 0 if stated.window_minutes > 0.0 else request.retries
+    if stated.window_minutes <= 0.0 and stated.longest_minutes is None:
+        return run
+    needed = stated.window_minutes + (stated.longest_minutes or run.longest_minutes) + SPARE_MINUTES
+    retries = 0 if stated.window_minutes > 0.0 else run.retries
+    return replace(run, longest_minutes=max(run.longest_minutes, ceil(needed)), retries=retries)
 
 
 def _require_not_quiet(cell: Cell, hour: int, minute: int) -> None:

@@ -46,7 +46,9 @@ def words_of(line: str) -> list[str]:
 
 
 def test_a_night_is_a_check_once_and_what_may_pass_is_tried_again() -> None:
-    found = settings_of(service_text(scheduled(), "robot", ["dialout"], "mail@%n.service"))
+    found = settings_of(
+        service_text(replace(scheduled(), on_failure="mail@%n.service"), "robot", ["dialout"])
+    )
     assert found["Type"] == "oneshot"
     assert words_of(found["ExecStart"])[3:] == [
         "run", "/cells/my-robot/cell.toml", "--unattended", "--mode", "check",
@@ -62,31 +64,31 @@ def test_a_night_is_a_check_once_and_what_may_pass_is_tried_again() -> None:
 
 def test_metrics_are_written_after_each_run_whatever_came_of_it() -> None:
     run = replace(scheduled(), metrics=Path("/metrics/a b.prom"))
-    found = settings_of(service_text(run, "robot", [], None))
+    found = settings_of(service_text(run, "robot", []))
     assert words_of(found["ExecStopPost"])[3:] == [
         "status", "/cells/my-robot/cell.toml", "--metrics", "/metrics/a b.prom",
     ]  # fmt: skip
     assert crontab_line(run).endswith("; " + shlex.join(run.words_afterwards))
-    assert "ExecStopPost" not in service_text(scheduled(), "robot", [], None)
+    assert "ExecStopPost" not in service_text(scheduled(), "robot", [])
 
 
 def test_a_cell_below_a_temporary_folder_is_not_hidden_from_its_run() -> None:
     for cell, private in (("/cells/a/c.toml", "yes"), ("/tmp/a/c.toml", "no"), ("/tmpa/c.toml", "yes")):
-        assert settings_of(service_text(scheduled(cell), "robot", [], None))["PrivateTmp"] == private
+        assert settings_of(service_text(scheduled(cell), "robot", []))["PrivateTmp"] == private
 
 
 def test_the_service_of_a_user_asks_for_nothing_that_only_root_may() -> None:
-    found = settings_of(service_text(scheduled(retries=0), None, ["dialout"], None))
+    found = settings_of(service_text(scheduled(retries=0), None, ["dialout"]))
     assert not {"User", "ProtectSystem", "CapabilityBoundingSet", "OnFailure", "Restart"} & set(found)
 
 
 @given(PRINTABLE, PRINTABLE)
 def test_any_path_is_one_argument(folder, file) -> None:
     run = scheduled(f"/{folder}/{file}")
-    found = settings_of(service_text(run, "robot", [], None))
+    found = settings_of(service_text(run, "robot", []))
     assert words_of(found["ExecStart"]) == list(run.words)
     assert found["WorkingDirectory"].replace("%%", "%") == str(run.cell.parent)
-    assert cell_of(service_text(run, None, [], None)) == cell_of(timer_text(run)) == run.cell
+    assert cell_of(service_text(run, None, [])) == cell_of(timer_text(run)) == run.cell
 
 
 @given(PRINTABLE)
@@ -115,8 +117,9 @@ def test_what_is_no_time_of_day_is_refused() -> None:
 @pytest.mark.parametrize("user", [None, "root"])
 def test_systemd_finds_nothing_wrong_with_them(tmp_path, user) -> None:
     run = scheduled(str(tmp_path / "a cell$ with %i" / "cell.toml"))
+    run = replace(run, on_failure="mail@%n.service")
     run.cell.parent.mkdir()
-    units = {"service": service_text(run, user, [], "mail@%n.service"), "timer": timer_text(run)}
+    units = {"service": service_text(run, user, []), "timer": timer_text(run)}
     for kind, text in units.items():
         (tmp_path / f"{run.unit}.{kind}").write_text(text)
     files = [str(tmp_path / f"{run.unit}.{kind}") for kind in units]

@@ -18,7 +18,15 @@ from hexacell.text.planning import quick_accuracy_text, quick_start_text, run_fo
 from hexacell.text.verdict import check_start_text, check_text, length_text, verification_text
 from procedures.journal.journal import Entry
 from procedures.run.keys import Phase, SetKey
-from procedures.run.questions import PLACED, Question, QuestionKind
+from procedures.run.questions import (
+    PLACED,
+    GaugePlacement,
+    PendingChange,
+    Question,
+    StepFailure,
+    UnreadyController,
+    WrittenResult,
+)
 from procedures.run.state import RunState, apply
 from procedures.steps import events
 from procedures.steps.move import Move
@@ -100,15 +108,15 @@ class TypedAnswer:
 def typed_answer(typed: str, question: Question, person: str) -> TypedAnswer | None:
     """The answer in a typed line, None if it is not one; ``person`` is who gives it."""
     line = typed.strip()
-    match question.kind:
-        case QuestionKind.PLACE_GAUGES:
+    match question.subject:
+        case GaugePlacement():
             return None if line else TypedAnswer(PLACED)
-        case QuestionKind.APPROVE_CHANGE | QuestionKind.KEEP_RESULT:
+        case PendingChange() | WrittenResult():
             answer, consent = line.lower(), question.consent.lower()
             if answer == consent or (consent == YES[0] and answer in YES):
                 return TypedAnswer(person)
             return TypedAnswer(None) if answer in NO else None
-        case QuestionKind.CHOOSE_RECOVERY | QuestionKind.START_UP:
+        case StepFailure() | UnreadyController():
             chosen = matching_choice(line, question)
             return None if chosen is None else TypedAnswer(chosen)
 
@@ -122,12 +130,12 @@ def matching_choice(typed: str, question: Question) -> str | None:
 
 def request_text(question: Question) -> str:
     """What to type."""
-    match question.kind:
-        case QuestionKind.PLACE_GAUGES:
+    match question.subject:
+        case GaugePlacement():
             return "Press Enter when they are in place, or type a to abort: "
-        case QuestionKind.CHOOSE_RECOVERY:
+        case StepFailure():
             return f"Type one of {', '.join(question.choices)}: "
-    if question.kind is QuestionKind.START_UP or question.consent == YES[0]:
+    if isinstance(question.subject, UnreadyController) or question.consent == YES[0]:
         return "Type yes or no: "
     return f"Type the cell's name, {question.consent}, to take the responsibility, or no: "
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Protocol
 
 from drivers.interfaces import StartupAction
@@ -21,16 +20,6 @@ PLACED = "placed"
 
 YES, NO = "yes", "no"
 """The answers to whether the controller may be made ready, or is."""
-
-
-class QuestionKind(StrEnum):
-    """What is asked."""
-
-    PLACE_GAUGES = "place"
-    APPROVE_CHANGE = "approve"
-    CHOOSE_RECOVERY = "decide"
-    KEEP_RESULT = "keep"
-    START_UP = "start up"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,15 +86,12 @@ class Question:
     """One question to a person. An answer is a text, or None.
 
     Attributes:
-        text: the question in plain words, for a user interface that has none of its own.
         choices: the answers that are accepted. If empty, any text is (the name of who approves) and
             None declines.
         default: the choice that an empty answer selects; None if a choice must be made.
         consent: what a person types to consent, where the answer is that person's name.
     """
 
-    kind: QuestionKind
-    text: str
     subject: GaugePlacement | PendingChange | StepFailure | WrittenResult | UnreadyController
     choices: tuple[str, ...] = ()
     default: str | None = None
@@ -114,25 +100,14 @@ class Question:
 
 def ask_placement(at: SetKey, pose: Pose) -> Question:
     """Ask for the gauges to be placed around the ball; answered when they are."""
-    return Question(
-        QuestionKind.PLACE_GAUGES,
-        f"Put the gauges around the ball at {at.station} ({pose}).",
-        GaugePlacement(at.point, pose, at.station),
-        choices=(PLACED,),
-        default=PLACED,
-    )
+    place = GaugePlacement(at.point, pose, at.station)
+    return Question(place, choices=(PLACED,), default=PLACED)
 
 
 def ask_mounting(mounting: int, seat: int, pose: Pose) -> Question:
     """Ask for the gauges to be mounted in a seat of the fixture; answered when they are."""
-    zero = "and zero them" if mounting == 1 else "without zeroing them"
-    return Question(
-        QuestionKind.PLACE_GAUGES,
-        f"Mount the gauges in seat {seat} of the fixture, around the ball ({pose}), {zero}.",
-        GaugePlacement(mounting, pose, f"mounting {mounting}", seat),
-        choices=(PLACED,),
-        default=PLACED,
-    )
+    place = GaugePlacement(mounting, pose, f"mounting {mounting}", seat)
+    return Question(place, choices=(PLACED,), default=PLACED)
 
 
 def ask_approval(
@@ -145,33 +120,20 @@ def ask_approval(
 ) -> Question:
     """Ask whether the config of a cell may be written; answered by the name of who approves."""
     is_grave = any(gate.needs_cell_name and not gate.passed for gate in gates)
-    return Question(
-        QuestionKind.APPROVE_CHANGE,
-        f"Write this into the controller's config?\n{diff}",
-        PendingChange(tuple(gates), diff, displacement, improvement),
-        consent=cell if is_grave else "yes",
-    )
+    change = PendingChange(tuple(gates), diff, displacement, improvement)
+    return Question(change, consent=cell if is_grave else "yes")
 
 
 def ask_acceptance(
     line: str, verification: Verification, displacement: TaskDisplacement | None = None
 ) -> Question:
     """Ask whether a result that did not pass stays; answered by the name of who keeps it."""
-    return Question(
-        QuestionKind.KEEP_RESULT,
-        f"{line}. Keep the new geometry?",
-        WrittenResult(line, verification, displacement),
-    )
+    return Question(WrittenResult(line, verification, displacement))
 
 
 def ask_recovery(problem: str, choices: Sequence[Action]) -> Question:
     """Ask how to continue after a failure; answered by the value of one of the actions."""
-    return Question(
-        QuestionKind.CHOOSE_RECOVERY,
-        problem,
-        StepFailure(problem),
-        choices=tuple(choice.value for choice in choices),
-    )
+    return Question(StepFailure(problem), tuple(choice.value for choice in choices))
 
 
 def ask_startup(needed: StartupAction, problem: str, *, is_theirs: bool) -> Question:
@@ -179,7 +141,7 @@ def ask_startup(needed: StartupAction, problem: str, *, is_theirs: bool) -> Ques
     request = _AT_THE_CONTROLLER if is_theirs else _STARTUP_REQUESTS[needed]
     is_permitted_by_file = not is_theirs and needed is not StartupAction.RESET_ESTOP
     subject = UnreadyController(problem, request, needed.value if is_permitted_by_file else None)
-    return Question(QuestionKind.START_UP, f"{problem}. {request}", subject, choices=(YES, NO))
+    return Question(subject, choices=(YES, NO))
 
 
 _AT_THE_CONTROLLER = (

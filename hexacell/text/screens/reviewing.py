@@ -15,7 +15,7 @@ from hexacell.text.verdict import VERDICT_MEANINGS
 from hexacell.verdict.decision import Verdict
 from hexacell.verdict.verification import DeviationStatistics
 from procedures.run.keys import Phase
-from procedures.run.questions import PendingChange, QuestionKind
+from procedures.run.questions import PendingChange, WrittenResult
 from procedures.run.state import RunState
 
 PROPOSAL_WAITS = "Its proposal can still be written: w asks for it, with the change."
@@ -80,7 +80,7 @@ def _approval(picture: RunPicture) -> str:
     if question is not None and isinstance(question.subject, PendingChange):
         refusal = approval_refusal(question.subject.gates)
         return refusal or "Waiting for you: w shows the change, to approve or to decline it."
-    if question is not None and question.kind is QuestionKind.KEEP_RESULT:
+    if question is not None and isinstance(question.subject, WrittenResult):
         return "Waiting for you: w asks whether the result is kept."
     if state.rolled_back:
         return "The old config was restored."

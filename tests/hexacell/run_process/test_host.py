@@ -30,7 +30,7 @@ from procedures.calibration.calibration import Mode
 from procedures.engine.command_loop import Status
 from procedures.engine.commands import Answer, CommandQueue, Resume
 from procedures.journal.journal import read_entries, read_journal
-from procedures.run.questions import QuestionKind
+from procedures.run.questions import GaugePlacement, StepFailure
 from procedures.steps import events
 from tests.hexacell.run_process.conftest import Client, Connected
 from tests.hexacell.services.conftest import maker
@@ -85,8 +85,8 @@ def hosted(path: Path, cell: Cell) -> Hosted:
     return run
 
 
-def asks(kind: QuestionKind) -> Callable[[HostMessage], bool]:
-    return lambda one: isinstance(one, QuestionOpened) and one.question.kind is kind
+def asks(kind: type) -> Callable[[HostMessage], bool]:
+    return lambda one: isinstance(one, QuestionOpened) and isinstance(one.question.subject, kind)
 
 
 def is_status(status: Status) -> Callable[[HostMessage], bool]:
@@ -103,15 +103,15 @@ def history_told(client: Client) -> list[events.Event]:
 
 async def answer_all(client: Client) -> None:
     """Put gauges in place and approve everything, to the end of the run."""
-    answers = {QuestionKind.PLACE_GAUGES: "placed", QuestionKind.CHOOSE_RECOVERY: "abort"}
+    answers = {GaugePlacement: "placed", StepFailure: "abort"}
     async for message in client._messages:
         client.told.append(message)
         if isinstance(message, QuestionOpened):
-            await client.connection.give(Answer(answers.get(message.question.kind, "a tester")))
+            await client.connection.give(Answer(answers.get(type(message.question.subject), "a tester")))
 
 
 async def place(client: Client) -> None:
-    await client.until(asks(QuestionKind.PLACE_GAUGES))
+    await client.until(asks(GaugePlacement))
     await client.connection.give(Answer("placed"))
 
 
@@ -134,7 +134,7 @@ async def test_a_whole_run_is_told_and_commanded_over_the_socket(hosted) -> None
 async def test_gauges_are_shown_while_they_are_placed(hosted) -> None:
     async with hosted() as run:
         client = await run.client()
-        await client.until(asks(QuestionKind.PLACE_GAUGES))
+        await client.until(asks(GaugePlacement))
         shown = await client.until(
             lambda one: isinstance(one, LiveSnapshot) and all(g.noise_mm is not None for g in one.gauges)
         )
@@ -151,9 +151,9 @@ async def test_gauges_are_shown_while_they_are_placed(hosted) -> None:
 async def test_a_second_client_is_told_the_same_and_the_open_question(hosted) -> None:
     async with hosted() as run:
         first = await run.client()
-        await first.until(asks(QuestionKind.PLACE_GAUGES))
+        await first.until(asks(GaugePlacement))
         second = await run.client()
-        await second.until(asks(QuestionKind.PLACE_GAUGES))
+        await second.until(asks(GaugePlacement))
         assert history_told(second) == history_told(first) == list(run.history)
         assert StatusChanged(status=Status.AWAITING_OPERATOR) in second.told
         await second.connection.take_control()

@@ -12,6 +12,7 @@ import pytest
 
 from hexacell.config.interface import ControllerLimits
 from hexacell.errors import FileError, UsageError
+from hexacell.kinematics.pose import Pose
 from hexacell.run_process.messages import (
     CursorMoved,
     EventRecorded,
@@ -27,6 +28,7 @@ from procedures.engine.command_loop import Status
 from procedures.engine.commands import Undo
 from procedures.journal.journal import Entry, encode
 from procedures.run.keys import Phase, SetKey
+from procedures.run.questions import GaugePlacement
 from procedures.steps import events
 from procedures.steps.place import Place
 from tests.procedures.fakes import ManualClock
@@ -129,9 +131,9 @@ async def test_questions_to_place_gauges_are_told(tmp_path) -> None:
     run = RecordedRun(recorded(tmp_path), 2)
     messages = run.messages()
     asked = await told(messages)
-    assert [one.question.text for one in asked if isinstance(one, QuestionOpened)] == [
-        "Put the gauges around the ball at point 1 (X100.000 Y-100.000 Z500.000 A0.000 B0.000 C0.000)."
-    ]
+    [placement] = [one.question.subject for one in asked if isinstance(one, QuestionOpened)]
+    assert isinstance(placement, GaugePlacement)
+    assert (placement.station, placement.pose) == ("point 1", Pose(100.0, -100.0, 500.0))
     assert StatusChanged(status=Status.AWAITING_OPERATOR) in asked
     run.step()
     answered = await told(messages)

@@ -98,7 +98,7 @@ async def test_an_emergency_stop_during_the_run_is_reset_at_the_controller_only(
     bench.controller.needed = [needed]
 
     async def ask(question: Any) -> str:
-        person.problems.append(question.text)
+        person.problems.append(question.subject.request)
         if len(person.problems) == 2:
             bench.controller.needed = [StartupAction.SWITCH_ON]  # it was reset there
         return "yes"

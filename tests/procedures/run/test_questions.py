@@ -15,7 +15,7 @@ from procedures.run.keys import Phase, SetKey
 from procedures.run.questions import (
     GaugePlacement,
     Question,
-    QuestionKind,
+    StepFailure,
     ask_approval,
     ask_placement,
     ask_recovery,
@@ -54,7 +54,7 @@ async def test_only_a_choice_of_the_question_is_an_answer() -> None:
     asking = asyncio.create_task(broker.ask(ask_recovery("It broke.", (Action.RETRY, Action.ABORT))))
     await asyncio.sleep(0)
     assert broker.open
-    assert (broker.open.kind, broker.open.text) == (QuestionKind.CHOOSE_RECOVERY, "It broke.")
+    assert broker.open.subject == StepFailure("It broke.")
     assert broker.open.choices == ("retry", "abort")
     assert not broker.answer("redo-set")
     assert not broker.answer(None), "a choice must be made"

@@ -170,13 +170,7 @@ class RowList(OptionList):
         )
 
 
-TABS = {
-    "cell": "Cell",
-    "preflight": "Preflight",
-    "measure": "Measure",
-    "review": "Review",
-    "history": "History",
-}
+TABS = ("cell", "preflight", "measure", "review", "history")
 
 
 class TopLine(Horizontal):
@@ -201,9 +195,9 @@ class TabLine(Static):
             Content.from_markup(
                 f"[@click=app.show('{name}')]{'[reverse b]>' if name == present else ' '}$text "
                 f"{'[/]' if name == present else ''}[/]",
-                text=f"{keys[name]} {title}",
+                text=f"{keys[name]} {name.capitalize()}",
             )
-            for name, title in TABS.items()
+            for name in TABS
         ]
         super().__init__(Content("  ").join(parts))
 

@@ -117,15 +117,9 @@ def typed_answer(typed: str, question: Question, person: str) -> TypedAnswer | N
                 return TypedAnswer(person)
             return TypedAnswer(None) if answer in NO else None
         case StepFailure() | UnreadyController():
-            chosen = matching_choice(line, question)
-            return None if chosen is None else TypedAnswer(chosen)
-
-
-def matching_choice(typed: str, question: Question) -> str | None:
-    """The only choice that begins with the line typed; a space may stand for a hyphen."""
-    answer = typed.strip().lower().replace(" ", "-")
-    found = [choice for choice in question.choices if answer and choice.startswith(answer)]
-    return found[0] if len(found) == 1 else None
+            answer = line.lower().replace(" ", "-")
+            found = [choice for choice in question.choices if answer and choice.startswith(answer)]
+            return TypedAnswer(found[0]) if len(found) == 1 else None
 
 
 def request_text(question: Question) -> str:

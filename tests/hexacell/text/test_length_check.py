@@ -83,6 +83,8 @@ def test_a_mounting_is_asked_for_with_what_not_to_do() -> None:
         (3, 1, "Mount them the same way round. Do not zero them"),
     ):
         text = question_text(ask_mounting(mounting, seat, Pose(150.0, 0.0, 500.0)))
-        assert f"Mount the gauges in seat {seat} of the fixture (mounting {mounting})\nThe robot holds" in text
+        assert (
+            f"Mount the gauges in seat {seat} of the fixture (mounting {mounting})\nThe robot holds" in text
+        )
         assert words in text
         assert ("and zero the gauges" in " ".join(text.split())) == (mounting == 1)

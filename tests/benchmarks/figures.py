@@ -201,18 +201,25 @@ def machine() -> str:
 
 
 def table(figures: Iterable[Figure], present: str) -> str:
-    """The figures that have a target as a page, and what did not come to its end."""
+    """The figures that have a target as a page, and what did not come to its end.
+
+    Cases of a benchmark that have the same target share a row, with their values in the same order.
+    """
     every = sorted(figures, key=lambda one: one.benchmark.partition("::")[0])
     listed = [one for one in every if one.met is not None or one.name == DID_NOT_END]
     never = [one for one in listed if one.met and one.target == str(NEVER)]
-    rows = ["| benchmark | figure | measured | target | |", "|---|---|---|---|---|"]
+    alike: dict[tuple[str, str, str, str], list[Figure]] = {}
     for one in listed:
-        if one in never:
-            continue
-        marks = [] if one.met else ["**missed**"]
-        marks += [] if one.commit.rstrip("+") == present.rstrip("+") else [f"at {one.commit}"]
-        case = one.benchmark.partition("[")[2].removesuffix("]")
-        cells = (f"{_module(one)} {case}", one.name, one.shown, one.target, ", ".join(marks))
+        if one not in never:
+            marks = [one.target] if one.target else []
+            marks += [] if one.met else ["**missed**"]
+            marks += [] if one.commit.rstrip("+") == present.rstrip("+") else [f"at {one.commit}"]
+            alike.setdefault((_module(one), _name(one), one.unit, ", ".join(marks)), []).append(one)
+    rows = ["| benchmark | figure | measured | target |", "|---|---|---|---|"]
+    for (module, name, unit, target), ones in alike.items():
+        benchmark = f"{module} {', '.join(dict.fromkeys(filter(None, map(_case, ones))))}"
+        values = ", ".join(dict.fromkeys(one.shown.removesuffix(unit).strip() for one in ones))
+        cells = (benchmark, name, f"{values} {unit}", target)
         rows.append(f"| {' | '.join(' '.join(cell.replace('|', '/').split()) for cell in cells)} |")
     missed = sum(not one.met for one in listed)
     counts = (
@@ -223,6 +230,16 @@ def table(figures: Iterable[Figure], present: str) -> str:
     sizes = "; ".join(sorted({f"{_module(one)} {one.samples}" for one in every if one.samples}))
     text = f"{HEAD}Commit {present}; {machines}. {counts}\n\nSamples: {sizes}.\n\n"
     return text + "\n".join(rows) + "\n"
+
+
+def _case(figure: Figure) -> str:
+    return figure.benchmark.partition("[")[2].removesuffix("]")
+
+
+def _name(figure: Figure) -> str:
+    """The name of a figure without the case that it begins with, so that cases share a row."""
+    case, _, name = figure.name.partition(": ")
+    return name if name and _case(figure).endswith(case) else figure.name
 
 
 def _module(figure: Figure) -> str:

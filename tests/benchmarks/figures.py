@@ -28,7 +28,8 @@ HEAD = """# Figures of the benchmarks
 
 Written by `make figures` from `build/figures.json`, which `make bench` writes in one pass over all
 benchmarks (`FULL=1` takes the samples of the targets, for hours). A figure that is not of the commit below
-names its own; those without a target are in that file only.
+names its own; those without a target are in that file only. Cases with one target share a row, where a
+value that several have is shown once.
 **missed** is a target that was not reached. [Measured](measured.md) has what else was found.
 
 """
@@ -203,7 +204,8 @@ def machine() -> str:
 def table(figures: Iterable[Figure], present: str) -> str:
     """The figures that have a target as a page, and what did not come to its end.
 
-    Cases of a benchmark that have the same target share a row, with their values in the same order.
+    Cases of a benchmark that have the same target share a row, with their different values in the order
+    in which they come; a value that several cases have is shown once.
     """
     every = sorted(figures, key=lambda one: one.benchmark.partition("::")[0])
     listed = [one for one in every if one.met is not None or one.name == DID_NOT_END]

@@ -341,12 +341,12 @@ def _texts(node: ast.expr, names: dict[str, list[str]]) -> list[str]:
 # The journal
 
 
-def journal(page: str) -> str:
-    """Every event of a journal and every part of one, with its fields.
+FIELDS = ROOT / "procedures" / "journal" / "fields.md"
 
-    ``page`` has a table of what the fields mean, by name, or by event and name where that differs.
-    """
-    meanings = field_meanings(page)
+
+def journal(_page: str = "") -> str:
+    """Every event of a journal and every part of one, with its fields."""
+    meanings = field_meanings()
     sections = []
     for heading, model in journal_models().items():
         rows = [
@@ -360,9 +360,10 @@ def journal(page: str) -> str:
     return "\n".join(sections)
 
 
-def field_meanings(page: str) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of each field in the table of a page."""
-    rows = re.findall(r"^\| `([\w .]+)` \| ([^|]*) \| ([^|]*) \|$", page, flags=re.MULTILINE)
+def field_meanings() -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each field, by name, or by event and name where that differs."""
+    text = FIELDS.read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([\w .]+)` \| ([^|]*) \| ([^|]*) \|$", text, flags=re.MULTILINE)
     return {name: (unit.strip(), meaning.strip()) for name, unit, meaning in rows}
 
 

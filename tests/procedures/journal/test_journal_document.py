@@ -1,4 +1,4 @@
-"""``docs/journal.md`` has the meaning, and for numbers the unit, of every field of the journal."""
+"""The docs have the meaning, and for numbers the unit, of every field of the journal."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from docs.generated import field_key, field_meanings, fields_of_model, journal_m
 from procedures.journal.journal import VERSION
 
 PAGE = (Path(__file__).parents[3] / "docs" / "journal.md").read_text(encoding="utf-8")
-MEANINGS = field_meanings(PAGE)
+MEANINGS = field_meanings()
 NUMBERS = re.compile(r"\bnumbers?\b")
 QUOTED = re.compile(r"`[^`]*`")
 

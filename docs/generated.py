@@ -10,15 +10,12 @@ import argparse
 import ast
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, is_dataclass
-from datetime import datetime
-from enum import Enum
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any
 
-from pydantic import BaseModel
+from pydantic import TypeAdapter
 
 from hexacell.cell.loader import schema
 from hexacell.cli.parser import make_parser
@@ -100,22 +97,19 @@ def _cell_sections() -> Iterator[str]:
     waiting = [("", document)]
     while waiting:
         name, section = waiting.pop(0)
-        keys, parts = [], []
+        rows, parts = [], []
         for key, value in section["properties"].items():
             part, is_list = _section_in(value, definitions)
             if part is None:
-                is_required = key in section.get("required", ())
-                keys.append((key, value, is_required))
+                words = _type(value, definitions).removesuffix(" or null")
+                default = _default(value, key in section.get("required", ()))
+                rows.append((f"`{key}`", words, default, escaped(value.get("description", ""))))
             else:
                 path = f"{name}.{key}" if name else key
                 parts.append((f"[{path}]" if is_list else path, part))
         yield f"## {f'`[{name}]`' if name else 'At the top of the file'}\n"
         yield f"{section.get('description', '')}\n"
-        if keys:
-            rows = [
-                (f"`{key}`", _type(value, definitions), _default(value, is_required), _meaning(value))
-                for key, value, is_required in keys
-            ]
+        if rows:
             yield table(["key", "value", "default", "meaning"], rows)
         waiting = parts + waiting
 
@@ -132,19 +126,23 @@ def _section_in(value: dict[str, Any], definitions: dict[str, Any]) -> tuple[dic
     return None, False
 
 
+_UNBOUNDED = 1e5
+
+
 def _type(value: dict[str, Any], definitions: dict[str, Any]) -> str:  # noqa: PLR0911 - a case a kind of type
+    """What a JSON Schema allows, in words."""
     if "$ref" in value:
-        return _type(definitions[value["$ref"].removeprefix("#/$defs/")], definitions)
-    if "anyOf" in value:
-        options = [one for one in value["anyOf"] if one.get("type") != "null"]
+        definition = definitions[value["$ref"].removeprefix("#/$defs/")]
+        return _heading_of(definition) if "properties" in definition else _type(definition, definitions)
+    if options := value.get("anyOf") or value.get("oneOf"):
         return " or ".join(dict.fromkeys(_type(one, definitions) for one in options))
-    if "enum" in value:
-        return " or ".join(f"`{one}`" for one in value["enum"])
-    if "const" in value:
-        return f"`{value['const']}`"
-    match value.get("type"):
+    if "const" in value or "enum" in value:
+        return " or ".join(f"`{one}`" for one in value.get("enum", [value.get("const")]))
+    match value.get("type", ""):
         case "array":
-            items = value.get("items") or next(iter(value.get("prefixItems", ({},))))
+            items = value.get("items") or next(iter(value.get("prefixItems", ())), None)
+            if items is None:
+                return "an empty list"
             count = value.get("minItems") if value.get("minItems") == value.get("maxItems") else None
             return f"{count or 'list of'} {'x ' if count else ''}{_type(items, definitions)}"
         case "number" | "integer" as kind:
@@ -153,15 +151,10 @@ def _type(value: dict[str, Any], definitions: dict[str, Any]) -> str:  # noqa: P
             if least is not None and most is not None and abs(most) < _UNBOUNDED:
                 return f"{words}, {least:g} to {most:g}"
             return f"{words} above 0" if least is not None and 0 < least < 1 else words
-        case "boolean":
-            return "true or false"
-        case "object":
-            return "table"
-        case _:
-            return "text"
-
-
-_UNBOUNDED = 1e5
+        case "string":
+            return "time" if value.get("format") == "date-time" else "text"
+        case kind:
+            return {"boolean": "true or false", "null": "null", "object": "named values"}.get(kind, "text")
 
 
 def _default(value: dict[str, Any], is_required: bool) -> str:
@@ -174,10 +167,6 @@ def _default(value: dict[str, Any], is_required: bool) -> str:
         return f"`{str(default).lower()}`"
     shown = f"{default:g}" if isinstance(default, float) else str(default).replace("'", '"')
     return f"`{shown}`"
-
-
-def _meaning(value: dict[str, Any]) -> str:
-    return escaped(value.get("description", ""))
 
 
 # Messages
@@ -268,16 +257,13 @@ def _within(scope: ast.AST) -> Iterator[ast.AST]:
 def _assigned_texts(scope: ast.AST) -> dict[str, list[str]]:
     names: dict[str, list[str]] = {}
     for node in _within(scope):
-        targets: list[ast.expr] = []
-        if isinstance(node, ast.Assign):
-            targets = node.targets
-        elif isinstance(node, ast.AnnAssign | ast.NamedExpr):
-            targets = [node.target]
-        for target in targets:
-            if not isinstance(node, ast.Assign | ast.AnnAssign | ast.NamedExpr) or node.value is None:
-                continue
-            if isinstance(target, ast.Name):
-                names.setdefault(target.id, []).extend(_texts(node.value, {}))
+        match node:
+            case (
+                ast.Assign(targets=[ast.Name(name)], value=value)
+                | ast.AnnAssign(target=ast.Name(name), value=ast.expr() as value)
+                | ast.NamedExpr(target=ast.Name(name), value=value)
+            ):
+                names.setdefault(name, []).extend(_texts(value, {}))
     return names
 
 
@@ -289,14 +275,9 @@ def _heading(name: str, bases: dict[str, list[str]]) -> str | None:
     """Under which heading a class or function that makes messages belongs; None for all others."""
     if name in {"SeveralErrors", "GuardTripped", "RobotNotStopped"}:
         return None
-    seen: list[str] = []
-    waiting = [name]
-    while waiting:
-        seen.append(one := waiting.pop(0))
-        if one in HEADINGS:
-            return HEADINGS[one]
-        waiting += [base for base in bases.get(one, []) if base not in seen]
-    return None
+    if name in HEADINGS:
+        return HEADINGS[name]
+    return next(filter(None, (_heading(base, bases) for base in bases.get(name, ()))), None)
 
 
 def _message(node: ast.Call, kind: str, names: dict[str, list[str]]) -> Iterator[Message]:
@@ -348,12 +329,12 @@ def journal(_page: str = "") -> str:
     """Every event of a journal and every part of one, with its fields."""
     meanings = field_meanings()
     sections = []
-    for heading, model in journal_models().items():
+    for heading, (description, fields) in journal_models().items():
         rows = [
             (f"`{name}`", words, *meanings[field_key(heading, name, meanings)])
-            for name, words in fields_of_model(model)
+            for name, words in fields.items()
         ]
-        text = re.sub(r":\w+:`[~.]*([^`]+)`", r"`\1`", " ".join((model.__doc__ or "").split()))
+        text = re.sub(r":\w+:`[~.]*([^`]+)`", r"`\1`", " ".join(description.split()))
         sections.append(f"### {heading}\n\n{text.replace('``', '`')}\n")
         if rows:
             sections.append(table(["field", "type", "unit", "meaning"], rows))
@@ -373,77 +354,27 @@ def field_key(heading: str, name: str, meanings: dict[str, tuple[str, str]]) -> 
     return own if own in meanings else name
 
 
-def journal_models() -> dict[str, type[Any]]:
-    """Every event by its kind, then every model within them by its kind or name."""
-    events = get_args(get_args(Event)[0])
-    found: dict[str, type[Any]] = {_heading_of(event): event for event in events}
-    for event in events:
-        found |= {_heading_of(part): part for part in _parts_of(event)}
+def journal_models() -> dict[str, tuple[str, dict[str, str]]]:
+    """Description and fields of every event by its kind, then of every model within them by kind or name.
+
+    The fields are names with their types; ``kind`` says which event it is and is left out.
+    """
+    document = TypeAdapter(Event).json_schema()
+    definitions = document["$defs"]
+    events = [one["$ref"].removeprefix("#/$defs/") for one in document["oneOf"]]
+    found = {}
+    for model in map(definitions.__getitem__, dict.fromkeys([*events, *definitions])):
+        if "properties" in model:
+            fields = {name: _type(one, definitions) for name, one in model["properties"].items()}
+            if "const" in model["properties"].get("kind", ()):
+                del fields["kind"]
+            found[_heading_of(model)] = model.get("description", ""), fields
     return found
 
 
-def fields_of_model(model: type[Any]) -> list[tuple[str, str]]:
-    """Name and type of every field; ``kind`` says which event it is and is left out."""
-    kind = _kind_of(model)
-    return [(name, _words(one)) for name, one in _annotations(model).items() if name != "kind" or not kind]
-
-
-def _annotations(model: type[Any]) -> dict[str, Any]:
-    if is_dataclass(model):
-        return get_type_hints(model)
-    return {name: field.annotation for name, field in model.model_fields.items()}
-
-
-def _is_model(annotation: object) -> bool:
-    return isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation))
-
-
-def _parts_of(model: type[Any]) -> Iterator[type[Any]]:
-    for annotation in _annotations(model).values():
-        for part in _models_in(annotation):
-            yield part
-            yield from _parts_of(part)
-
-
-def _models_in(annotation: Any) -> Iterator[type[Any]]:  # noqa: ANN401 - a type of any form
-    if _is_model(annotation):
-        yield annotation
-    for argument in get_args(annotation):
-        yield from _models_in(argument)
-
-
-def _kind_of(model: type[Any]) -> str | None:
-    """The word that says which event it is, where it is one of several."""
-    kind = None if is_dataclass(model) else model.model_fields.get("kind")
-    return kind.default if kind is not None and type(kind.default) is str else None
-
-
-def _heading_of(model: type[Any]) -> str:
-    return _kind_of(model) or model.__name__
-
-
-def _words(annotation: Any) -> str:  # noqa: ANN401, PLR0911 - a case a kind of type
-    """A type in words."""
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin is Annotated:
-        return _words(arguments[0])
-    if origin in {Union, UnionType}:
-        options = [_words(one) for one in arguments if one is not NoneType]
-        return " or ".join([*options, *(["null"] if NoneType in arguments else [])])
-    if origin is Literal:
-        return " or ".join(f"`{one}`" for one in arguments)
-    if origin is tuple and not arguments:
-        return "an empty list"
-    if origin is tuple and arguments[-1] is Ellipsis:
-        return f"list of {_words(arguments[0])}"
-    if origin is tuple:
-        return f"{len(arguments)} x {_words(arguments[0])}"
-    if isinstance(annotation, type) and issubclass(annotation, Enum):
-        return " or ".join(f"`{one.value}`" for one in annotation)
-    if _is_model(annotation):
-        return _heading_of(annotation)
-    plain = {float: "number", int: "whole number", str: "text", bool: "true or false", datetime: "time"}
-    return plain.get(annotation, "object")
+def _heading_of(model: dict[str, Any]) -> str:
+    """The word that says which event it is, where it is one of several; else the model's name."""
+    return model["properties"].get("kind", {}).get("const") or model["title"]
 
 
 # Faults of devices

@@ -161,10 +161,10 @@ def forward_kinematics(
             final = rows[converged]
             found[final] = contracts[final] & (assembly_mode(jacobian[converged]) == required[final])
             left = np.flatnonzero(~finished)
+            if not len(left):
+                break
             rows, poses, joints = rows[left], poses[left], joints[left]
             error, jacobian, geometry = error[left], jacobian[left], _of_rows(geometry, left)
-        if not len(rows):
-            break
         step, sizes = _damped_step(jacobian, error)
         if largest_contraction < np.inf and number < 2:
             # The second step is compared with the first one, which was not to be shortened.

@@ -71,9 +71,12 @@ class Legs:
 
     def smallest_distance(self) -> Array:
         """Between any two legs (n,), mm: of the lines in their middles."""
-        ends = self.base_joints, self.platform_joints
-        first, second = ([joints[:, PAIRS[:, side]] for joints in ends] for side in (0, 1))
-        smallest: Array = segment_distances(*first, *second).min(axis=-1)
+        # Coordinates come first: sums over three numbers at the end of an array take several times as long.
+        start = np.ascontiguousarray(self.base_joints.T)
+        end = np.ascontiguousarray(self.platform_joints.T)
+        first, second = PAIRS.T
+        distances = segment_distances(start[:, first], end[:, first], start[:, second], end[:, second])
+        smallest: Array = distances.min(axis=0)
         return smallest
 
 
@@ -81,27 +84,38 @@ def segment_distances(start: Array, end: Array, other_start: Array, other_end: A
     """The smallest distances of segments from others.
 
     Args:
-        start: one end of each segment (..., 3), mm.
+        start: one end of each segment (3, ...), mm.
         end: its other end.
-        other_start: one end of each other segment (..., 3), mm.
+        other_start: one end of each other segment (3, ...), mm.
         other_end: its other end.
 
     Returns:
         Distances (...,), mm.
     """
     along, other, between = end - start, other_end - other_start, start - other_start
-    a, e, b = _dot(along, along), _dot(other, other), _dot(along, other)
-    c, f = _dot(along, between), _dot(other, between)
+    a, e, b = _product(along, along), _product(other, other), _product(along, other)
+    c, f = _product(along, between), _product(other, between)
     determinant = a * e - b * b
     is_parallel = determinant <= PARALLEL * a * e
     first = np.where(is_parallel, 0.0, (b * f - c * e) / np.where(is_parallel, 1.0, determinant))
-    first = np.clip(first, 0.0, 1.0)
-    second = np.clip((b * first + f) / e, 0.0, 1.0)
+    first = _clipped(first, 0.0, 1.0)
+    second = _clipped((b * first + f) / e, 0.0, 1.0)
     # The nearest point of the first segment to that of the other one, which may be its end.
-    first = np.clip((b * second - c) / a, 0.0, 1.0)
-    apart = between + first[..., None] * along - second[..., None] * other
-    distances: Array = np.linalg.norm(apart, axis=-1)
+    first = _clipped((b * second - c) / a, 0.0, 1.0)
+    apart = between + first * along - second * other
+    distances: Array = np.sqrt(_product(apart, apart))
     return distances
+
+
+def _product(one: Array, other: Array) -> Array:
+    """Scalar products of vectors (3, ...)."""
+    product: Array = one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+    return product
+
+
+def _clipped(values: Array, least: float, most: float) -> Array:
+    """As np.clip, which takes several times as long for a few numbers."""
+    return np.minimum(np.maximum(values, least), most)
 
 
 def angles_between(vectors: Array, axes: Array) -> Array:
@@ -114,7 +128,7 @@ def angles_between(vectors: Array, axes: Array) -> Array:
     Returns:
         Angles (...,), rad, from 0 to pi.
     """
-    return np.arccos(np.clip(_dot(vectors, axes), -1.0, 1.0))
+    return np.arccos(_clipped(_dot(vectors, axes), -1.0, 1.0))
 
 
 def _dot(one: Array, other: Array) -> Array:

@@ -237,6 +237,8 @@ def _inverse_has_margin(inverse: Array, margin: float) -> Mask:
     bound = np.linalg.norm(inverse, axis=(-2, -1)) * margin
     has_margin: Mask = bound <= 1.0
     undecided = np.flatnonzero(~has_margin & (bound <= np.sqrt(6.0)))
+    if not len(undecided):
+        return has_margin
     gramian = inverse[undecided] @ np.swapaxes(inverse[undecided], -1, -2)
     bound = np.linalg.norm(gramian @ gramian, axis=(-2, -1)) ** 0.25 * margin
     has_margin[undecided] = bound <= 1.0

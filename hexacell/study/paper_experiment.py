@@ -12,7 +12,7 @@ does not say its orientations: here each of three angles is drawn between -20 an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,7 @@ from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot.model import Robot
 from hexacell.study.data_sets import DataSet, unlimited_travel
-from hexacell.study.paper_simulation import NOISE_MM, SEED, bundled_robot
+from hexacell.study.paper_simulation import NOISE_MM, SEED, bundled_robot, median
 from hexacell.study.reference_solvers import gauss_newton
 from hexacell.study.tasks import Study
 
@@ -141,7 +141,8 @@ class Reduction:
     @classmethod
     def of(cls, found: Sequence[Differences]) -> Reduction:
         """The medians of the draws' differences."""
-        return cls(*(_median(getattr(one, name) for one in found) for name in ("before", "paper", "ours")))
+        of_draws = ([getattr(one, name) for one in found] for name in ("before", "paper", "ours"))
+        return cls(*(median(float(np.mean(one)) for one in draws if one) for draws in of_draws))
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,11 +187,6 @@ def experiment_summary(
             )
         )
     return ExperimentStudy(tuple(rows), outcomes[Experiment(PAPER_REPEATABILITY_MM, 0).key])
-
-
-def _median(differences: Iterable[Sequence[float]]) -> float:
-    means = [float(np.mean(one)) for one in differences if one]
-    return float(np.median(means)) if means else float("nan")
 
 
 EXPERIMENT = Study(

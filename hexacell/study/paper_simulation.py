@@ -212,10 +212,10 @@ class MedianErrors:
             len(errors),
             len(settled),
             sum(not one.ours for one in errors),
-            _median(one.paper_mm for one in settled),
-            _median(one.ours_mm for one in settled if one.ours),
-            _median(one.ours_mm for one in errors if one.ours),
-            tuple(_median(_after(one, steps) for one in errors) for steps in STEPS_SHOWN),
+            median(one.paper_mm for one in settled),
+            median(one.ours_mm for one in settled if one.ours),
+            median(one.ours_mm for one in errors if one.ours),
+            tuple(median(_after(one, steps) for one in errors) for steps in STEPS_SHOWN),
         )
 
 
@@ -275,8 +275,8 @@ def summary(trials: Mapping[str, Trial], outcomes: Mapping[str, Outcome]) -> Pap
         tuple(_set(one, found[one]) for one in _sweep_kinds()),
         {
             symbol: (
-                _median(one.paper[symbol] for one in most if one.is_settled),
-                _median(one.ours[symbol] for one in most if one.ours),
+                median(one.paper[symbol] for one in most if one.is_settled),
+                median(one.ours[symbol] for one in most if one.ours),
             )
             for symbol in PAPER_TABLE_2_MM
         },
@@ -296,7 +296,7 @@ def _set(kind: Kind, outcomes: Sequence[Outcome]) -> PlannedSet:
         *kind,
         MedianErrors.of([one.exact for one in outcomes]),
         MedianErrors.of([one.noisy for one in outcomes]),
-        _median(one.deviation_mm for one in outcomes),
+        median(one.deviation_mm for one in outcomes),
     )
 
 
@@ -307,7 +307,8 @@ def _after(errors: Errors, steps: int) -> float:
     return errors.paper_mm
 
 
-def _median(values: Iterable[float]) -> float:
+def median(values: Iterable[float]) -> float:
+    """The median of some values; NaN where there are none."""
     found = list(values)
     return float(np.median(found)) if found else float("nan")
 

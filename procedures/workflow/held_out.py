@@ -17,6 +17,7 @@ from procedures.steps.locate import Locate
 from procedures.steps.move import Move
 from procedures.steps.registry import Step
 from procedures.workflow.sets import SetSteps, TravelError, reference_move, reference_pose, require_zero
+from procedures.workflow.trial import TrialSteps
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +26,7 @@ class HeldOutSteps:
 
     point_count: int
     sets: SetSteps
+    trials: TrialSteps
 
     def next_step(self, state: RunState, phase: Phase) -> Step | None:
         """The next step of the first set that is not closed; None if all are."""
@@ -65,7 +67,7 @@ class HeldOutSteps:
             raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
         if measured.reference_unverified:
             return self.sets.at_or_to_reference(state, key, self._ball(state, key))
-        if measured.samples and (trial := self.sets.trial(state, key, self._ball(state, key))):
+        if measured.samples and (trial := self.trials.next_step(state, key, self._ball(state, key))):
             return trial
         if (orientation := self._next_orientation(state, key)) is not None:
             here = self.sets.at_pose(state, key, orientation)

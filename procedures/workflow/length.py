@@ -21,6 +21,7 @@ from procedures.steps.locate import Locate
 from procedures.steps.move import Move
 from procedures.steps.registry import Step
 from procedures.workflow.sets import NoSafePath, SetSteps, TravelError, reference_pose
+from procedures.workflow.trial import TrialSteps
 
 BESIDE_MM = np.array([1.0, -0.8, 0.6])
 """From the middle of a seat to the record beside it: no two gauges see the same."""
@@ -32,6 +33,7 @@ class LengthSteps:
 
     fixture: LengthCheckSettings
     sets: SetSteps
+    trials: TrialSteps
 
     def next_step(self, state: RunState) -> Step | None:
         """The next step of the first mounting that is not closed; None if all are."""
@@ -64,7 +66,7 @@ class LengthSteps:
                 "lies; then mount the gauges there again",
             )
         if not measured.reference_unverified and (
-            trial := self.sets.trial(state, key, self._zero(state, key))
+            trial := self.trials.next_step(state, key, self._zero(state, key))
         ):
             return trial
         orientation = measured.next_orientation

@@ -30,6 +30,7 @@ from procedures.workflow.held_out import HeldOutSteps
 from procedures.workflow.length import LengthSteps
 from procedures.workflow.points import IdentificationSteps, NoiseSteps
 from procedures.workflow.sets import SetSteps
+from procedures.workflow.trial import TrialSteps
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +72,12 @@ class Measuring:
     """The stages that measure, for the geometries that command the robot of a plan."""
 
     def __init__(self, plan: Plan) -> None:
-        settings = plan.settings
-        sets = SetSteps(plan.robot, settings.stations.trial_mm)
-        self.points = IdentificationSteps(plan, sets, NoiseSteps(plan, sets))
-        self.held_out = HeldOutSteps(len(settings.verification.points), sets)
+        sets, settings = SetSteps(plan.robot), plan.settings
+        trials = TrialSteps(settings.stations.trial_mm, sets)
+        self.points = IdentificationSteps(plan, sets, NoiseSteps(plan, sets), trials)
+        self.held_out = HeldOutSteps(len(settings.verification.points), sets, trials)
         fixture = settings.length_check
-        self.length = None if fixture is None else LengthSteps(fixture, sets)
+        self.length = None if fixture is None else LengthSteps(fixture, sets, trials)
 
     def length_step(self, state: RunState) -> BaseStep | None:
         """The next step of the length check; None when it is done."""

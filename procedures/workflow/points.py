@@ -30,6 +30,7 @@ from procedures.steps.registry import Step
 from procedures.steps.repeat import Repeat
 from procedures.steps.standstill import Standstill
 from procedures.workflow.sets import Known, SetSteps, beside, move_to_chosen, reference_pose, require_zero
+from procedures.workflow.trial import TrialSteps
 
 DISTANCE_SHARE = 0.3
 """How far the robot leaves the reference, level as it is, as a share of the gauges' travel."""
@@ -106,6 +107,7 @@ class IdentificationSteps:
     plan: Plan
     sets: SetSteps
     noise: NoiseSteps
+    trials: TrialSteps
 
     def next_step(self, state: RunState) -> Step | None:
         """The next step; None if nothing more is to be measured."""
@@ -134,7 +136,7 @@ class IdentificationSteps:
         require_zero(state, key)
         if measured.reference_unverified:
             return self.sets.at_or_to_reference(state, key, self._ball(state, key))
-        if trial := self.sets.trial(state, key, self._ball(state, key)):
+        if trial := self.trials.next_step(state, key, self._ball(state, key)):
             return trial
         measuring_noise = self.noise.next_step(state, key, self._known(state, key))
         # With several records to be taken again, one is, before the robot moves to the next of them.

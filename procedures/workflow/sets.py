@@ -1,10 +1,4 @@
-"""The steps within a set of poses and the moves between them: along checked straight lines, or none.
-
-Whenever its gauges were placed or connected again they are tried: from a recorded reference the ball is
-moved a millimetre along each axis of the base, and the gauges are read. Back at the reference it is judged
-whether each of them follows the ball on its axis, with its sign and scale
-(:mod:`hexacell.noise.gauge_trial`). Only then is anything else measured.
-"""
+"""The steps within a set of poses and the moves between them: along checked straight lines, or none."""
 
 from __future__ import annotations
 
@@ -30,11 +24,9 @@ from procedures.run.state import RunState
 from procedures.steps.close import CloseSet
 from procedures.steps.move import Expectation, Move
 from procedures.steps.place import Place
-from procedures.steps.probe import Probe
 from procedures.steps.registry import Step
 from procedures.steps.revisit import Revisit
 from procedures.steps.sample import Sample
-from procedures.steps.try_gauges import Try
 
 Known = tuple[RobotBelief, GaugeZero]
 """What is known of the robot, and where the ball was when a set's gauges were zeroed."""
@@ -106,7 +98,9 @@ class RunPathPlanner:
             action="Bring it near that pose with its own controller, then continue",
         )
 
-    def back(self, state: RunState, key: SetKey, known: Known | None) -> Move | None:
+    def back(
+        self, state: RunState, key: SetKey, known: tuple[RobotBelief, GaugeZero] | None
+    ) -> Move | None:
         """The next move back to a set's reference by the path on which the robot came; None if it did not.
 
         Where something is ``known`` the path is shortened (:func:`hexacell.motion.paths.next_return_move`).
@@ -153,10 +147,9 @@ def _is_inside(belief: RobotBelief, command: PoseBatch, reference: Array, share:
 
 @dataclass(frozen=True, eq=False)
 class SetSteps:
-    """Steps of the sets of one robot; ``trial_mm`` is the length of a move of a trial, 0 for no trial."""
+    """Steps of the sets of one robot."""
 
     robot: Robot
-    trial_mm: float
 
     @cached_property
     def paths(self) -> RunPathPlanner:
@@ -206,43 +199,6 @@ class SetSteps:
         """The next move to the reference of a set; raises ``HexacellError`` if no safe path leads there."""
         back = self.paths.back(state, key, known)
         return back or self.to_reference(state, key, None if known is None else known[1].reference)
-
-    def trial(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
-        """The next step of a trial; None if none is due, ``LimitError`` where no small move is possible.
-
-        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
-        """
-        measured = state.set(key)
-        if not self.trial_mm or measured.tried or not measured.samples:
-            return None
-        axis = len(measured.probes)
-        if axis == 3:
-            is_back = state.at_pose == (key, 1)
-            return Try(at=key) if is_back else self.to_reference(state, key, ball)
-        moved = self._moved(state, key, axis)
-        pose = beside(reference_pose(state, key), moved)
-        if state.off_plan and state.target == pose:
-            return Probe(at=key, moved_mm=moved)
-        probed = [beside(reference_pose(state, key), probe.moved_mm) for probe in measured.probes[-1:]]
-        is_beside = state.off_plan and not state.position_unknown and state.target in probed
-        if state.at_pose != (key, 1) and not is_beside:
-            return self.to_reference(state, key, ball)
-        return Move(at=key, orientation=0, pose=pose)
-
-    def _moved(self, state: RunState, key: SetKey, axis: int) -> ThreeNumbers:
-        """The move along an axis, to the side on which there is room."""
-        belief = self.robot.belief().zeroed_at(state.zero_shown(key))  # the robot as it was drawn
-        reference = reference_pose(state, key)
-        ball = ball_position(belief, self.robot.from_commands([Pose(*reference)]))
-        for side in (1.0, -1.0):
-            x, y, z = (side * self.trial_mm * np.eye(3)[axis]).tolist()
-            if self.is_clear_both_ways(belief, reference, beside(reference, (x, y, z)), ball):
-                return (x, y, z)
-        raise LimitError(
-            f"{key}: the gauges cannot be tried, because the robot cannot move by {self.trial_mm:g} mm "
-            f"along {'xyz'[axis]} there within its limits",
-            action="Choose another point, or a smaller trial_mm in [stations]",
-        )
 
 
 def beside(reference: SixNumbers, moved: ThreeNumbers) -> SixNumbers:

@@ -52,3 +52,10 @@ def student_limit(freedom: float, exceeded: float) -> float:
     from scipy.special import stdtrit  # noqa: PLC0415
 
     return -float(stdtrit(freedom, exceeded))
+
+
+def variance_ratio_exceedance(above: float, below: float, value: float) -> float:
+    """Probability that a ratio of two mean squares, with so many degrees of freedom each, is larger."""
+    from scipy.special import fdtrc  # noqa: PLC0415
+
+    return float(fdtrc(above, below, value))

@@ -193,6 +193,7 @@ class RobotPhysics:
         self._motion = Motion(joints[[0, 0]], -1e9, 0.0)  # standstill
         self._joints = joints[0]
         self._rows_passed = 0
+        self._unseen = np.zeros(6), np.zeros(6)
         first = continue_solution(
             mechanism, self._truth, joints, start=start, start_geometry=commanding.geometry
         )
@@ -216,6 +217,7 @@ class RobotPhysics:
             scatter = motion.repeatability * self._random.standard_normal(6)
             actual = path / self._shown_per_mm + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
             actual[0] = self._motion.joints(self._update())
+            self._unseen = self._unseen[1], motion.unseen_repeatability * self._random.standard_normal(6)
             stated_s = 0.0 if duration_s is None else duration_s + RAMP_S
             duration = max(motion.minimum_s, distance / motion.speed, stated_s)
             self._motion, self._rows_passed = Motion(actual, self._clock.now(), duration), 0
@@ -239,7 +241,8 @@ class RobotPhysics:
         """The joint variables measured by the encoders (6,), mm."""
         with self._lock:
             flicker = self._settings.encoders.flicker * self._random.standard_normal(6)
-            shown = self._shown_per_mm * self._motion.joints(self._clock.now())
+            now = self._clock.now()
+            shown = self._shown_per_mm * self._motion.joints(now)
             measured: Array = shown + self._encoder_noise + flicker
             return measured
 
@@ -267,8 +270,14 @@ class RobotPhysics:
         while self._rows_passed + 1 <= position:
             self._rows_passed += 1
             self._move_platform(self._motion.path[self._rows_passed])
-        self._move_platform(self._motion.joints(now))
+        self._move_platform(self._motion.joints(now) + self._beside_encoders(now))
         return now
+
+    def _beside_encoders(self, now: float) -> Array:
+        """How far the joints (6,) are from where their encoders see them; it changes with a motion."""
+        before, after = self._unseen
+        share = self._motion.fraction(now)
+        return np.asarray((1.0 - share) * before + share * after)
 
     def _move_platform(self, joints: Array) -> None:
         if np.array_equal(joints, self._joints):

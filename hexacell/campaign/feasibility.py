@@ -13,8 +13,6 @@ from hexacell.campaign.planner import Plan
 from hexacell.design.predicted_records import GaugeZero, estimate_gauge_zero
 from hexacell.errors import HexacellError, LimitError, ReachError, UsageError
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.identified_zeros import ParameterChoice, zeros_by_noise
-from hexacell.identification.solver.result import UNDETERMINED_RATIO
 from hexacell.kinematics.pose import Pose
 from hexacell.motion.path_check import is_clear
 from hexacell.robot.pose_limits import broken_limits
@@ -23,11 +21,9 @@ from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 LARGEST_SHARE = 0.5
 """Share of the robots within the tolerances that may be unable to take the reference of a point."""
 
-NAMES_SHOWN = 4
-
-UNDETERMINED_SHARE = 0.25
-"""Share of all parameters: if fewer stay as uncertain as drawn, the result reports them; if more, the plan
-is refused."""
+LARGEST_SHARE_UNKNOWN = 0.5
+"""Share of the error at the worst task pose that records may leave of what the drawing does; with more the
+robot would hardly be better."""
 
 
 def reach_failures(plan: Plan) -> Iterator[HexacellError]:
@@ -105,7 +101,7 @@ def optimisation_failures(plan: Plan) -> Iterator[list[HexacellError]]:
         any_failure = any_failure or bool(found)
         yield found
     if not any_failure:
-        yield [*_undetermined_parameters(plan)]
+        yield [*_no_better(plan)]
 
 
 def measuring_failures(plan: Plan) -> Iterator[list[HexacellError]]:
@@ -204,21 +200,22 @@ def _expected_zero(plan: Plan, belief: RobotBelief, point: int) -> GaugeZero:
     return estimate_gauge_zero(belief, actual.poses, actual.joints, np.zeros((1, 3)))
 
 
-def _undetermined_parameters(plan: Plan) -> Iterator[HexacellError]:
-    """The failure that even well spread poses leave many parameters as uncertain as drawn."""
-    names = plan.robot.mechanism.convention.free_names
-    before, predicted = plan.robot.prior, plan.predicted_belief().covariance
-    after = np.sqrt(np.diag(predicted))
-    if plan.robot.identifies is not ParameterChoice.ALL:
-        information = np.linalg.inv(predicted) - before.precision
-        after = zeros_by_noise(plan.robot.mechanism, plan.robot.controller, information)
-    rows = np.flatnonzero(after > UNDETERMINED_RATIO * before.sigma)
-    if len(rows) > UNDETERMINED_SHARE * len(names):
-        shown = ", ".join(names[row] for row in rows[:NAMES_SHOWN])
-        more = ", ..." if len(rows) > NAMES_SHOWN else ""
-        yield UsageError(
-            f"points, orientations and limits leave {len(rows)} of {len(names)} parameters undetermined "
-            f"({shown}{more})",
-            subject="[identification]",
-            action="Allow more tilt, more orientations, or points farther apart",
-        )
+def _no_better(plan: Plan) -> Iterator[HexacellError]:
+    """The failure that even well spread poses tell hardly more of the task poses than the drawing does.
+
+    Parameters that hardly move a task pose may stay as the drawing has them; U contains that.
+    """
+    start = CampaignState()
+    now = plan.forecaster.worst_error(start, plan.robot.belief())
+    end = plan.forecaster.worst_error(start, plan.predicted_belief())
+    limit = plan.settings.acceptance.position_mm
+    if now is None or end is None or end <= LARGEST_SHARE_UNKNOWN * now or 2.0 * end <= limit:
+        return
+    records = sum(plan.forecaster.planned(start).values())
+    yield UsageError(
+        f"{records} records leave an error of {end:.3g} mm at the worst task pose, one sigma, where the "
+        f"drawing with its tolerances leaves {now:.3g}: the robot would hardly be better",
+        subject="[identification]",
+        action="Allow more tilt, more orientations, or points farther apart; gauges and encoders of "
+        "another noise need other figures in [noise]",
+    )

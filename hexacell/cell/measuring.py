@@ -204,6 +204,12 @@ class NoiseSettings(Section):
     gauges_mm: tuple[Positive, Positive, Positive] | None = key(
         None, "noise of the gauges x, y and z, mm, 1 sigma, where they differ; takes the place of gauge_mm"
     )
+    stops: NotNegative = key(
+        0.0,
+        "where a joint stops beside its command, as its encoder shows it, 1 sigma; what a run measures "
+        "takes its place where that is more",
+        alias="stops_mm",
+    )
     figures: Literal["stated", "measured"] = key(
         "stated",
         "what these figures are: stated, they hold unless a run measures significantly more; measured, "
@@ -251,6 +257,11 @@ class GuardSettings(Section):
     )
     following: Positive = key(
         1.0, "largest difference of a joint from its commanded position", alias="following_mm"
+    )
+    limits: Literal["measured", "fixed"] = key(
+        "measured",
+        "whether following, acceptance.drift_mm and recovery.agreement_mm widen for a machine that was "
+        "measured to repeat less well; fixed: they never do",
     )
     free_disk_mb: float = key(
         50.0, "least free space for the run folder, MB", ge=0, le=1e12, allow_inf_nan=False

@@ -87,7 +87,16 @@ class SimulatedMotion(Section):
     minimum_s: NotNegative = key(0.3, "shortest duration of a move, s")
     ringing_mm: NotNegative = key(0.2, "amplitude of the ball's oscillation on arrival, mm")
     ringing_s: Positive = key(0.15, "time constant of that oscillation's decay, s")
-    repeatability: NotNegative = key(0.0, "scatter of each joint's stop, 1 sigma", alias="repeatability_mm")
+    repeatability: NotNegative = key(
+        0.0,
+        "scatter of each joint's stop about its command, which its encoder sees",
+        alias="repeatability_mm",
+    )
+    unseen_repeatability: NotNegative = key(
+        0.0,
+        "scatter of each joint at each stop beside what its encoder shows, 1 sigma",
+        alias="unseen_repeatability_mm",
+    )
 
 
 class SoftLimits(Section):

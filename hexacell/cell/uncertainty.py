@@ -58,6 +58,10 @@ SIZES_OF_GRADES: Mapping[Grade, Mapping[str, float]] = {
 """Where the sizes of a grade differ from the defaults of the keys, which are those of ``precision``."""
 
 
+STOPS = "noise.stops"
+"""The size of this section's effects that stands in another: where joints stop beside their commands."""
+
+
 def repeatability_key(unit: JointUnit) -> str:
     """The key of where a joint stops beside what its encoder shows."""
     return f"stop_repeatability_{unit.thousandth}"
@@ -109,7 +113,7 @@ class CommonUncertaintySettings(Section):
 
     @model_validator(mode="after")
     def _sources_belong_to_sizes(self) -> Self:
-        known = set(type(self).model_fields) - {"grade", "sources", "stop_repeatability_acts"}
+        known = {*type(self).model_fields, STOPS} - {"grade", "sources", "stop_repeatability_acts"}
         if unknown := sorted(set(self.sources) - known):
             raise broken_rule(
                 f"sources has {unknown[0]}, which is no size of this section", "Correct the key"

@@ -30,7 +30,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.design.candidates import ReachableTargets
-from hexacell.design.predicted_records import GaugeZero, PredictedRecords, predict_records
+from hexacell.design.predicted_records import (
+    CHANCE_SIGMAS,
+    TRAVEL_SHARE,
+    GaugeZero,
+    PredictedRecords,
+    predict_records,
+)
 from hexacell.identification.belief import SPARE_ANGLE, SPARE_SIGMAS, UNCERTAIN_SIGMA, RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.geometry import GeometryBatch
@@ -120,10 +126,12 @@ class TravelConstraint:
         sigma = belief.orientation_sigma_from(sensitivity)
         if sigma > UNCERTAIN_SIGMA:
             return scenario.nearly_all_hold()
-        robots = scenario.sampled(_standard_normal(SAMPLES, len(belief.free)), np.arange(len(targets)))
+        every = np.arange(len(targets))
+        robots = scenario.sampled(_standard_normal(SAMPLES, len(belief.free)), every)
         if len(robots) < FEWEST_SAMPLES:
             return np.zeros(len(targets), dtype=bool)
-        holds = _all_within(robots, belief.limits, 1.0 / (1.0 + sigma / HALF_TRAVEL_SIGMA))
+        share = 1.0 / (1.0 + sigma / HALF_TRAVEL_SIGMA)
+        holds = _all_within(robots, belief.limits, scenario.stop_spread(every), share)
         holds[holds] = self._margins_suffice(targets[holds])
         return holds
 
@@ -175,6 +183,11 @@ class _Scenario:
     poses: PoseBatch
     sensitivity: FreeSensitivity
 
+    def stop_spread(self, targets: NDArray[np.intp]) -> Array:
+        """How far the ball may stop beside some of the targets (n, 3), mm, along the gauges."""
+        covariance = self.belief.noise.stop_covariance(self.sensitivity.joints[1 + targets, :3])
+        return CHANCE_SIGMAS * self.belief.limits.sigma_along_gauges(covariance)
+
     def nearly_all_hold(self) -> Mask:
         """At which targets (n,) the constraint holds on all of many sampled robots but the worst.
 
@@ -188,7 +201,8 @@ class _Scenario:
                 break
             more = self.sampled(variates, possible)
             robots = more if robots is None else _SampledRobots.joined([robots, more])
-            within = _nearly_all_within(robots, self.belief.limits, UNCERTAIN_SHARE)
+            spread = self.stop_spread(possible)
+            within = _nearly_all_within(robots, self.belief.limits, spread, UNCERTAIN_SHARE)
             possible, robots = possible[within], robots[:, within]
         holds = np.zeros(len(self.joints) - 1, dtype=bool)
         holds[possible] = robots is not None and len(robots) >= FEWEST_SAMPLES
@@ -236,23 +250,31 @@ class _Scenario:
         )
 
 
-def _nearly_all_within(sampled: _SampledRobots, limits: Limits, share: float) -> Mask:
+def _nearly_all_within(sampled: _SampledRobots, limits: Limits, spread: Array, share: float) -> Mask:
     """At which targets all sampled robots but the worst stay within a share of the gauges' room.
 
+    The ``spread`` (n, 3), mm, is of their stops.
     Of all that take the target the legs are free.
     """
     stay = sampled.found & limits.within_travel(sampled.deviations, share=share)
+    stay &= limits.within_travel(sampled.deviations, spread, TRAVEL_SHARE)
     are_free = (sampled.leg_margins >= 0.0).all(axis=-1)
     within: Mask = (np.count_nonzero(~stay, axis=0) <= 1) & (are_free | ~sampled.found).all(axis=0)
     return within
 
 
-def _all_within(sampled: _SampledRobots, limits: Limits, share: float) -> Mask:
-    """At which targets all sampled robots, and those that ``SIGMAS`` predict, stay within a share of it."""
+def _all_within(sampled: _SampledRobots, limits: Limits, stops: Array, share: float) -> Mask:
+    """At which targets all sampled robots, and those that ``SIGMAS`` predict, stay within a share of it.
+
+    ``stops`` (n, 3), mm, is the spread of their stops.
+    """
     deviations, margins = sampled.deviations, sampled.leg_margins
     spread = (deviations @ limits.frames.base).std(axis=0)
-    predicted = limits.within_travel(deviations.mean(axis=0), SIGMAS * spread, share)
+    mean_deviation, both = deviations.mean(axis=0), np.hypot(SIGMAS * spread, stops)
+    predicted = limits.within_travel(mean_deviation, SIGMAS * spread, share)
+    predicted &= limits.within_travel(mean_deviation, both, TRAVEL_SHARE)
     stay = sampled.found & limits.within_travel(deviations, share=share)
+    stay &= limits.within_travel(deviations, stops, TRAVEL_SHARE)
     mean = margins.mean(axis=0)
     are_free = (mean >= SPARE_SIGMAS * np.sqrt(np.mean((margins - mean) ** 2, axis=0))).all(axis=-1)
     within: Mask = np.all(stay, axis=0) & predicted & are_free

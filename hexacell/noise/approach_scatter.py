@@ -1,8 +1,9 @@
 """Scatter between approaches: one pose visited again and again from different directions.
 
-What the encoders see of the ball's motion is no error of the model. The rest is, for each visit less
-their mean, ``r = d - G q`` with ``G = dP/dq``, whose covariance follows from the noise of encoders and
-gauges that is stated for a record. Whether there is more is a chi-square test. Where it comes from, ball
+What the encoders see of the ball's motion is no error of the model: it shows how far the joints stop beside
+their commands. The rest is, for each visit less their mean, ``r = d - G q`` with ``G = dP/dq``, whose
+covariance follows from the noise of encoders and gauges that is stated for a record, and from what is not
+known of G (:mod:`.ball_by_encoders`). Whether there is more is a chi-square test. Where it comes from, ball
 and joints show together: with stops s, play p, and errors e and g of encoders and gauges,
 
     q = s + e,      d = G (s + p) + g.
@@ -22,11 +23,14 @@ from hexacell.cell.fields import Frozen
 from hexacell.distributions import chi_square_exceedance, chi_square_limit
 from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.kinematics.rotations import Array
+from hexacell.noise.ball_by_encoders import BallByEncoders
 from hexacell.noise.standstill import SIGNIFICANCE
 
 FEWEST_VISITS = 3
 """Fewer visits, the first one included, show nothing."""
 CONFIDENCE = 0.95
+SEEN = 0.05
+"""Probability of the encoders' noise below which joints are said to stop beside their commands."""
 INSTRUMENT_ODDS = 10.0
 """How many times as likely as all joints or encoders a single instrument must be to be named."""
 LARGEST_EXCESS = 1e3
@@ -74,6 +78,8 @@ class RepeatedApproaches(Frozen):
         source: what does not repeat beyond that; None where the stated noise explains everything.
         excess: one standard deviation of it beside the stated noise, of each joint or encoder or of
             the instrument, in ``unit``.
+        stops: one standard deviation of where a joint stops, as its encoder shows it, less the noise of
+            the encoders; zero unless they see more than that. In ``stop_unit``.
     """
 
     visits: int
@@ -83,6 +89,8 @@ class RepeatedApproaches(Frozen):
     source: ScatterSource | None = None
     unit: JointUnit = JointUnit.MM
     excess: float = 0.0
+    stops: float = 0.0
+    stop_unit: JointUnit = JointUnit.MM
 
     @property
     def ratio_at_most(self) -> float:
@@ -94,7 +102,7 @@ class RepeatedApproaches(Frozen):
 def approach_scatter(
     deviations: Array,
     joints: Array,
-    by_joints: Array,
+    ball: BallByEncoders,
     encoders: Array,
     gauges_mm: Array,
     joint_unit: JointUnit = JointUnit.MM,
@@ -104,7 +112,7 @@ def approach_scatter(
     Args:
         deviations: of the ball along base x, y, z (m, 3), mm.
         joints: what the encoders showed (m, 6), mm.
-        by_joints: derivative G (3, 6) of the ball's position by the joint variables.
+        ball: how it moves by what the encoders show.
         encoders: stated noise of each encoder (6,) in a record.
         gauges_mm: likewise of the gauges (3,).
         joint_unit: of the joint variables.
@@ -113,10 +121,12 @@ def approach_scatter(
         return None
     shown = np.concatenate([deviations, joints], axis=1)
     around = shown - shown.mean(axis=0)
+    stated = np.diag(np.concatenate([gauges_mm, encoders]) ** 2)
+    stated[:3, :3] += ball.covariance(around[:, 3:]).sum(axis=0) / (len(shown) - 1)
     visits = _Visits(
         products=around.T @ around,
-        motion=np.concatenate([by_joints, np.eye(LEGS)]),
-        stated=np.diag(np.concatenate([gauges_mm, encoders]) ** 2),
+        motion=np.concatenate([ball.by_joints, np.eye(LEGS)]),
+        stated=stated,
         freedom=len(shown) - 1,
     )
     freedom, chi_square = 3 * visits.freedom, visits.unexplained()
@@ -125,6 +135,8 @@ def approach_scatter(
         degrees_of_freedom=freedom,
         ball_mm=float(np.sqrt(np.trace(visits.products[:3, :3]) / visits.freedom)),
         ratio=float(np.sqrt(chi_square / freedom)),
+        stops=_stops(visits, encoders),
+        stop_unit=joint_unit,
     )
     if chi_square_exceedance(freedom, chi_square) >= SIGNIFICANCE:
         return found
@@ -135,6 +147,14 @@ def approach_scatter(
     source = alone if is_alone else together
     unit = JointUnit.MM if source.instruments[:3].any() else joint_unit
     return found.model_copy(update={"source": source, "unit": unit, "excess": excesses[source][1]})
+
+
+def _stops(visits: _Visits, encoders: Array) -> float:
+    """One standard deviation of where a joint stops; zero where the noise of the encoders explains it."""
+    squares, freedom = np.diag(visits.products)[3:], visits.freedom
+    if chi_square_exceedance(LEGS * freedom, float(np.sum(squares / encoders**2))) >= SEEN:
+        return 0.0
+    return float(np.sqrt(np.mean(squares / freedom - encoders**2)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,8 +1,9 @@
 """Whether three gauges answer as they are mounted, by what they showed after small known moves.
 
 What the gauges showed per length of a move along each base axis is a matrix, the identity for gauges as
-they should be on a perfect robot. Of all assignments of gauges to axes, with either sign, the one is
-taken whose axes the gauges followed best, so that no threshold on directions is needed. Next to a
+they should be on a perfect robot. How far the ball went is what the encoders show, not what was commanded:
+a machine that does not repeat goes elsewhere. Of all assignments of gauges to axes, with either sign, the
+one is taken whose axes the gauges followed best, so that no threshold on directions is needed. Next to a
 singularity, where the ball may go at 45 degrees to its command, a healthy set resembles one with two
 gauges exchanged and one of them reversed: two mistakes at once must be followed distinctly better. At
 3,929 references of robots drawn within tolerances of 7 mm the right assignment was then ahead by 0.39 and
@@ -13,12 +14,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hexacell.distributions import variance_ratio_exceedance
 from hexacell.kinematics.rotations import Array
+
+AXES = 3
+"""Moves of a round, one along each axis."""
+
+CHANCE = 1e-3
+"""Probability of healthy gauges to show what is taken for a mistake."""
 
 LEAST_RESPONSE = 0.4
 """Share of the moves that a gauge in mm must show. Healthy ones showed 0.79 of them and more."""
@@ -51,13 +60,51 @@ class TrialFinding:
     gauges: tuple[int, ...]
 
 
-def response_of(moved_mm: Array, shown_mm: Array) -> Array:
-    """What each gauge showed per length of a move along each axis (3, 3), by gauge and axis.
+@dataclass(frozen=True, eq=False)
+class GaugeTrial:
+    """What three gauges showed after small moves of the ball, a round of three at a time.
 
-    ``moved_mm`` (3, 3) are the moves along base x, y, z, in rows, which must be independent; ``shown_mm``
-    (3, 3) is what the gauges x, y, z showed after each of them.
+    Attributes:
+        moved_mm: the moves (n, 3) along base x, y, z, in rows.
+        shown_mm: what the gauges x, y, z showed (n, 3) after each of them.
     """
-    return np.asarray(np.linalg.solve(moved_mm, shown_mm).T)
+
+    moved_mm: Array
+    shown_mm: Array
+
+    @cached_property
+    def response(self) -> Array:
+        """What each gauge showed per length of a move along each axis (3, 3), by gauge and axis."""
+        return self._fitted[:AXES].T
+
+    @cached_property
+    def _fitted(self) -> Array:
+        """The response (3, 3), by axis and gauge, and after several rounds the error of the reference."""
+        design = self._design if len(self.moved_mm) > AXES else self.moved_mm
+        return np.asarray(np.linalg.lstsq(design, self.shown_mm, rcond=None)[0])
+
+    @property
+    def _design(self) -> Array:
+        return np.concatenate([self.moved_mm, np.ones((len(self.moved_mm), 1))], axis=1)
+
+    @property
+    def findings(self) -> tuple[TrialFinding, ...]:
+        """What is wrong with the gauges, if it is no chance; nothing if they are as they should be."""
+        return () if self.may_be_chance else judge_response(self.response)
+
+    @property
+    def may_be_chance(self) -> bool:
+        """Whether healthy gauges on this machine may have shown the same; not after a single round."""
+        if len(self.moved_mm) <= AXES:
+            return False
+        unknowns, freedom = self.response.size, self.shown_mm.size - self._fitted.size
+        scatter = float(np.sum((self.shown_mm - self._design @ self._fitted) ** 2))
+        as_moved = self.shown_mm - self.moved_mm
+        beyond = float(np.sum((as_moved - as_moved.mean(axis=0)) ** 2)) - scatter
+        if scatter == 0.0:
+            return beyond <= 0.0
+        ratio = (beyond / unknowns) / (scatter / freedom)
+        return variance_ratio_exceedance(unknowns, freedom, ratio) > CHANCE
 
 
 def judge_response(response: Array) -> tuple[TrialFinding, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hexacell.campaign.budget import TimeModel
 from hexacell.cell.fields import Frozen, Point, SixNumbers
 from hexacell.cell.model import CellSettings
-from hexacell.cell.uncertainty import repeatability_key
+from hexacell.cell.uncertainty import STOPS, repeatability_key
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.noise.approach_scatter import RepeatedApproaches, ScatterSource
 
@@ -74,7 +74,9 @@ def with_measured_noise(settings: CellSettings, measured: MeasuredNoise) -> Cell
     """The settings of a cell with what was measured in the place of what they state."""
     gauges: Point = tuple(one.record for one in measured.gauges)  # type: ignore[assignment]
     encoders: SixNumbers = tuple(one.record for one in measured.encoders)  # type: ignore[assignment]
-    noise = settings.noise.model_copy(update={"gauges_mm": gauges, "encoders": encoders})
+    noise = settings.noise.model_copy(
+        update={"gauges_mm": gauges, "encoders": encoders, "stops": _stops(settings, measured)}
+    )
     seconds = TimeModel.of(settings).record_seconds + averaging_seconds(settings, measured.windows)
     return settings.model_copy(
         update={
@@ -90,13 +92,26 @@ def averaging_seconds(settings: CellSettings, windows: int) -> float:
     return (windows - 1) * settings.timing.window_s
 
 
+def _stops(settings: CellSettings, measured: MeasuredNoise) -> float:
+    """Where joints stop beside their commands: as measured, unless more is stated and holds."""
+    stated, approaches = settings.noise, measured.approaches
+    if approaches is None:
+        return stated.stops
+    return approaches.stops if stated.figures == "measured" else max(stated.stops, approaches.stops)
+
+
 def _stated_effects(settings: CellSettings, measured: MeasuredNoise) -> object:
     """The section of systematic effects; stops that were measured are in the noise of the records."""
     stated, approaches = settings.uncertainty, measured.approaches
-    if approaches is None or approaches.source is not ScatterSource.JOINTS:
+    if approaches is None:
         return stated
-    key = repeatability_key(approaches.unit)
-    sources = stated.sources | {key: f"{approaches.visits} visits of the first reference"}
-    return stated.model_copy(
-        update={key: 1e3 * approaches.excess, "stop_repeatability_acts": "at work", "sources": sources}
-    )
+    visits = f"{approaches.visits} visits of the first reference"
+    changes: dict[str, object] = {"sources": stated.sources | {STOPS: visits}}
+    if approaches.source is ScatterSource.JOINTS:
+        key = repeatability_key(approaches.unit)
+        changes = {
+            key: 1e3 * approaches.excess,
+            "stop_repeatability_acts": "at work",
+            "sources": stated.sources | {STOPS: visits, key: visits},
+        }
+    return stated.model_copy(update=changes)

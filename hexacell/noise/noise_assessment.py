@@ -21,8 +21,8 @@ from hexacell.identification.problem.prior import Noise
 from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
 from hexacell.noise.approach_scatter import RepeatedApproaches, approach_scatter
+from hexacell.noise.ball_by_encoders import BallByEncoders
 from hexacell.noise.measured_noise import (
     AveragingForecast,
     InstrumentNoise,
@@ -115,13 +115,10 @@ class _NoiseAssessment:
     def scatter(self) -> RepeatedApproaches | None:
         """What the visits show beyond the larger of stated noise and that of the readings."""
         robot, visits, least = self.plan.robot, self.readings.visits, self._at_least(self.stated)
-        commands = robot.from_commands([self.readings.reference])
-        joints = robot.mechanism.inverse(robot.commanding, robot.branch, commands)
-        at = robot.mechanism, robot.commanding, commands, joints
-        by_joints = pose_sensitivity(*at, POSITION).joints
-        in_base = robot.frames.base.T @ by_joints[0]
+        command = robot.from_commands([self.readings.reference])
+        ball = BallByEncoders.at(robot, robot.belief(), command)
         unit = robot.mechanism.words.joint_unit
-        return approach_scatter(visits[:, :3], visits[:, 3:], in_base, least[3:], least[:3], unit)
+        return approach_scatter(visits[:, :3], visits[:, 3:], ball, least[3:], least[:3], unit)
 
     def _of_records(self, windows: int) -> Array:
         """The noise (9,) of records that are means of some windows, with what does not repeat."""

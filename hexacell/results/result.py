@@ -74,6 +74,7 @@ class IdentificationResult(Frozen):
     outliers: tuple[OutlierRecord, ...]
     frame: str
     expected_chi2: float | None = None
+    noise_freedom: float | None = None
     identifies: ParameterChoice = ParameterChoice.ALL
 
     @classmethod
@@ -96,6 +97,7 @@ class IdentificationResult(Frozen):
             outliers=tuple(OutlierRecord.of(record, fault) for record, fault in found.left_out),
             frame=found.problem.mechanism.convention.name,
             expected_chi2=found.goodness.expected if found.problem.prior.is_estimate or zeros else None,
+            noise_freedom=None if np.isinf(found.problem.noise.freedom) else found.problem.noise.freedom,
             identifies=ParameterChoice.ALL if zeros is None else ParameterChoice.ZEROS,
         )
 
@@ -131,7 +133,9 @@ class IdentificationResult(Frozen):
     def residuals(self) -> ChiSquareTest:
         """The chi-square test of the residuals."""
         return ChiSquareTest(
-            self.chi2, float(self.dof) if self.expected_chi2 is None else self.expected_chi2
+            self.chi2,
+            float(self.dof) if self.expected_chi2 is None else self.expected_chi2,
+            np.inf if self.noise_freedom is None else self.noise_freedom,
         )
 
     def identified(self, parameters: ParameterSet) -> Geometry:

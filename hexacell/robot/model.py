@@ -17,6 +17,7 @@ from hexacell.config.layout import ConfigLayout, FormatOfFile
 from hexacell.config.linuxcnc_ini import limits_of_ini
 from hexacell.errors import FileError, UsageError
 from hexacell.identification.belief import RobotBelief
+from hexacell.identification.diagnostics.geometry_change import largest_change
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
 from hexacell.identification.identified_zeros import (
     HeldParameters,
@@ -118,6 +119,10 @@ class Robot:
     def tolerance_violations(self, found: GeometryEstimate) -> tuple[ToleranceViolation, ...]:
         """The parameters of an estimate that are outside the drawing's tolerances."""
         return tolerance_violations(found, self.mechanism, self.drawing, self.tolerances)
+
+    def largest_change(self, geometry: Geometry) -> float:
+        """The largest change of a parameter of the controller's to a geometry in the convention, mm."""
+        return largest_change(self.mechanism, self.controller, geometry, self.tolerances)
 
     def identified_zeros(self, found: Identification) -> IdentifiedZeros | None:
         """The zeros by an identification's records, where these alone are identified."""
@@ -326,7 +331,7 @@ def noise_of(settings: CellSettings) -> Noise:
     """The noise of a record that a cell's settings state."""
     stated = settings.noise
     alignment = float(np.radians(settings.stations.alignment_deg))
-    noise = Noise(stated.encoder, stated.gauge_mm, alignment, stated.gauge_scale)
+    noise = Noise(stated.encoder, stated.gauge_mm, alignment, stated.gauge_scale, stops=stated.stops)
     if stated.encoders is None and stated.gauges_mm is None:
         return noise
     encoders, gauges = noise.encoders.tolist(), noise.gauges_mm.tolist()

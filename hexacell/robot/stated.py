@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import (
+    STOPS,
     LinearUncertaintySettings,
     RotaryUncertaintySettings,
     UncertaintySettings,
@@ -26,6 +27,7 @@ from hexacell.limits.limits import AxisLimits, Limits, ZeroedRanges
 from hexacell.uncertainty.effect_kinds import (
     ball_beside_tool,
     ball_roundness,
+    command_repeatability,
     common_encoder_scale,
     common_sag,
     encoder_eccentricities,
@@ -174,6 +176,14 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
         stop_repeatability(
             *size_and_source(repeatability_key(words.joint_unit)),
             is_in_noise=stated.stop_repeatability_acts == "at work",
+            joint=words.joint,
+            unit=words.joint_unit,
+        )
+    )
+    effects.append(
+        command_repeatability(
+            1e3 * settings.noise.stops,
+            stated.sources.get(STOPS, "cell file"),
             joint=words.joint,
             unit=words.joint_unit,
         )

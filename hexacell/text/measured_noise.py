@@ -40,6 +40,18 @@ def _summary(measured: MeasuredNoise) -> Iterator[str]:
             f"  {approaches.visits} visits of one pose agree with what is stated for a record: they "
             f"scatter {approaches.ratio:.1f} times as much"
         )
+    if approaches is not None and approaches.stops:
+        yield _stops(approaches)
+
+
+def _stops(approaches: RepeatedApproaches) -> str:
+    """How far joints stop beside their commands, and what a run makes of it."""
+    size = f"{_number(approaches.stops)} {approaches.stop_unit.thousandth}"
+    return (
+        f"  each joint stops {size} (one sigma) beside its command, as its encoder shows: the ball by "
+        f"{approaches.ball_mm:.3f} mm. The records know it; the robot at work errs by it, and no geometry "
+        "corrects that"
+    )
 
 
 def _of_each_kind(measured: MeasuredNoise, figure: str) -> str:

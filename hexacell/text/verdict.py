@@ -56,6 +56,10 @@ def _error_lines(accuracy: VerifiedAccuracy | None) -> Iterator[str]:
         where = f"at {accuracy.poses} {what}" if name == "position" else "there"
         size = f"{error.value:.3f} {unit}, U {error.expanded:.3f} (limit {error.limit:g})"
         yield f"  largest {name} error {where}: {size}"
+    if (geometry := accuracy.of_geometry) is not None:
+        found = geometry.position
+        size = f"{found.value:.3f} mm, U {found.expanded:.3f}: {geometry.verdict}"
+        yield f"  of that by the geometry: {size}; the rest is how the joints scatter about their commands"
     guard_bands = [error.guard_band for _, _, error in accuracy.errors if error.guard_band]
     if guard_bands:
         yield f"  a pass and a fail keep {guard_bands[0]} from the limit"

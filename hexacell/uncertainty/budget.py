@@ -28,6 +28,8 @@ VISIBLE_SIGMAS = 4.0
 
 OF_THE_MACHINE = (Occurrence.CONSTANT, Occurrence.EVERY_STOP, Occurrence.WITH_TOOL)
 
+STOPS = Occurrence.STOPS_AT_WORK
+
 HARMLESS_ERROR = 5.0
 """Times the error by the noise: an effect that is not seen before is one that no record shows."""
 
@@ -110,13 +112,26 @@ class UncertaintyBudget:
         acting = tuple(line for line in lines if line.columns.shape[-1])
         return cls(propagation.jacobian, noise, acting, known, has_held=zeros is not None)
 
-    def errors_of(self, difference: Array) -> TaskErrors:
+    def errors_of(self, difference: Array, *, of_geometry: bool = False) -> TaskErrors:
         """The errors of a geometry whose free parameters differ by (p,) from the estimate.
+
+        They are those of one round of visits to the task poses; those ``of_geometry`` are without the
+        scatter of the stops, which no geometry corrects.
 
         They are estimated from the difference, and from effects that were measured, as the scale in a
         length check; what is not known of them is that of the estimate.
         """
-        return TaskErrors(self.known - self.jacobian @ difference, self._all)
+        estimated = self.known - self.jacobian @ difference
+        if not of_geometry:
+            return TaskErrors(estimated, self._all)
+        lasting = [line.columns for line in self.lines if line.effect.occurrence is not STOPS]
+        columns = [self.noise, _joined(lasting, self.noise.shape[:2])]
+        return TaskErrors(estimated, np.concatenate(columns, axis=-1))
+
+    @property
+    def scatters(self) -> bool:
+        """Whether the robot at work was measured, or stated, to stop elsewhere each time."""
+        return any(line.effect.occurrence is STOPS and line.effect.size for line in self.lines)
 
     @property
     def parameter_columns(self) -> Mapping[str, Array]:

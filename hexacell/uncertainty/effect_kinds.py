@@ -8,7 +8,8 @@ the base.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -61,6 +62,22 @@ def encoder_eccentricities(mdeg: float, source: str = "") -> Effect:
     return Effect(name, mdeg, "mdeg", Occurrence.CONSTANT, waves, source=source)
 
 
+REPEATABILITY = "repeatability"
+
+
+def with_unseen_stops(effects: Iterable[Effect], size: float) -> tuple[Effect, ...]:
+    """Effects with what repeated readings show of stops that encoders do not see, beyond what is stated.
+
+    The noise of the records contains it already. ``size`` is in um or mdeg.
+    """
+    return tuple(
+        replace(effect, size=size, occurrence=Occurrence.STOPS_AT_WORK, source="repeated readings")
+        if effect.name.startswith(REPEATABILITY) and size > effect.size
+        else effect
+        for effect in effects
+    )
+
+
 def stop_repeatability(
     size: float,
     source: str = "",
@@ -75,12 +92,28 @@ def stop_repeatability(
     mechanism's word for it.
     """
     occurrence = Occurrence.STOPS_AT_WORK if is_in_noise else Occurrence.EVERY_STOP
-    name = f"repeatability of a {joint}"
+    name = f"{REPEATABILITY} of a {joint}"
 
     def columns(at: Placement) -> Array:
         return at.by_joints(np.broadcast_to(THOUSANDTH * np.eye(LEGS), (len(at), LEGS, LEGS)))
 
     return Effect(name, size, unit.thousandth, occurrence, columns, source=source)
+
+
+def command_repeatability(
+    size: float, source: str = "", *, joint: str = "joint", unit: JointUnit = JointUnit.MM
+) -> Effect:
+    """A joint stops beside its command, each time elsewhere, and its encoder shows it.
+
+    The records know it; the robot at work suffers it, whatever geometry commands it. ``size`` is in um or
+    mdeg, ``joint`` the mechanism's word.
+    """
+
+    def columns(at: Placement) -> Array:
+        return at.by_joints(np.broadcast_to(THOUSANDTH * np.eye(LEGS), (len(at), LEGS, LEGS)))
+
+    name = f"stops of a {joint} beside its command"
+    return Effect(name, size, unit.thousandth, Occurrence.STOPS_AT_WORK, columns, source=source)
 
 
 UM_PER_M = 1e-6

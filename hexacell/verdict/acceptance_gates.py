@@ -8,7 +8,6 @@ from hexacell.cell.fields import Frozen
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.result import GeometryEstimate
-from hexacell.kinematics.geometry import Geometry
 
 
 class AcceptanceGate(Frozen):
@@ -30,8 +29,8 @@ def gates(
     violations: Sequence[ToleranceViolation],
     *,
     residuals: ChiSquareTest,
+    change_mm: float,
     largest_change_mm: float,
-    before: Geometry,
     expired: Sequence[str] | None = None,
 ) -> tuple[AcceptanceGate, ...]:
     """All gates of an identification.
@@ -40,25 +39,17 @@ def gates(
         identified: the geometry, in the mechanism's frame convention.
         violations: of the drawing's tolerances.
         residuals: the chi-square test of the residuals.
+        change_mm: the largest change of a parameter of the controller's, in the best choice of frames:
+            other frames are no other robot.
         largest_change_mm: what may change without a person.
-        before: the controller's geometry, in the same convention: other frames are no other robot.
         expired: instruments whose certificate had expired when the run began; None without certificates.
     """
-    undetermined, change_mm = identified.undetermined, identified.geometry.largest_difference(before)
     names = ", ".join(f"{one.name} ({one.change:+.2f} {one.unit})" for one in violations)
     checked = [
         AcceptanceGate(
             name="converged",
             passed=identified.termination.converged,
             sentence=f"The solver ended because {identified.termination.value}.",
-        ),
-        AcceptanceGate(
-            name="determined",
-            passed=not undetermined,
-            sentence=f"Not determined by these data: {', '.join(undetermined)}."
-            if undetermined
-            else "The data determine every parameter.",
-            needs_person=True,
         ),
         _agrees(residuals),
         AcceptanceGate(  # the drawing may be of another machine

@@ -7,10 +7,11 @@ from itertools import chain, repeat
 
 import numpy as np
 
-from hexacell.campaign.feasibility import UNDETERMINED_SHARE
+from hexacell.campaign.feasibility import LARGEST_SHARE_UNKNOWN
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.design.decorrelation import DecorrelatingPose, decorrelating_poses
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.model_tests import PointPrediction, leave_one_point_out
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
@@ -68,6 +69,7 @@ class Assessment:
     measured_noise: MeasuredNoise | None = None
     points: tuple[PointPrediction, ...] = ()
     zeros: IdentifiedZeros | None = None
+    share_unknown: float = 0.0
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -82,16 +84,13 @@ class Assessment:
 
     @property
     def is_usable(self) -> bool:
-        """Whether the solver converged, nothing refuses the geometry, and the data determine most of it."""
+        """Whether the solver converged, nothing refuses the geometry, and the task poses are known."""
         return self.found.converged and not self.refused and not self.determines_too_little
 
     @property
     def determines_too_little(self) -> bool:
-        """Whether so many parameters are as uncertain as drawn that the geometry is hardly a result."""
-        free = self.found.problem.mechanism.convention.free_names
-        unknown = set(self.undetermined) & set(free)
-        identified = free if self.zeros is None else self.zeros.names
-        return len(unknown) > UNDETERMINED_SHARE * len(identified)
+        """Whether the task poses are hardly better known than by the drawing: the geometry is no result."""
+        return self.share_unknown > LARGEST_SHARE_UNKNOWN
 
     @property
     def improvement(self) -> ExpectedImprovement | None:
@@ -149,4 +148,13 @@ def assess(
         measured_noise=measured_noise,
         points=leave_one_point_out(found) if found.converged else (),
         zeros=zeros,
+        share_unknown=_share_unknown(task, belief, robot),
     )
+
+
+def _share_unknown(task: Task, belief: RobotBelief, robot: Robot) -> float:
+    """The error left at the worst task pose over that of what was known before; 0 without any pose."""
+    error = task.error(belief)
+    if error is None:
+        return 0.0
+    return error.worst(belief.covariance) / error.worst(robot.prior.covariance)

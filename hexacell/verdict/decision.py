@@ -124,10 +124,24 @@ class ErrorLimits:
         return worst_verdict([of_position, of_orientation])
 
 
+class GeometryErrors(Frozen):
+    """The errors at the task poses that the geometry alone makes, without the scatter of the stops."""
+
+    position: JudgedError
+    orientation: JudgedError
+
+    @property
+    def verdict(self) -> Verdict:
+        """The decision on both."""
+        return worst_verdict([self.position.verdict, self.orientation.verdict])
+
+
 class VerifiedAccuracy(Frozen):
-    """The error of the written geometry at the task poses.
+    """The error of the written geometry in one round of visits to the task poses.
 
     Attributes:
+        of_geometry: the errors without the scatter of the stops; None where the machine repeats as well as
+            was stated, or measured.
         poses: their number, and whether the cell file names them; else they span the workspace.
         worst: the pose with the largest position error, in the controller's frames.
         scale_of: what says how long a millimetre is: the encoders, or the drawing where these read angles.
@@ -138,6 +152,7 @@ class VerifiedAccuracy(Frozen):
     poses: int
     task_named: bool
     worst: SixNumbers
+    of_geometry: GeometryErrors | None = None
     length: LengthResult | None = None
     scale_of: Literal["encoders", "drawing"] = "encoders"
 
@@ -150,6 +165,7 @@ class VerifiedAccuracy(Frozen):
         task: Task,
         *,
         task_named: bool,
+        of_geometry: TaskErrors | None = None,
         length: LengthResult | None = None,
     ) -> VerifiedAccuracy:
         """The decision on errors at the poses of a ``task`` that the ``robot`` reaches."""
@@ -159,6 +175,12 @@ class VerifiedAccuracy(Frozen):
             orientation=JudgedError.of(errors.orientation, limits.orientation_deg, factor),
             poses=len(task.poses),
             task_named=task_named,
+            of_geometry=None
+            if of_geometry is None
+            else GeometryErrors(
+                position=JudgedError.of(of_geometry.position, limits.position_mm, factor),
+                orientation=JudgedError.of(of_geometry.orientation, limits.orientation_deg, factor),
+            ),
             worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
             length=length,
             scale_of="encoders" if joint_unit is JointUnit.MM else "drawing",

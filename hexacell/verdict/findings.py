@@ -30,6 +30,7 @@ def findings(assessed: Assessment) -> tuple[str, ...]:
         _accuracy(assessed),
         _poor_repeatability(assessed),
         _noise(assessed),
+        _undetermined(assessed),
         _unreachable(assessed),
         *map(str, assessed.found.data_faults),
     )
@@ -101,23 +102,27 @@ def _verdict(assessed: Assessment) -> str:
             "mistake explains them. Check that the drawing, the controller's config and the branch are "
             "this machine's, and that the ball and the gauges are clamped."
         )
-    if assessed.undetermined:
-        return _incomplete(assessed)
+    if assessed.determines_too_little:
+        return (
+            f"Not usable: the task poses are known {1.0 / assessed.share_unknown:.1f} times as well as by "
+            "the drawing alone. Measure at more points, and in more orientations with larger tilts."
+        )
     return _point_verdict(assessed) or _residual_verdict(found.goodness)
 
 
-def _incomplete(assessed: Assessment) -> str:
+def _undetermined(assessed: Assessment) -> str:
+    """The parameters that stay as the drawing has them; U contains what they do at the task poses."""
     convention = assessed.found.problem.mechanism.convention
     free = convention.free_names
     names = [convention.display_name(name) for name in assessed.undetermined if name in free]
-    if len(names) > NAMED_PARAMETERS:
-        subject = f"{len(names)} of {len(free)} parameters are"
-    else:
-        subject = f"{', '.join(names)} {'is' if len(names) == 1 else 'are'}"
-    what = f"{subject} not determined by these data"
-    if not assessed.determines_too_little:
-        return f"Incomplete: {what}."
-    return f"Not usable: {what}. Measure at more points, and in more orientations with larger tilts."
+    if not names:
+        return ""
+    shown = ", ".join(names[:NAMED_PARAMETERS])
+    more = ", ..." if len(names) > NAMED_PARAMETERS else ""
+    return (
+        f"Of {len(free)} parameters these records hardly determine {len(names)} ({shown}{more}): they stay "
+        "near the drawing, and U contains what that does at the task poses."
+    )
 
 
 def _point_verdict(assessed: Assessment) -> str:

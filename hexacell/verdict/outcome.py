@@ -54,6 +54,8 @@ def reason_of(verified: Verification) -> str:
         return f"worse than before{doubt}"
     if verified.verdict is Verdict.NOT_EVALUATED and failed:
         return failed[0].rstrip(".")
+    if verified.is_kept and verified.verdict is not Verdict.PASS:
+        return "the machine does not repeat well enough; the geometry is better, and stays"
     if verified.verdict is Verdict.NOT_EVALUATED and verified.accuracy is not None:
         return "U is above the limit"
     return ""

@@ -63,7 +63,7 @@ def is_worse(before: DeviationStatistics, after: DeviationStatistics, noise: Noi
     A mean of n distances to one noisy reference has at most the variance of a record, once for the
     reference and 1/n for the poses.
     """
-    record_mm = float(np.hypot(noise.gauge_mm, noise.encoder))
+    record_mm = float(np.sqrt(noise.gauge_mm**2 + noise.encoder**2 + noise.stops**2))
     standard_error = record_mm * float(np.sqrt(2.0 + 1.0 / before.poses + 1.0 / after.poses))
     return after.mean_mm - before.mean_mm > SIGNIFICANT_SIGMAS * standard_error
 
@@ -82,11 +82,24 @@ class Verification(Frozen):
     before_mm: float | None = None
     after_mm: float | None = None
     is_worse: bool = False
+    is_better: bool = False
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the result stays: it passed, or it is better and only the machine's scatter is too large.
+
+        The old geometry would scatter as much, and err more.
+        """
+        if self.verdict is Verdict.PASS:
+            return True
+        scatters = self.accuracy is not None and self.accuracy.of_geometry is not None
+        holds = all(test.passed for test in self.tests) and self.is_better
+        return scatters and holds and self.verdict is Verdict.NOT_EVALUATED
 
     @property
     def is_offered(self) -> bool:
-        """Whether a person may keep the result: it did not pass, but it is not worse than before."""
-        return self.verdict is not Verdict.PASS and self.after_mm is not None and not self.is_worse
+        """Whether a person may keep the result: it does not stay, but it is not worse than before."""
+        return not self.is_kept and self.after_mm is not None and not self.is_worse
 
     @property
     def needs_confirmation(self) -> bool:
@@ -141,7 +154,8 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
             sentence = f"The length check says nothing: {length.reason}."
         test = ModelTest(name="length check", passed=length.is_consistent, sentence=sentence)
         tests = (*tests, test)
-    worse = is_worse(before, after, _noise_in_mm(robot, updated))
+    noise = _noise_in_mm(robot, updated)
+    worse = is_worse(before, after, noise)
     return Verification(
         verdict=_verdict(tests, accuracy, worse=worse),
         tests=tests,
@@ -149,6 +163,7 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
         before_mm=before.mean_mm,
         after_mm=after.mean_mm,
         is_worse=worse,
+        is_better=is_worse(after, before, noise),
     )
 
 
@@ -176,18 +191,27 @@ def verified_accuracy(
             budget = task.budget(updated, belief, *effects, check.observation) or budget
     # With zeros alone, what is written is not the estimate of all parameters.
     written = found.free if robot.identifies is ParameterChoice.ALL else robot.free_parameters
-    errors = budget.errors_of(written - updated.free)
+    difference = written - updated.free
+    errors = budget.errors_of(difference)
+    of_geometry = budget.errors_of(difference, of_geometry=True) if budget.scatters else None
     limits, is_named = ErrorLimits.of(settings.acceptance), bool(settings.task.poses)
-    return VerifiedAccuracy.of(errors, limits, robot, task, task_named=is_named, length=length)
+    return VerifiedAccuracy.of(
+        errors, limits, robot, task, task_named=is_named, of_geometry=of_geometry, length=length
+    )
 
 
 def _noise_in_mm(robot: Robot, updated: Identification) -> Noise:
-    """The noise of a record; that of encoders of angles as the motion of the ball that it makes."""
+    """The noise of a record, with that of stops, and of encoders of angles, as the ball's motion by it."""
+    by_joints, noise = updated.prediction.by_joints, robot.noise
+    stops_mm = _rms(noise.stop_covariance(by_joints))
     if robot.mechanism.words.joint_unit is JointUnit.MM:
-        return robot.noise
-    covariances = robot.noise.encoder_covariance(updated.prediction.by_joints)
-    ball_mm = float(np.sqrt(np.mean(np.trace(covariances, axis1=1, axis2=2)) / 3.0))
-    return replace(robot.noise, encoder=ball_mm)
+        return replace(noise, stops=stops_mm)
+    return replace(noise, encoder=_rms(noise.encoder_covariance(by_joints)), stops=stops_mm)
+
+
+def _rms(covariances: Array) -> float:
+    """Root mean square along an axis, by covariances (n, 3, 3)."""
+    return float(np.sqrt(np.mean(np.trace(covariances, axis1=1, axis2=2)) / 3.0))
 
 
 def _verdict(tests: Sequence[ModelTest], accuracy: VerifiedAccuracy | None, *, worse: bool) -> Verdict:

@@ -28,16 +28,20 @@ from hexacell.kinematics.commanded_motion import RefusedCommands
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
+from hexacell.noise.allowances import Allowances, ReferenceChange
 from hexacell.noise.measured_noise import MeasuredNoise, with_measured_noise
+from hexacell.noise.repeats import Repeats
 from hexacell.results.result import AcceptedResult
 from hexacell.results.written_geometry import as_written
 from hexacell.robot.model import Robot
 from hexacell.robot.stated import stated_effects
+from hexacell.uncertainty.effect_kinds import with_unseen_stops
 from hexacell.verdict.decision import ErrorLimits
 from hexacell.verdict.length_check import with_measured_scale
 from procedures.calibration.held_out_poses import HeldOutPoses, PosesByPoint, replacements
 from procedures.run.keys import Phase, SetKey, SixNumbers
-from procedures.run.state import RunState
+from procedures.run.readings import Reading
+from procedures.run.state import RunState, SetState
 
 
 class Mode(StrEnum):
@@ -184,6 +188,11 @@ class Knowledge:
         return self._plan_of(self.robot.with_controller(self._written))
 
     @cached_property
+    def allowances(self) -> Allowances:
+        """What may be off at a stop, and back at a reference."""
+        return Allowances(self.calibration.settings, self.measuring.robot, self.learnt.noise is not None)
+
+    @cached_property
     def check(self) -> Check:
         """The check of the robot as it is now."""
         calibration, wanted, accepted = self.calibration, self.settings.check, self.calibration.accepted
@@ -219,11 +228,25 @@ class Knowledge:
             robot = self.quick.robot_after(state.measurements())
         else:
             robot = self.identifying.robot
-        return self._at_temperatures(robot, state.temperature_range_k)
+        return self._as_measured(robot, state)
 
     def written_robot(self, state: RunState) -> Robot:
         """The robot with the proposed geometry in its controller."""
-        return self._at_temperatures(self.robot.with_controller(self._written), state.temperature_range_k)
+        return self._as_measured(self.robot.with_controller(self._written), state)
+
+    def _as_measured(self, robot: Robot, state: RunState) -> Robot:
+        """The robot with the temperatures read while measuring, and the noise that all repeats show."""
+        robot, repeats = self._at_temperatures(robot, state.temperature_range_k), self._repeats(state)
+        effects = with_unseen_stops(robot.effects, 1e3 * repeats.unseen_stops(robot.noise))
+        return replace(robot, noise=repeats.applied_to(robot.noise), effects=effects)
+
+    def _repeats(self, state: RunState) -> Repeats:
+        """All readings at the same references before the geometry is identified."""
+        noise = self.learnt.noise
+        allowances = Allowances(self.calibration.settings, self.identifying.robot, noise is not None)
+        sets = [one for at, one in state.sets.items() if at.phase is Phase.IDENTIFY and one.samples]
+        changes = [since_zero(allowances, one, one.closing) for one in sets if one.closing is not None]
+        return Repeats.of(None if noise is None else noise.approaches, changes)
 
     def provisional_geometry(self, state: RunState) -> Geometry:
         """The estimate by now, or the provisional geometry that the run applied before an interruption.
@@ -284,6 +307,13 @@ class Knowledge:
         is_carried_on = accepted is not None and self.calibration.mode is Mode.QUICK
         known = accepted.parameter_columns if accepted is not None and is_carried_on else {}
         return replace(robot, effects=with_measured_scale(effects, length), known_effects=known)
+
+
+def since_zero(allowances: Allowances, measured: SetState, now: Reading) -> ReferenceChange:
+    """How a reading at the reference of a set differs from the one with which it was zeroed."""
+    zero = measured.samples[0]
+    before, after = (np.array([*one.gauges_mm, *one.joints]) for one in (zero.reading, now))
+    return allowances.since(Pose(*zero.pose), before, after)
 
 
 def expected_records(

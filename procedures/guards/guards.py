@@ -67,6 +67,11 @@ class Guards:
         self._devices = devices
         self._clock = clock
         self.supervisor = MotionSupervisor(devices.controller, clock, folder, settings.guards.free_disk_mb)
+        self._following = settings.guards.following
+
+    def allow_following(self, limit: float) -> None:
+        """Let joints stop as far from their commands as this, in their unit."""
+        self._following = limit
 
     async def prepare(self, order: Supervised[None]) -> None:
         """Run the order that makes the controller ready to move; releases the latch."""
@@ -94,7 +99,7 @@ class Guards:
 
     async def locate(self) -> PositionReports:
         """Where the robot is, which controller and encoders agree on; nothing moves."""
-        found = await self.position.read()
+        found = await self.position.read(following=self._following)
         if found.reports is None or found.trip is not None:
             assert found.trip is not None  # noqa: S101 - without reports there is a reason
             raise await self.supervisor.stop(found.trip)
@@ -124,10 +129,9 @@ class Guards:
 
     async def _arrival_trip(self, commanded: Array, reached: EncoderSample) -> Trip | None:
         """A joint is not where it was commanded (6,), or the controller is wrong about where it is."""
-        limit = self._settings.guards.following
         words = self._settings.mechanism.words
-        following = following_error(commanded, np.array(reached.positions), limit, words)
-        found = await self.position.read(reached)
+        following = following_error(commanded, np.array(reached.positions), self._following, words)
+        found = await self.position.read(reached, following=self._following)
         return following if following and found.odd is PositionSource.ENCODERS else found.trip or following
 
     async def _go(self, target: Pose, duration_s: float) -> EncoderSample:

@@ -170,20 +170,26 @@ class PositionCheck:
     clock: CellClock
     config: CurrentConfig
 
-    async def read(self, encoders: EncoderSample | None = None) -> CheckedPosition:
-        """Where the robot is, by this sample of the ``encoders`` or a new one; raises ``HexacellError``."""
+    async def read(
+        self, encoders: EncoderSample | None = None, *, following: float | None = None
+    ) -> CheckedPosition:
+        """Where the robot is, by this sample of the ``encoders`` or a new one; raises ``HexacellError``.
+
+        An encoder may be ``following`` from its joint, in their unit; by default as the cell file states.
+        """
+        following = following or self.settings.guards.following
         try:
-            found = await self._compared(encoders or await self.devices.read_encoders())
+            found = await self._compared(following, encoders or await self.devices.read_encoders())
         except NotHomedError:
             return CheckedPosition(None, _NOT_HOMED)
         for _ in range(1, ATTEMPTS):
             if found.trip is None or found.reports is None:
                 break
             await self.clock.sleep(POLL_PAUSE_S * self.clock.factor)
-            found = await self._compared(await self.devices.read_encoders())
+            found = await self._compared(following, await self.devices.read_encoders())
         return found
 
-    async def _compared(self, encoders: EncoderSample) -> CheckedPosition:
+    async def _compared(self, following: float, encoders: EncoderSample) -> CheckedPosition:
         reported = await self.devices.controller.position()
         if reported is None:
             return CheckedPosition(None, _NOT_HOMED)
@@ -198,13 +204,13 @@ class PositionCheck:
             commanding.branch,
             reports,
             position_mm=self.settings.controller.position_tolerance_mm,
-            following=self.settings.guards.following,
+            following=following,
         )
         if mismatch is None:
             return CheckedPosition(reports)
-        return CheckedPosition(reports, self._trip(mismatch, reports), mismatch.odd)
+        return CheckedPosition(reports, self._trip(mismatch, reports, following), mismatch.odd)
 
-    def _trip(self, found: PositionMismatch, reports: PositionReports) -> Trip:
+    def _trip(self, found: PositionMismatch, reports: PositionReports, following: float) -> Trip:
         joint = f"{self.settings.mechanism.words.joint} {found.leg}"
         match found.odd:
             case PositionSource.POSE:
@@ -218,7 +224,7 @@ class PositionCheck:
             case PositionSource.ENCODERS:
                 problem = (
                     f"shows {joint} at {self._place(found.encoder)} where the controller's pose and joints "
-                    f"have it at {self._place(found.joint)} (limit {self.settings.guards.following:g} "
+                    f"have it at {self._place(found.joint)} (limit {following:g} "
                     f"{self.settings.mechanism.words.joint_unit})"
                 )
                 action = "See whether it slipped or lost its zero, or the controller was homed wrongly"

@@ -19,15 +19,16 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of, joints_of
 from hexacell.motion.trajectory import LineDurations
+from hexacell.noise.allowances import ReferenceChange
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
-from procedures.calibration.calibration import Calibration
+from procedures.calibration.calibration import Calibration, since_zero
 from procedures.devices.device_set import Devices, Thermometers, gather_errors
 from procedures.devices.settling import DeviceSnapshot, Settled, read_series, settle, trimmed_mean
 from procedures.guards.guards import Guards
 from procedures.guards.position_check import PositionReports
 from procedures.resources.controller_config import ConfigChanges, ConfigEdits, Startup
-from procedures.run.keys import SixNumbers
+from procedures.run.keys import SetKey, SixNumbers
 from procedures.run.questions import Operator, Question
 from procedures.run.readings import Reading, ReadingSeries, Temperature
 from procedures.run.state import RunState
@@ -170,6 +171,10 @@ class RunResources:
             joints=tuple(joints_of(row) for row in series.joints),
             **_raw(series.window),
         )
+
+    def since_reference(self, state: RunState, at: SetKey, reading: Reading) -> ReferenceChange:
+        """How a reading at the reference of a set differs from the one with which it was zeroed."""
+        return since_zero(self.calibration.known(state).allowances, state.set(at), reading)
 
     async def check_gauges(self) -> None:
         """Make sure that the gauges are set as they were; raises ``HexacellError``."""

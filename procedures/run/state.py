@@ -43,6 +43,7 @@ class SetState:
     Attributes:
         samples: those that count, in the order taken; the first is the reference.
         again: orientations and poses of discarded records, which are taken again.
+        closing: what was read at the reference at the end.
         reference_unverified: the gauges were unwatched; their zero must be verified at the reference.
         standstill: readings at the reference without moving, and ``visits`` of it.
         has_left: the robot has been elsewhere since it was read last.
@@ -56,6 +57,7 @@ class SetState:
     placed: bool = False
     rejections: int = 0
     drift_mm: tuple[float, float, float] | None = None
+    closing: Reading | None = None
     again: tuple[tuple[int, SixNumbers], ...] = ()
     reference_unverified: bool = False
     standstill: StandstillRead | None = None
@@ -97,7 +99,7 @@ class SetState:
         """One record less; a closed set is open again with its reference unverified."""
         kept = tuple(sample for sample in self.samples if sample.orientation != orientation)
         undone = [(s.orientation, s.pose) for s in self.samples if s.orientation == orientation]
-        less = replace(self, samples=kept, again=(*self.again, *undone), drift_mm=None)
+        less = replace(self, samples=kept, again=(*self.again, *undone), drift_mm=None, closing=None)
         return less.unverified() if self.closed else less
 
 

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from hexacell.cell.devices import EncoderSettings
+from hexacell.errors import LimitError
 from hexacell.kinematics.pose import Pose
 from hexacell.noise.measured_noise import MeasuredNoise
 from hexacell.noise.noise_assessment import NoiseReadings, assess_noise
@@ -45,7 +46,24 @@ class AssessNoise(Computation):
         assert state.at_pose is not None  # noqa: S101 - decided only at the reference
         key, _ = state.at_pose
         readings = noise_readings(state.set(key), run.settings.encoders)
-        return NoiseMeasured(at=key, noise=assess_noise(run.calibration.plan, readings))
+        measured = NoiseMeasured(at=key, noise=assess_noise(run.calibration.plan, readings))
+        _require_travel(run, measured.applied_to(state), readings.reference)
+        return measured
+
+
+def _require_travel(run: RunResources, state: RunState, reference: Pose) -> None:
+    """Raise ``LimitError`` where the machine scatters so much that no pose keeps the ball in the travel."""
+    needed = run.calibration.known(state).allowances.needed_travel_mm(reference)
+    narrowest = min(gauge.travel_mm for gauge in run.settings.gauges)
+    travel = min(narrowest, 2.0 * run.settings.limits.gauge_travel_mm)
+    if needed <= travel:
+        return
+    raise LimitError(
+        f"this machine does not repeat well enough for gauges of {travel:g} mm: the ball leaves their "
+        "travel by chance, wherever it is",
+        action=f"Use gauges with a travel of more than {needed:.0f} mm, and state it in gauges.travel_mm "
+        "and limits.gauge_travel_mm; or look for play in guides and joints",
+    )
 
 
 def noise_readings(measured: SetState, encoders: EncoderSettings) -> NoiseReadings:

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from hexacell.measurements.records import deviation_of
+from hexacell.noise.allowances import ReferenceChange
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import ThreeNumbers
 from procedures.run.readings import Reading, in_words
@@ -17,9 +18,10 @@ from procedures.steps.base import EventOfSet, StepOfSet
 
 
 class SetClosed(EventOfSet):
-    """The reference was read again; ``drift_mm`` is the change since it was zeroed.
+    """The reference was read again.
 
-    The ``reason`` is why the set has fewer records than planned; empty where it has all.
+    ``drift_mm`` is the change of the gauges since they were zeroed, less what the encoders explain. The
+    ``reason`` is why the set has fewer records than planned; empty where it has all.
     """
 
     kind: Literal["closed"] = "closed"
@@ -28,7 +30,9 @@ class SetClosed(EventOfSet):
     reason: str = ""
 
     def applied_to(self, state: RunState) -> RunState:
-        return state.with_set(self.at, replace(state.set(self.at), drift_mm=self.drift_mm))
+        return state.with_set(
+            self.at, replace(state.set(self.at), drift_mm=self.drift_mm, closing=self.reading)
+        )
 
     def text(self, state: RunState) -> str:
         samples = state.set(self.at).samples
@@ -58,23 +62,24 @@ class CloseSet(StepOfSet):
     doing: ClassVar[str] = "reading the reference again, for the drift"
 
     async def perform(self, run: RunResources, state: RunState) -> SetClosed:
-        """Read again; raises ``DriftTripped`` if the gauges show another value than before."""
+        """Read again; raises ``DriftTripped`` if gauges show what neither encoders nor noise explain."""
         reading = await run.read()
-        zero = state.set(self.at).samples[0].reading
-        drift_mm = deviation_of(np.subtract(reading.gauges_mm, zero.gauges_mm))
+        change = run.since_reference(state, self.at, reading)
         await run.check_gauges()
-        if trip := reference_drift(str(self.at), drift_mm, run.settings.acceptance.drift_mm):
+        if trip := reference_drift(str(self.at), change, run.settings.acceptance.drift_mm):
             raise trip.as_error()  # not latched, as nothing moved
+        drift_mm = deviation_of(change.unexplained_mm)
         return SetClosed(at=self.at, drift_mm=drift_mm, reading=reading, reason=self.reason)
 
 
-def reference_drift(point: str, drift_mm: tuple[float, ...], limit_mm: float) -> Trip | None:
+def reference_drift(point: str, change: ReferenceChange, limit_mm: float) -> Trip | None:
     """The trip of a set whose gauges show another value at its reference than at its begin."""
-    if max(map(abs, drift_mm)) <= limit_mm:
+    if not change.exceeds(limit_mm):
         return None
     return Trip(
         Guard.DRIFT,
         point,
-        f"back at the reference the gauges show {in_words(drift_mm)}, more than {limit_mm:g} mm",
-        "A gauge slipped or the machine does not repeat; resume measures this point again",
+        f"back at the reference the gauges show {in_words(change.unexplained_mm)} that the encoders do not "
+        f"explain, more than {limit_mm:g} mm",
+        "A gauge slipped, or something moved; resume measures this point again",
     )

@@ -41,14 +41,13 @@ class Propose(Computation):
         assert state.identified is not None  # noqa: S101 - decided only after the identification
         settings, robot, result = run.settings, run.calibration.robot, state.identified.result
         identified = result.estimate(robot.mechanism.parameters)
-        commanding, _ = robot.mechanism.normalize_frames(robot.controller)
         started = state.started
         conditions = gates(
             identified,
             robot.tolerance_violations(identified),
             residuals=result.residuals,
+            change_mm=robot.largest_change(identified.geometry),
             largest_change_mm=settings.acceptance.largest_change_mm,
-            before=commanding,
             expired=started.expired if settings.certificates and started is not None else None,
         )
         written = as_written(settings, robot, identified.geometry)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar, Literal
 
-import numpy as np
-
 from drivers.errors import GaugeAtEnd
 from hexacell.errors import HexacellError, consists_only_of
 from hexacell.measurements.records import deviation_of
+from hexacell.noise.allowances import ReferenceChange
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import Phase, SetKey, ThreeNumbers
 from procedures.run.readings import Reading, in_words
@@ -69,24 +68,26 @@ class Revisit(StepOfSet):
                 raise
             return SetInvalidated(at=self.at, reason=str(error))
         await run.check_gauges()
-        before, limits = state.set(self.at).samples[0].reading, run.settings.reference_agreement
-        return check_reference(self.at, before, reading, *limits)
+        change = run.since_reference(state, self.at, reading)
+        return check_reference(self.at, change, reading, *run.settings.reference_agreement)
 
 
 def check_reference(
-    at: SetKey, before: Reading, now: Reading, limit_mm: float, joint_limit: float
+    at: SetKey, change: ReferenceChange, now: Reading, limit_mm: float, joint_limit: float
 ) -> ReferenceConfirmed | SetInvalidated:
     """Whether gauges and encoders show at a set's reference what they showed before.
 
     ``joint_limit`` is in the unit of the joint variables.
     """
-    gauges = np.subtract(now.gauges_mm, before.gauges_mm)
-    joints = np.subtract(now.joints, before.joints)
-    if np.abs(gauges).max() > limit_mm:
-        reason = f"back at its reference the gauges show {in_words(gauges)}, more than {limit_mm:g} mm"
+    if change.exceeds(limit_mm):
+        shown = in_words(change.unexplained_mm)
+        reason = (
+            f"back at its reference the gauges show {shown} that the encoders do not explain, more than "
+            f"{limit_mm:g} mm"
+        )
         return SetInvalidated(at=at, reason=reason, reading=now)
-    if np.abs(joints).max() > joint_limit:
-        leg = int(np.abs(joints).argmax())
-        reason = f"back at its reference q{leg + 1} shows {joints[leg]:+.3f}, more than {joint_limit:g}"
+    if (leg := change.leg_beyond(joint_limit)) is not None:
+        shown = f"{change.joints[leg]:+.3f}"
+        reason = f"back at its reference q{leg + 1} shows {shown}, more than {joint_limit:g}"
         return SetInvalidated(at=at, reason=reason, reading=now)
-    return ReferenceConfirmed(at=at, change_mm=deviation_of(gauges), reading=now)
+    return ReferenceConfirmed(at=at, change_mm=deviation_of(change.unexplained_mm), reading=now)

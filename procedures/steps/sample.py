@@ -11,6 +11,7 @@ from drivers.errors import GaugeAtEnd
 from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError, consists_only_of, joined
 from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Record, deviation_of
 from hexacell.robot.stated import gauge_travel_of
 from procedures.resources.run_resources import RunResources
@@ -56,7 +57,7 @@ class RecordRejected(EventOfSet):
     def applied_to(self, state: RunState) -> RunState:
         """At the pose the ball was outside the travel; before it, a guard stopped the robot on the way."""
         rejected = state.set(self.at).with_rejection(self.orientation)
-        is_on_the_way = self.at.phase.has_new_geometry and state.at_pose != (self.at, self.orientation)
+        is_on_the_way = state.at_pose != (self.at, self.orientation)
         left = state.without_position() if is_on_the_way else replace(state, at_pose=None)
         # With the new geometry it may be a verdict: that the gauges are as they were is verified first.
         is_verified = not self.at.phase.has_new_geometry or rejected.rejections > 1
@@ -105,7 +106,8 @@ async def read_inside(
         return RecordRejected(at=step.at, orientation=step.orientation, reason=str(error))
     zero = state.zero(step.at)
     if zero is None:
-        require_room(run.settings, reading.gauges_mm)
+        allowed_mm = run.calibration.known(state).allowances.mounting_mm(Pose(*step.pose))
+        require_room(run.settings, reading.gauges_mm, allowed_mm)
         zero = reading
     deviation = np.subtract(reading.gauges_mm, zero.gauges_mm)
     room = gauge_travel_of(run.settings).room(zero.gauges_mm)
@@ -115,17 +117,18 @@ async def read_inside(
     return reading
 
 
-def require_room(settings: CellSettings, shown_mm: ThreeNumbers) -> None:
+def require_room(settings: CellSettings, shown_mm: ThreeNumbers, allowed_mm: Array) -> None:
     """Raise ``MountingError`` for gauges whose plungers stand too far from the middle of their travel.
 
-    ``shown_mm`` is what they show along base x, y, z. A gauge whose display does not show its place passes.
+    ``shown_mm`` is what they show along base x, y, z, ``allowed_mm`` (3,) how far they may stand. A gauge
+    whose display does not show its place passes.
     """
     errors: list[MountingError] = []
     travel = gauge_travel_of(settings)
     room, needed = travel.room(shown_mm), travel.sure_room
     gauges = sorted(settings.gauges, key=lambda gauge: gauge.axis)
     for axis, (gauge, place) in enumerate(zip(gauges, travel.places(shown_mm), strict=True)):
-        if place is None or abs(place) <= settings.stations.mounting_mm:
+        if place is None or abs(place) <= allowed_mm[axis]:
             continue
         left = room.upper[axis] if place > 0.0 else -room.lower[axis]
         side = f"{'+' if place > 0.0 else '-'}{gauge.axis}"

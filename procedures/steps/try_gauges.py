@@ -9,14 +9,15 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from hexacell.cell.devices import GaugeSettings
-from hexacell.cell.model import CellSettings
 from hexacell.errors import joined
+from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of
-from hexacell.noise.gauge_trial import GaugeMistake, TrialFinding, judge_response, response_of
+from hexacell.noise.allowances import Allowances
+from hexacell.noise.gauge_trial import GaugeMistake, GaugeTrial, TrialFinding
 from procedures.resources.run_resources import RunResources
 from procedures.run.keys import ThreeNumbers
-from procedures.run.state import RunState
+from procedures.run.state import RunState, SetState
 from procedures.steps.base import EventOfSet, StepOfSet
 from procedures.steps.place import MountingError
 
@@ -69,26 +70,22 @@ class Try(StepOfSet):
 
     async def perform(self, run: RunResources, state: RunState) -> GaugesTried:
         """Compare the probes with the reference; raises ``MountingError`` where a gauge did not follow."""
-        measured = state.set(self.at)
-        zero = np.array(measured.samples[0].reading.gauges_mm)
-        moved = np.array([probe.moved_mm for probe in measured.probes])
-        shown = np.array([probe.reading.gauges_mm for probe in measured.probes]) - zero
-        x, y, z = (deviation_of(row) for row in require_response(run.settings, moved, shown))
+        trial = trial_of(run.calibration.known(state).allowances, state.set(self.at))
+        if trial.findings:
+            gauges = sorted(run.settings.gauges, key=lambda gauge: gauge.axis)
+            errors = [_mistake(finding, gauges, trial.response) for finding in trial.findings]
+            raise joined("the gauges do not answer as they are mounted by the cell file", errors)
+        x, y, z = (deviation_of(row) for row in trial.response)
         return GaugesTried(at=self.at, response=(x, y, z))
 
 
-def require_response(settings: CellSettings, moved_mm: Array, shown_mm: Array) -> Array:
-    """What each gauge showed per length of a move along each axis (3, 3), by gauge and axis.
-
-    ``moved_mm`` (3, 3) are the moves in rows, ``shown_mm`` (3, 3) what the gauges x, y, z showed of them.
-    Raises ``MountingError`` with the gauges that do not follow the ball as they should, and what to do.
-    """
-    response = response_of(moved_mm, shown_mm)
-    if findings := judge_response(response):
-        gauges = sorted(settings.gauges, key=lambda gauge: gauge.axis)
-        errors = [_mistake(finding, gauges, response) for finding in findings]
-        raise joined("the gauges do not answer as they are mounted by the cell file", errors)
-    return response
+def trial_of(allowances: Allowances, measured: SetState) -> GaugeTrial:
+    """What the gauges of a set showed beside its reference, and how far the ball went by the encoders."""
+    zero = measured.samples[0]
+    before = np.array(zero.reading.gauges_mm), np.array(zero.reading.joints)
+    shown = np.array([probe.reading.gauges_mm for probe in measured.probes]) - before[0]
+    joints = np.array([probe.reading.joints for probe in measured.probes]) - before[1]
+    return GaugeTrial(allowances.ball_at(Pose(*zero.pose)).motion(joints), shown)
 
 
 def _mistake(finding: TrialFinding, gauges: Sequence[GaugeSettings], response: Array) -> MountingError:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
+from hexacell.noise.allowances import Allowances
 from hexacell.verdict.decision import Verdict
 from procedures.calibration.calibration import Calibration, Mode
 from procedures.resources.run_resources import RunResources
@@ -45,6 +46,7 @@ class StepExecutor(RunResources):
         """Carry out one step; raises ``HexacellError``."""
         if not step.moves_nothing:
             await self.require_unedited_config(state)
+            self.guards.allow_following(self.calibration.known(state).allowances.following)
         return await step.perform(self, state)
 
 
@@ -54,7 +56,8 @@ def next_step(calibration: Calibration, state: RunState) -> BaseStep | None:
         return None
     if state.config_write_pending:
         return TakeBack()
-    measuring = Measuring(calibration.known(state).measuring)
+    known = calibration.known(state)
+    measuring = Measuring(known.measuring, known.allowances)
     if state.recalled is not None:
         return _way_back(measuring, state)
     if calibration.mode in {Mode.LENGTH, Mode.CHECK}:
@@ -71,9 +74,9 @@ def next_step(calibration: Calibration, state: RunState) -> BaseStep | None:
 class Measuring:
     """The stages that measure, for the geometries that command the robot of a plan."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, allowances: Allowances) -> None:
         sets, settings = SetSteps(plan.robot), plan.settings
-        trials = TrialSteps(settings.stations.trial_mm, sets)
+        trials = TrialSteps(settings.stations.trial_mm, sets, allowances)
         self.points = IdentificationSteps(plan, sets, NoiseSteps(plan, sets), trials)
         self.held_out = HeldOutSteps(len(settings.verification.points), sets, trials)
         fixture = settings.length_check
@@ -86,7 +89,7 @@ class Measuring:
 
 def length_poses(calibration: Calibration) -> tuple[tuple[str, Pose], ...]:
     """The poses of the length check of a run with their names; empty without one."""
-    steps = Measuring(calibration.plan).length
+    steps = Measuring(calibration.plan, calibration.at_start.allowances).length
     is_wanted = calibration.length_check or calibration.mode is Mode.LENGTH
     return steps.planned_poses() if is_wanted and steps is not None else ()
 
@@ -128,9 +131,11 @@ def _write_back(measuring: Measuring, state: RunState, *, has_length_check: bool
 
 def _after_verdict(state: RunState, judged: ResultValidated) -> BaseStep | None:
     """What follows a verdict on a written geometry: it stays, or a person decides, or it is rolled back."""
-    if judged.verdict is Verdict.PASS or state.rolled_back:
+    verification = judged.verification
+    stays = judged.verdict is Verdict.PASS or (verification is not None and verification.is_kept)
+    if stays or state.rolled_back:
         return None
-    is_offered = judged.verification is not None and judged.verification.is_offered
+    is_offered = verification is not None and verification.is_offered
     if is_offered and state.accepted is None and not state.rolling_back:
         return Accept()
     is_kept = state.accepted is not None and state.accepted.by is not None

@@ -81,4 +81,5 @@ def contradicted_points(points: Sequence[PointPrediction]) -> tuple[PointPredict
 def _prediction_test(costs: LinearCosts, rows: Mask) -> ChiSquareTest:
     every = np.ones(len(rows), dtype=bool)
     coordinates = costs.problem.subset(rows).coordinates
-    return ChiSquareTest(costs.least(every) - costs.least(~rows), coordinates)
+    chi2 = costs.least(every) - costs.least(~rows)
+    return ChiSquareTest(chi2, coordinates, costs.problem.noise.freedom)

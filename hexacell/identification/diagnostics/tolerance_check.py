@@ -218,7 +218,7 @@ class ToleranceFitter:
                 return at.result(best)
             change = np.zeros(9)
             change[self.frame_columns] = best[: at.frame_count] * self.frame_scales
-            there = _Step(self, at.frames.then(_small_change(change)), without)
+            there = _Step(self, at.frames.then(small_change(change)), without)
             moved = np.concatenate([np.zeros(at.frame_count), best[at.frame_count :]])
             if there.distance(moved) < (1.0 - LEAST_GAIN) * distance:
                 at, values, distance = there, moved, there.distance(moved)
@@ -247,7 +247,7 @@ class ToleranceFitter:
         there = Geometry(self.drawing.parameters, self._in(frames, self.geometry.vector))
 
         def changed(change: Array) -> Array:
-            return self.mechanism.change_frames(there, _small_change(change)).vector
+            return self.mechanism.change_frames(there, small_change(change)).vector
 
         steps = STEP * np.eye(9)[self.frame_columns]
         derivatives = np.array([changed(step) - changed(-step) for step in steps]).T / (2.0 * STEP)
@@ -335,7 +335,7 @@ class _Step:
         )
 
 
-def _small_change(change: Array) -> FrameTransform:
+def small_change(change: Array) -> FrameTransform:
     """A change of the frames by a shift, mm, a turn of the base and one of the platform, rad (9,)."""
     shift, base, platform = change.reshape(3, 3)
     return FrameTransform(rotations.from_vector(base), shift, rotations.from_vector(platform))

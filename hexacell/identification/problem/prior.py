@@ -37,6 +37,9 @@ class Noise:
         gauge_scale: of each gauge's relative scale error; zero if exact.
         encoder_shares: of each encoder, in units of ``encoder``; empty where all are alike.
         gauge_shares: of each gauge, x, y, z, in units of ``gauge_mm``.
+        stops: of where a joint stops beside its command, as its encoder shows it: no noise of a record, but
+            it moves the ball.
+        freedom: degrees of freedom with which all this was measured; infinite where it is stated.
         gauge_axes: rows of the matrix whose columns are the gauges' directions in the frame convention;
             empty where all gauges are alike, or along its axes.
     """
@@ -48,6 +51,8 @@ class Noise:
     encoder_shares: tuple[float, ...] = ()
     gauge_shares: tuple[float, ...] = ()
     gauge_axes: tuple[tuple[float, ...], ...] = ()
+    stops: float = 0.0
+    freedom: float = np.inf
 
     def with_devices(self, encoders: Sequence[float], gauges_mm: Sequence[float]) -> Noise:
         """This noise with that of each encoder, and of the gauges x, y and z."""
@@ -84,6 +89,10 @@ class Noise:
         """Covariance (n, 3, 3), mm^2, of the ball's position by ``dP/dq`` (n, 3, 6)."""
         scaled = position_by_joints * self.encoders
         return np.asarray(scaled @ np.swapaxes(scaled, -1, -2))
+
+    def stop_covariance(self, position_by_joints: Array) -> Array:
+        """Covariance (n, 3, 3), mm^2, of where the ball comes to rest, by ``dP/dq`` (n, 3, 6)."""
+        return np.asarray(self.stops**2 * position_by_joints @ np.swapaxes(position_by_joints, -1, -2))
 
     @property
     def gauge_covariance(self) -> Array:

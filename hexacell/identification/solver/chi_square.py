@@ -4,6 +4,10 @@ The expected chi-square is the number of measured coordinates, less the unknown 
 less the trace of C M for the parameters (C their covariance, M the information of the data): the effective
 degrees of freedom of ridge regression (Hastie, Tibshirani and Friedman, The Elements of Statistical
 Learning, 2nd ed. 2009). A parameter that the prior determines counts less than one.
+
+Where the noise was measured by repeated visits it is known with as many degrees of freedom as these have.
+The residuals are then compared with it by an F-test, as of lack of fit against pure error (Draper and
+Smith, Applied Regression Analysis, 3rd ed. 1998, chapter 2).
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ from enum import Enum
 
 import numpy as np
 
-from hexacell.distributions import chi_square_exceedance
+from hexacell.distributions import chi_square_exceedance, variance_ratio_exceedance
 
 SMALLEST_PROBABILITY = 1e-3
 CONTRADICTED_RATIO = 10.0
@@ -40,15 +44,21 @@ class ChiSquareTest:
         chi2: weighted sum of squares of the residuals.
         expected: its mean if model and stated noise are right; the degrees of freedom, where the
             data determine every parameter.
+        noise_freedom: degrees of freedom with which the noise was measured; infinite where it is stated.
     """
 
     chi2: float
     expected: float
+    noise_freedom: float = np.inf
 
     @property
     def probability(self) -> float:
         """Probability of residuals at least this large, if model and stated noise are right."""
-        return chi_square_exceedance(self.expected, self.chi2) if self.expected > 0.0 else 1.0
+        if self.expected <= 0.0:
+            return 1.0
+        if np.isinf(self.noise_freedom):
+            return chi_square_exceedance(self.expected, self.chi2)
+        return variance_ratio_exceedance(self.expected, self.noise_freedom, self.chi2 / self.expected)
 
     @property
     def ratio(self) -> float:

@@ -152,7 +152,8 @@ class LinearCosts:
         information = by_parameters.T @ by_parameters
         information = information - shared.T @ np.linalg.solve(by_causes.T @ by_causes, shared)
         taken = float(np.sum(covariance[:, : len(covariance)] * information))
-        return ChiSquareTest(cost - float(of_prior @ of_prior), self.problem.coordinates - taken)
+        chi2 = cost - float(of_prior @ of_prior)
+        return ChiSquareTest(chi2, self.problem.coordinates - taken, self.problem.noise.freedom)
 
     def _system(self, rows: Mask) -> tuple[Array, Array]:
         """Whitened rows (r, p + k) and values (r,) of some records and of the causes' unit variance."""

@@ -233,7 +233,7 @@ class Identification:
     def noise_test(self) -> ChiSquareTest:
         """The chi-square test of the residuals of a machine that has no error but the noise."""
         trace = float(np.sum(self.free_covariance * self.solution.information))
-        return ChiSquareTest(self.chi2, self.problem.coordinates - trace)
+        return ChiSquareTest(self.chi2, self.problem.coordinates - trace, self.problem.noise.freedom)
 
     @cached_property
     def goodness(self) -> ChiSquareTest:

@@ -77,6 +77,8 @@ def _is_accepted(state: RunState, *, is_applied_later: bool) -> bool:
     if state.judged.verdict is Verdict.PASS:
         return True
     verification = state.judged.verification
+    if verification is not None and verification.is_kept:
+        return True
     holds = verification is not None and all(test.passed for test in verification.tests)
     is_kept = state.accepted is not None and state.accepted.by is not None
     return holds and (is_kept or is_applied_later)

@@ -20,7 +20,6 @@ from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.robot.model import config_layout
 from hexacell.runs.run_folder import RunFolder
 from hexacell.verdict.acceptance_gates import AcceptanceGate
-from hexacell.verdict.decision import Verdict
 from procedures.journal.journal import RESTORE, now, read_journal
 from procedures.resources.controller_config import holds_provisional
 from procedures.run.questions import Operator, Question, ask_approval
@@ -177,7 +176,7 @@ def _verification_gate(state: RunState) -> AcceptanceGate:
         return AcceptanceGate(name="verified", passed=False, sentence=sentence, needs_person=True)
     return AcceptanceGate(
         name="verified",
-        passed=judged.verdict is Verdict.PASS,
+        passed=judged.verification.is_kept,
         sentence=f"Its verification: {judged.line}.",
         needs_person=judged.verification.is_offered,
     )

@@ -1,0 +1,149 @@
+"""What joints and gauges may be off by, once it is measured how well the machine repeats.
+
+What a cell file states is where a run starts. The joints of a machine that does not repeat stop elsewhere
+each time; the encoders see it, and the gauges show it. A limit is therefore widened to what chance explains
+by the scatter that was measured, unless the cell file says that it is fixed. A difference of the gauges at
+one reference is compared only as far as the encoders do not explain it: what is left, beyond its noise and
+what is not known of the geometry (:mod:`.ball_by_encoders`), is a gauge that slipped, or something that
+moved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.cell.model import CellSettings
+from hexacell.design.predicted_records import CHANCE_SIGMAS, TRAVEL_SHARE
+from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.rotations import Array
+from hexacell.noise.ball_by_encoders import BallByEncoders
+from hexacell.robot.model import Robot
+from hexacell.robot.stated import gauge_travel_of
+
+SIGMAS = 5.0
+"""Standard deviations up to which a difference is chance, at some hundred stops of six joints each."""
+
+SCATTER = 1.5
+"""Noise of the encoders over what is stated from which the ball may leave the travel by chance."""
+
+ROOM_KEPT = 0.5
+"""Share of the gauges' room that a plunger has left on either side when the gauges are zeroed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Allowances:
+    """What may be off at a stop, at a standstill or back at a reference.
+
+    Attributes:
+        settings: of the cell, as stated.
+        robot: with the geometry that its controller has, and the noise of a record as known by now.
+        is_measured: whether its noise was measured.
+    """
+
+    settings: CellSettings
+    robot: Robot
+    is_measured: bool = False
+
+    @property
+    def stops(self) -> float:
+        """One standard deviation of where a joint stops, as its encoder shows it, as far as measured."""
+        return self.robot.noise.stops
+
+    @property
+    def scatters(self) -> bool:
+        """Whether it was measured that the machine does not repeat, beyond what is stated of a record."""
+        stated = self.settings.noise.encoder
+        return self.is_measured and (self.stops > stated or self.robot.noise.encoder > SCATTER * stated)
+
+    @property
+    def following(self) -> float:
+        """How far a joint may stop from its command, in its unit.
+
+        Until the scatter is measured, as far as the gauges can follow the ball.
+        """
+        guards, wanted = self.settings.guards, self.settings.noise
+        if guards.limits == "fixed":
+            return guards.following
+        stated = max(guards.following, SIGMAS * self.stops)
+        if self.is_measured or not wanted.revisits:
+            return stated
+        reference = Pose(*self.settings.identification.points[0])
+        ball = self.ball_at(reference)
+        room = gauge_travel_of(self.settings).sure_room.smallest_mm
+        return max(stated, room / float(np.linalg.norm(ball.by_joints, axis=0).max()))
+
+    def since(self, reference: Pose, before: Array, now: Array) -> ReferenceChange:
+        """The change of two readings (9,) at one reference: gauges x, y, z, mm, then the encoders."""
+        ball, noise = self.ball_at(reference), self.robot.noise
+        change = now - before
+        joints = change[3:]
+        by_encoders = ball.by_joints * noise.encoders
+        two = 2.0 * (by_encoders @ by_encoders.T + np.diag(noise.gauges_mm**2))
+        covariance = two + ball.covariance(joints)
+        is_fixed = self.settings.guards.limits == "fixed"
+        return ReferenceChange(
+            unexplained_mm=change[:3] - ball.motion(joints),
+            covariance=covariance,
+            explicable_mm=np.zeros(3) if is_fixed else SIGMAS * np.sqrt(np.diag(covariance)),
+            joints=joints,
+            explicable_joints=0.0 if is_fixed else float(np.sqrt(2.0)) * SIGMAS * self.stops,
+        )
+
+    def mounting_mm(self, reference: Pose) -> Array:
+        """How far each plunger (3,) may stand from the middle of its travel when the gauges are zeroed.
+
+        Fixed gauges are where the machine has once been; no person can bring them nearer, and half of
+        their room is enough.
+        """
+        stated = self.settings.stations.mounting_mm
+        kept = ROOM_KEPT * gauge_travel_of(self.settings).room().smallest_mm
+        if self.settings.guards.limits == "fixed":
+            return np.full(3, stated)
+        if self.settings.stations.placement == "fixed":
+            return np.full(3, max(stated, kept))
+        scatter = self.stops * np.linalg.norm(self.ball_at(reference).by_joints, axis=1)
+        widened = np.minimum(SIGMAS * scatter, kept)
+        return np.asarray(np.maximum(stated, widened))
+
+    def needed_travel_mm(self, reference: Pose) -> float:
+        """Measuring range of gauges in which the ball stays by chance, if it is not moved at all, mm."""
+        ball, noise = self.ball_at(reference), self.robot.noise
+        by_joints = ball.by_joints[None]
+        records = 2.0 * noise.encoder_covariance(by_joints)[0] + noise.stop_covariance(by_joints)[0]
+        chance = np.sqrt(np.diag(records) + 2.0 * noise.gauges_mm**2).max()
+        return 2.0 * CHANCE_SIGMAS * float(chance) / TRAVEL_SHARE
+
+    def ball_at(self, reference: Pose) -> BallByEncoders:
+        """How the ball moves near a reference by what the encoders show."""
+        robot = self.robot
+        return BallByEncoders.at(robot, robot.belief(), robot.from_commands([reference]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReferenceChange:
+    """How two readings at one reference differ.
+
+    Attributes:
+        unexplained_mm: (3,) of the gauges x, y, z, less what the encoders show of it.
+        covariance: (3, 3), mm^2, of that, by noise and an uncertain geometry.
+        explicable_mm: (3,) up to which these explain it.
+        joints: (6,) of the encoders.
+        explicable_joints: up to which the scatter of the stops explains these.
+    """
+
+    unexplained_mm: Array
+    covariance: Array
+    explicable_mm: Array
+    joints: Array
+    explicable_joints: float
+
+    def exceeds(self, limit_mm: float) -> bool:
+        """Whether a gauge shows more than a limit, and more than is explicable."""
+        return bool((np.abs(self.unexplained_mm) > np.maximum(limit_mm, self.explicable_mm)).any())
+
+    def leg_beyond(self, limit: float) -> int | None:
+        """The leg, from 0, whose encoder shows most, beyond a limit and what is explicable; or None."""
+        leg = int(np.abs(self.joints).argmax())
+        return leg if abs(self.joints[leg]) > max(limit, self.explicable_joints) else None

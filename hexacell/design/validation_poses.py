@@ -14,7 +14,6 @@ from hexacell.design.criteria import innovation_covariance
 from hexacell.design.predicted_records import CHANCE_SIGMAS, TRAVEL_SHARE, position_derivatives
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.kinematics import rotations
 from hexacell.kinematics.commanded_motion import ActualPoses
 from hexacell.kinematics.pose import PoseBatch
@@ -97,7 +96,7 @@ def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
     noise = belief.noise
     covariance = innovation_covariance(belief.covariance, jacobian - jacobian[0], np.zeros((3, 3)))
     sigma = belief.limits.sigma_along_gauges(covariance)
-    each = record_covariance(by_joints, noise) + noise.stop_covariance(by_joints)
+    each = noise.record_covariance(by_joints) + noise.stop_covariance(by_joints)
     chance = belief.limits.sigma_along_gauges(each + each[0])
     deviation = actual.poses.positions - actual.poses.positions[0]
     by_geometry = SAFETY_SIGMAS * sigma

@@ -54,13 +54,6 @@ def zero_columns(mechanism: Mechanism, geometry: Geometry) -> Array:
     return np.asarray(left[:, sizes > SAME_CHANGE * sizes[0]])
 
 
-def zeros_by_noise(mechanism: Mechanism, geometry: Geometry, information: Array) -> Array:
-    """Standard deviations (p,) of the zeros by an information (p, p), were all else exact; else zero."""
-    columns = zero_columns(mechanism, geometry)
-    inverse = np.linalg.inv(columns.T @ information @ columns)
-    return np.sqrt(np.maximum(np.diag(columns @ inverse @ columns.T), 0.0))
-
-
 @dataclass(frozen=True, eq=False)
 class HeldParameters:
     """What is identified beside parameters that are held.

@@ -14,7 +14,7 @@ For each source one variance more is estimated by restricted maximum likelihood,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -75,6 +75,7 @@ class RepeatedApproaches(Frozen):
         visits: of the pose, the first one included.
         ball_mm: how far the ball is from its mean, as the gauges see it (root mean square distance).
         ratio: of what the encoders do not explain to what the stated noise explains.
+        ratio_as_drawn: likewise, were the geometry exactly as drawn.
         source: what does not repeat beyond that; None where the stated noise explains everything.
         excess: one standard deviation of it beside the stated noise, of each joint or encoder or of
             the instrument, in ``unit``.
@@ -86,6 +87,7 @@ class RepeatedApproaches(Frozen):
     degrees_of_freedom: int
     ball_mm: float
     ratio: float
+    ratio_as_drawn: float
     source: ScatterSource | None = None
     unit: JointUnit = JointUnit.MM
     excess: float = 0.0
@@ -96,7 +98,7 @@ class RepeatedApproaches(Frozen):
     def ratio_at_most(self) -> float:
         """Upper limit of the true ratio, with 95 % confidence."""
         freedom = self.degrees_of_freedom
-        return self.ratio * float(np.sqrt(freedom / chi_square_limit(freedom, CONFIDENCE)))
+        return self.ratio_as_drawn * float(np.sqrt(freedom / chi_square_limit(freedom, CONFIDENCE)))
 
 
 def approach_scatter(
@@ -121,7 +123,8 @@ def approach_scatter(
         return None
     shown = np.concatenate([deviations, joints], axis=1)
     around = shown - shown.mean(axis=0)
-    stated = np.diag(np.concatenate([gauges_mm, encoders]) ** 2)
+    instruments = np.diag(np.concatenate([gauges_mm, encoders]) ** 2)
+    stated = instruments.copy()
     stated[:3, :3] += ball.covariance(around[:, 3:]).sum(axis=0) / (len(shown) - 1)
     visits = _Visits(
         products=around.T @ around,
@@ -130,11 +133,13 @@ def approach_scatter(
         freedom=len(shown) - 1,
     )
     freedom, chi_square = 3 * visits.freedom, visits.unexplained()
+    as_drawn = replace(visits, stated=instruments).unexplained()
     found = RepeatedApproaches(
         visits=len(deviations),
         degrees_of_freedom=freedom,
         ball_mm=float(np.sqrt(np.trace(visits.products[:3, :3]) / visits.freedom)),
         ratio=float(np.sqrt(chi_square / freedom)),
+        ratio_as_drawn=float(np.sqrt(as_drawn / freedom)),
         stops=_stops(visits, encoders),
         stop_unit=joint_unit,
     )

@@ -106,12 +106,10 @@ def _stated_effects(settings: CellSettings, measured: MeasuredNoise) -> object:
     if approaches is None:
         return stated
     visits = f"{approaches.visits} visits of the first reference"
-    changes: dict[str, object] = {"sources": stated.sources | {STOPS: visits}}
+    keys, changes = [STOPS] if approaches.stops else [], dict[str, object]()
     if approaches.source is ScatterSource.JOINTS:
         key = repeatability_key(approaches.unit)
-        changes = {
-            key: 1e3 * approaches.excess,
-            "stop_repeatability_acts": "at work",
-            "sources": stated.sources | {STOPS: visits, key: visits},
-        }
-    return stated.model_copy(update=changes)
+        keys.append(key)
+        changes = {key: 1e3 * approaches.excess, "stop_repeatability_acts": "at work"}
+    sources = stated.sources | dict.fromkeys(keys, visits)
+    return stated.model_copy(update=changes | {"sources": sources})

@@ -161,9 +161,9 @@ def _residual_verdict(goodness: ChiSquareTest) -> str:
         case ChiSquareVerdict.NOT_EVALUATED:
             return f"Not proven: {lower}"
         case ChiSquareVerdict.TOO_SMALL:
-            return f"Good: the records determine every parameter. {sentence}"
+            return f"Good, though {lower}"
         case ChiSquareVerdict.AGREES:
-            return "Good: the records determine every parameter, and agree with the stated noise."
+            return "Good: the records agree with the stated noise."
 
 
 def _possible_causes(assessed: Assessment) -> str:

@@ -10,6 +10,7 @@ import pytest
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import POSITION, pose_sensitivity
 from hexacell.noise.approach_scatter import ScatterSource, approach_scatter
+from hexacell.noise.ball_by_encoders import BallByEncoders
 
 NOISE = 0.01
 VISITS = 7
@@ -32,7 +33,8 @@ def visit(by_joints):
         joints = seen + np.hypot(NOISE, encoders) * random.standard_normal((visits, 6))
         ball = (seen + sliders * random.standard_normal((visits, 6))) @ by_joints.T
         shown = ball + np.hypot(NOISE, gauges) * random.standard_normal((visits, 3))
-        return approach_scatter(shown, joints, by_joints, np.full(6, stated), np.full(3, stated))
+        ball = BallByEncoders(by_joints, np.zeros((3, 1, 6)))
+        return approach_scatter(shown, joints, ball, np.full(6, stated), np.full(3, stated))
 
     return scatter
 
@@ -43,6 +45,13 @@ def test_stops_that_the_encoders_see_are_no_scatter(visit) -> None:
     assert np.mean([one.ratio**2 for one in found]) == pytest.approx(1.0, abs=0.03)
     assert {one.degrees_of_freedom for one in found} == {3 * (VISITS - 1)}
     assert np.mean([one.ball_mm for one in found]) > 0.05  # the ball moved with them
+
+
+@pytest.mark.parametrize("stops", [0.01, 0.05, 0.5])
+def test_how_far_joints_stop_beside_their_commands(visit, stops) -> None:
+    found = [visit(stops=stops).stops for _ in range(300)]
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(stops, rel=0.08)
+    assert np.mean([visit(stops=0.0).stops > 0.0 for _ in range(500)]) == pytest.approx(0.05, abs=0.02)
 
 
 def test_the_upper_limit_of_the_noise_holds_in_95_percent(visit) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import Pose
-from hexacell.noise.gauge_trial import GaugeMistake, TrialFinding, judge_response, response_of
+from hexacell.noise.gauge_trial import GaugeMistake, GaugeTrial, TrialFinding, judge_response
 from hexacell.robot.model import robot_of
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
 
@@ -33,7 +33,7 @@ def responses(bundled_cell) -> np.ndarray:
             positions = virtual.actual_poses(commands).poses.positions
             triad = rotations.from_vector(np.radians(HAND_DEG) * random.standard_normal(3))
             shown = (positions[1:] - positions[0]) @ triad.T + NOISE_MM * random.standard_normal((3, 3))
-            found.append(response_of(np.eye(3), shown))
+            found.append(GaugeTrial(np.eye(3), shown).response)
     return np.array(found)
 
 
@@ -82,4 +82,29 @@ def test_three_dead_gauges_are_all_named() -> None:
 def test_the_response_is_by_gauge_and_axis_whatever_the_moves() -> None:
     response = np.array([[1.0, 0.1, 0.0], [0.0, 0.9, 0.2], [0.3, 0.0, 1.1]])
     moved = np.diag([1.0, -1.0, 0.5])
-    assert response_of(moved, moved @ response.T) == pytest.approx(response)
+    assert GaugeTrial(moved, moved @ response.T).response == pytest.approx(response)
+
+
+ROUNDS = np.concatenate([length * np.eye(3) for length in (1.0, 1.5, 1.5)])
+"""The moves of a trial that is repeated."""
+
+
+def shown_by(signs, scatter_mm, random) -> GaugeTrial:
+    """Gauges on a machine that does not repeat; the reading at the reference is off by as much."""
+    errors = scatter_mm * (random.standard_normal((len(ROUNDS), 3)) - random.standard_normal(3))
+    return GaugeTrial(ROUNDS, (ROUNDS + errors) * signs)
+
+
+@pytest.mark.parametrize("scatter_mm", [0.0, 0.1, 0.5, 1.5])
+def test_no_gauge_is_blamed_for_a_machine_that_does_not_repeat(scatter_mm) -> None:
+    random = np.random.default_rng(3)
+    trials = [shown_by(np.ones(3), scatter_mm, random) for _ in range(400)]
+    assert sum(bool(trial.findings) for trial in trials) <= 1
+    assert scatter_mm < 0.5 or any(judge_response(trial.response) for trial in trials)
+
+
+@pytest.mark.parametrize("scatter_mm", [0.0, 0.1, 0.2])
+def test_a_reversed_gauge_is_named_on_such_a_machine(scatter_mm) -> None:
+    random = np.random.default_rng(4)
+    trials = [shown_by(np.array([1.0, -1.0, 1.0]), scatter_mm, random) for _ in range(200)]
+    assert np.mean([TrialFinding(REVERSED, (1,)) in trial.findings for trial in trials]) > 0.98

@@ -29,7 +29,13 @@ def said(noise: MeasuredNoise) -> str:
 
 def visits(ratio: float, source: ScatterSource | None = None, excess: float = 0.0) -> RepeatedApproaches:
     return RepeatedApproaches(
-        visits=7, degrees_of_freedom=18, ball_mm=0.02, ratio=ratio, source=source, excess=excess
+        visits=7,
+        degrees_of_freedom=18,
+        ball_mm=0.02,
+        ratio=ratio,
+        ratio_as_drawn=ratio,
+        source=source,
+        excess=excess,
     )
 
 

@@ -17,6 +17,7 @@ from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import DeviceError, ExitCode, LimitError
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.limits.gauge_travel import GaugeRoom
+from hexacell.noise.allowances import ReferenceChange
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
 from procedures.guards.rules.after_a_move import following_error, stuck_gauge
 from procedures.guards.rules.base import GuardLimits
@@ -243,8 +244,13 @@ def test_an_unchanged_gauge_trips_if_the_ball_should_have_moved(shown, expected_
 
 
 def test_drift_has_its_own_exit_code() -> None:
-    assert reference_drift("P2", (0.1, -0.1, 0.0), 0.1) is None
-    trip = reference_drift("P2", (0.0, -0.101, 0.0), 0.1)
+    def change(*unexplained: float, explicable: float = 0.0) -> ReferenceChange:
+        shown = np.array(unexplained), np.eye(3), np.full(3, explicable)
+        return ReferenceChange(*shown, joints=np.zeros(6), explicable_joints=0.0)
+
+    assert reference_drift("P2", change(0.1, -0.1, 0.0), 0.1) is None
+    assert reference_drift("P2", change(0.0, -0.3, 0.0, explicable=0.4), 0.1) is None
+    trip = reference_drift("P2", change(0.0, -0.101, 0.0), 0.1)
     assert trip is not None
     error = trip.as_error()
     assert isinstance(error, DriftTripped)

@@ -140,7 +140,7 @@ def approach_scatter(
         ball_mm=float(np.sqrt(np.trace(visits.products[:3, :3]) / visits.freedom)),
         ratio=float(np.sqrt(chi_square / freedom)),
         ratio_as_drawn=float(np.sqrt(as_drawn / freedom)),
-        stops=_stops(visits, encoders),
+        stops=_stops(visits, encoders**2),
         stop_unit=joint_unit,
     )
     if chi_square_exceedance(freedom, chi_square) >= SIGNIFICANCE:
@@ -151,15 +151,18 @@ def approach_scatter(
     is_alone = excesses[alone][0] >= excesses[together][0] + np.log(INSTRUMENT_ODDS)
     source = alone if is_alone else together
     unit = JointUnit.MM if source.instruments[:3].any() else joint_unit
-    return found.model_copy(update={"source": source, "unit": unit, "excess": excesses[source][1]})
+    excess = excesses[source][1]
+    by_encoders = 0.0 if source is ScatterSource.JOINTS else excess**2 * source.instruments[3:]
+    stops = _stops(visits, encoders**2 + by_encoders)
+    return found.model_copy(update={"source": source, "unit": unit, "excess": excess, "stops": stops})
 
 
-def _stops(visits: _Visits, encoders: Array) -> float:
-    """One standard deviation of where a joint stops; zero where the noise of the encoders explains it."""
+def _stops(visits: _Visits, variances: Array) -> float:
+    """One standard deviation of where a joint stops; zero where the variances of encoders explain it."""
     squares, freedom = np.diag(visits.products)[3:], visits.freedom
-    if chi_square_exceedance(LEGS * freedom, float(np.sum(squares / encoders**2))) >= SEEN:
+    if chi_square_exceedance(LEGS * freedom, float(np.sum(squares / variances))) >= SEEN:
         return 0.0
-    return float(np.sqrt(np.mean(squares / freedom - encoders**2)))
+    return float(np.sqrt(max(0.0, float(np.mean(squares / freedom - variances)))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,11 +7,9 @@ from itertools import chain, repeat
 
 import numpy as np
 
-from hexacell.campaign.feasibility import LARGEST_SHARE_UNKNOWN
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.design.decorrelation import DecorrelatingPose, decorrelating_poses
-from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.model_tests import PointPrediction, leave_one_point_out
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
@@ -27,6 +25,7 @@ from hexacell.results.result import ExpectedImprovement
 from hexacell.robot.model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.possible_causes import PossibleCause, possible_causes
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 SEPARATED_PAIRS = 5
 """Number of the strongest correlations for which a separating measurement is searched."""
@@ -69,7 +68,8 @@ class Assessment:
     measured_noise: MeasuredNoise | None = None
     points: tuple[PointPrediction, ...] = ()
     zeros: IdentifiedZeros | None = None
-    share_unknown: float = 0.0
+    unknown_mm: float = 0.0
+    limit_mm: float = np.inf
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -89,8 +89,8 @@ class Assessment:
 
     @property
     def determines_too_little(self) -> bool:
-        """Whether the task poses are hardly better known than by the drawing: the geometry is no result."""
-        return self.share_unknown > LARGEST_SHARE_UNKNOWN
+        """Whether the records leave the error at a task pose unknown by more than its limit."""
+        return COVERAGE_FACTOR * self.unknown_mm > self.limit_mm
 
     @property
     def improvement(self) -> ExpectedImprovement | None:
@@ -125,6 +125,7 @@ def assess(
     if zeros is not None:
         belief = replace(belief, covariance=zeros.free_covariance)
     task = Task.of(settings, robot, belief)
+    error = task.error(belief)
     accuracy = predicted_accuracy(belief, task=task.poses, workspace=task.workspace)
     pairs, goodness = found.strongly_correlated(), found.goodness
     separating = decorrelating_poses(robot.belief(found), found, pairs[:SEPARATED_PAIRS])
@@ -148,13 +149,6 @@ def assess(
         measured_noise=measured_noise,
         points=leave_one_point_out(found) if found.converged else (),
         zeros=zeros,
-        share_unknown=_share_unknown(task, belief, robot),
+        unknown_mm=0.0 if error is None else error.worst(belief.covariance),
+        limit_mm=settings.acceptance.position_mm,
     )
-
-
-def _share_unknown(task: Task, belief: RobotBelief, robot: Robot) -> float:
-    """The error left at the worst task pose over that of what was known before; 0 without any pose."""
-    error = task.error(belief)
-    if error is None:
-        return 0.0
-    return error.worst(belief.covariance) / error.worst(robot.prior.covariance)

@@ -104,8 +104,9 @@ def _verdict(assessed: Assessment) -> str:
         )
     if assessed.determines_too_little:
         return (
-            f"Not usable: the task poses are known {1.0 / assessed.share_unknown:.1f} times as well as by "
-            "the drawing alone. Measure at more points, and in more orientations with larger tilts."
+            f"Incomplete: these records leave {2.0 * assessed.unknown_mm:.2g} mm of the error at the worst "
+            f"task pose unknown (two sigma; its limit is {assessed.limit_mm:g} mm). Measure at more "
+            "points, and in more orientations with larger tilts."
         )
     return _point_verdict(assessed) or _residual_verdict(found.goodness)
 

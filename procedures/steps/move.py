@@ -154,7 +154,8 @@ class Move(StepAtPose):
             # A machine that does not repeat may leave the plate by chance: another pose is taken. Where a
             # new geometry takes the ball off its plate, the second time is a verdict.
             run.guards.supervisor.clear()
-            return RecordRejected(at=self.at, orientation=self.orientation, reason=str(tripped))
+            reason = str(tripped)
+            return RecordRejected(at=self.at, orientation=self.orientation, reason=reason, on_the_way=True)
         return Arrived(at=self.at, orientation=self.orientation, pose=self.pose)
 
     def _watched(self, state: RunState) -> WatchedSet:

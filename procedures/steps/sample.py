@@ -46,19 +46,19 @@ class RecordTaken(EventAtPose):
 class RecordRejected(EventOfSet):
     """A record was rejected: the ball left the travel. Its orientation is chosen again.
 
-    There is no ``reading`` if a plunger was at its end.
+    There is no ``reading`` if a plunger was at its end, nor where a guard stopped the robot ``on_the_way``.
     """
 
     kind: Literal["refused"] = "refused"
     orientation: int
     reason: str
     reading: Reading | None = None
+    on_the_way: bool = False
 
     def applied_to(self, state: RunState) -> RunState:
-        """At the pose the ball was outside the travel; before it, a guard stopped the robot on the way."""
+        """At the pose the ball was outside the travel, or a guard stopped the robot on the way to it."""
         rejected = state.set(self.at).with_rejection(self.orientation)
-        is_on_the_way = state.at_pose != (self.at, self.orientation)
-        left = state.without_position() if is_on_the_way else replace(state, at_pose=None)
+        left = state.without_position() if self.on_the_way else replace(state, at_pose=None)
         # With the new geometry it may be a verdict: that the gauges are as they were is verified first.
         is_verified = not self.at.phase.has_new_geometry or rejected.rejections > 1
         return left.with_set(self.at, rejected if is_verified else rejected.unverified())

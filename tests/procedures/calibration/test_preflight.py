@@ -82,9 +82,7 @@ async def test_a_cancelled_plan_check_ends_before_its_next_part(make_rig, monkey
     rig = make_rig()
     calls: list[object] = []
     monkeypatch.setattr(feasibility, piece, stopped_in_its_first_call(getattr(feasibility, piece), calls))
-    monkeypatch.setattr(
-        feasibility, "_undetermined_parameters", lambda _plan: pytest.fail("the check went on")
-    )
+    monkeypatch.setattr(feasibility, "_no_better", lambda _plan: pytest.fail("the check went on"))
     with pytest.raises(asyncio.CancelledError):
         await plan_failures(rig.calibration, unattended=True)
     assert len(calls) == 1

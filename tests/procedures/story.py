@@ -60,9 +60,10 @@ class Story:
         where = self.arrived(orientation, pose).model_dump(exclude={"kind"})
         return events.RecordTaken(**where, reading=reading, deviation_mm=deviation)
 
-    def refused(self, orientation: int = 2) -> events.Event:
+    def refused(self, orientation: int = 2, *, on_the_way: bool = False) -> events.Event:
+        reason = "the ball left the travel"
         return events.RecordRejected(
-            at=self.key, orientation=orientation, reason="the ball left the travel"
+            at=self.key, orientation=orientation, reason=reason, on_the_way=on_the_way
         )
 
     def excluded(self, orientation: int = 2, pose: SixNumbers | None = None) -> events.Event:

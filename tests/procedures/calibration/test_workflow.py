@@ -111,7 +111,7 @@ TABLE: Table = {
     "taking it back was interrupted": ([*WRITTEN, WITHDRAWING, INTERRUPTED, LOCATED], "roll back"),
     "taken back without a verdict": ([*WRITTEN, WITHDRAWING, events.RolledBack()], "commit"),
     "refused on the way afterwards": (
-        [*WRITTEN, *s(Phase.AFTER).whole(1)[:3], s(Phase.AFTER).refused()],
+        [*WRITTEN, *s(Phase.AFTER).whole(1)[:3], s(Phase.AFTER).refused(on_the_way=True)],
         "locate",
     ),
     "refused at a pose afterwards": ([*WRITTEN, *refused_at_a_pose(s(Phase.AFTER))], "after-V1/o01/move"),

@@ -11,8 +11,8 @@ from hexacell.cli.arguments.runs import add_run_commands, add_study_commands
 
 EXIT_CODES = """exit codes:
   0 done, within limits            4 an answer or approval is needed
-  1 out of limits or worse,        5 the cell is in use
-    nothing applied                6 write-back failed and was undone
+  1 not within limits; a better    5 the cell is in use
+    geometry may have stayed       6 write-back failed and was undone
   2 usage or file error            7 out of its time; it can be resumed
   3 hardware or link               70 a fault of the program
                                    130 interrupted"""

@@ -59,7 +59,7 @@ def _error_lines(accuracy: VerifiedAccuracy | None) -> Iterator[str]:
     if (geometry := accuracy.of_geometry) is not None:
         found = geometry.position
         size = f"{found.value:.3f} mm, U {found.expanded:.3f}: {geometry.verdict}"
-        yield f"  of that by the geometry: {size}; the rest is how the joints scatter about their commands"
+        yield f"  of that by the geometry: {size}; the rest is scatter"
     guard_bands = [error.guard_band for _, _, error in accuracy.errors if error.guard_band]
     if guard_bands:
         yield f"  a pass and a fail keep {guard_bands[0]} from the limit"

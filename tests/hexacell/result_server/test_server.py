@@ -25,13 +25,21 @@ from cryptography.x509.oid import ExtendedKeyUsageOID
 from hexacell.cell.loader import Cell
 from hexacell.cell.operation import OpcUaSettings
 from hexacell.errors import DeviceError, FileError, UsageError
-from hexacell.result_server.server import MOST_RESULTS, NAMESPACE, ensure_certificate, serve_results
+from hexacell.result_server.server import (
+    MOST_RESULTS,
+    NAMESPACE,
+    Reader,
+    allowed_reader,
+    ensure_certificate,
+    serve_results,
+)
 from hexacell.runs.run_folder import runs_folder
 from hexacell.verdict.decision import Verdict
 from tests.hexacell.services.notify.local_servers import closed_port
 from tests.hexacell.services.proposed_runs import a_cell, propose_run
 
 USER, PASSWORD = "line-7", "hidden-password"
+READER_FILE = "reader.toml"
 QUIET = logging.getLogger("asyncua")
 
 
@@ -110,6 +118,12 @@ async def results(client: Client, cell: Cell) -> dict[str, dict[str, Any]]:
     return found
 
 
+def password_file(cell: Cell, mode: int) -> None:
+    path = cell.path.parent / READER_FILE
+    path.write_text(f'user = "{USER}"\npassword = "{PASSWORD}"\n')
+    path.chmod(mode)
+
+
 class Heard:
     """What a subscription is told."""
 
@@ -120,18 +134,27 @@ class Heard:
         self.told.put_nowait(event)
 
 
-async def test_results_can_be_read_and_each_new_one_is_told_once(cell, client_files) -> None:
+async def test_the_reader_alone_gets_in_reads_results_changes_none_and_is_told_each_new_one_once(
+    cell, client_files, monkeypatch
+) -> None:
+    monkeypatch.delenv("HEXACELL_OPCUA_USER")
+    password_file(cell, 0o600)
     propose_run(cell, "2026-11-01T100000Z")
     going_on = propose_run(cell, "2026-11-01T110000Z").folder.journal
     going_on.write_bytes(b"".join(going_on.read_bytes().splitlines(keepends=True)[:-1]))
     name = cell.settings.name
-    async with serving(cell) as address, reading(address, client_files) as client:
+    async with (
+        serving(cell, password_file=READER_FILE) as address,
+        reading(address, client_files) as client,
+    ):
+        await _only_the_reader_gets_in(address, client_files)
         ((shown, values),) = (await results(client, cell)).items()
         assert shown == values["ResultId"] == f"{name}/2026-11-01T100000Z"
         assert (values["ResultEvaluation"], values["ResultState"], values["IsSimulated"]) == (1, 1, True)
         assert (values["Verdict"], values["Mode"]) == ("pass", "optimise")
         assert values["ResultEvaluationDetails"] == "over"
         assert math.isnan(values["PositionErrorMm"])
+        await _changes_nothing(client, cell, "2026-11-01T100000Z")
 
         number = await client.get_namespace_index(NAMESPACE)
         kind = await client.nodes.base_event_type.get_child(f"{number}:ResultReadyEventType")
@@ -155,37 +178,27 @@ async def test_results_can_be_read_and_each_new_one_is_told_once(cell, client_fi
     assert left == [f"{name}/2026-11-{day:02}T100000Z" for day in days][-MOST_RESULTS:]
 
 
-async def test_who_is_not_the_reader_is_refused_and_the_reader_changes_nothing(
-    cell, client_files, monkeypatch
-) -> None:
-    monkeypatch.delenv("HEXACELL_OPCUA_USER")
-    path = cell.path.parent / "reader.toml"
-    path.write_text(f'user = "{USER}"\npassword = "{PASSWORD}"\n')
-    path.chmod(0o600)
-    propose_run(cell, "2026-11-20T100000Z")
+async def _only_the_reader_gets_in(address: str, client_files: tuple[Path, Path]) -> None:
     strangers = [(USER, "wrong"), ("other", PASSWORD), (USER, ""), (None, ""), ("admin", "")]
-    async with serving(cell, password_file=path.name) as address:
-        for user, password in strangers:
-            with pytest.raises(UaError):
-                async with reading(address, client_files, user, password):
-                    pass
-        endpoints = await Client(address).connect_and_get_server_endpoints()
-        assert {(one.SecurityMode, one.SecurityPolicyUri) for one in endpoints} == {
-            (ua.MessageSecurityMode.SignAndEncrypt, SecurityPolicyBasic256Sha256.URI)
-        }
-        plain = Client(address)
-        plain.set_user(USER)
-        plain.set_password(PASSWORD)
+    for user, password in strangers:
         with pytest.raises(UaError):
-            await plain.connect()
-        async with reading(address, client_files) as client:
-            await _changes_nothing(client, cell)
+            async with reading(address, client_files, user, password):
+                pass
+    endpoints = await Client(address).connect_and_get_server_endpoints()
+    assert {(one.SecurityMode, one.SecurityPolicyUri) for one in endpoints} == {
+        (ua.MessageSecurityMode.SignAndEncrypt, SecurityPolicyBasic256Sha256.URI)
+    }
+    plain = Client(address)
+    plain.set_user(USER)
+    plain.set_password(PASSWORD)
+    with pytest.raises(UaError):
+        await plain.connect()
 
 
-async def _changes_nothing(client: Client, cell: Cell) -> None:
+async def _changes_nothing(client: Client, cell: Cell, run: str) -> None:
     number = await client.get_namespace_index(NAMESPACE)
     name = cell.settings.name
-    path = (name, "ResultManagement", "Results", f"{name}/2026-11-20T100000Z")
+    path = (name, "ResultManagement", "Results", f"{name}/{run}")
     node = await client.nodes.objects.get_child([f"{number}:{one}" for one in path])
     (meta, _) = await node.get_children()
     (variable, *_) = await meta.get_children()
@@ -221,12 +234,11 @@ async def test_a_password_that_others_can_read_and_a_port_that_is_taken_are_refu
         settings = OpcUaSettings(port=taken.getsockname()[1])
         with pytest.raises(DeviceError, match="cannot be served"):
             await serve_results(cell, settings, asyncio.Event(), lambda _: None, lambda _: None)
+    assert allowed_reader(settings, cell.path.parent) == Reader(USER, PASSWORD), "of the environment"
     monkeypatch.delenv("HEXACELL_OPCUA_USER")
-    path = cell.path.parent / "reader.toml"
-    path.write_text(f'user = "{USER}"\npassword = "{PASSWORD}"\n')
-    path.chmod(0o644)
+    password_file(cell, 0o644)
     with pytest.raises(FileError, match="chmod 600") as raised:
-        async with serving(cell, password_file=path.name):
+        async with serving(cell, password_file=READER_FILE):
             pass
     assert PASSWORD not in str(raised.value)
 

@@ -1,7 +1,5 @@
 """What holds for every test: nothing is left behind, and hypothesis repeats itself in CI."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import fnmatch

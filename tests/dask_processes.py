@@ -1,7 +1,5 @@
 """A Dask cluster on this computer: a scheduler and workers, each a process of its own."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """When faults of a simulated cell are injected."""
 
-from __future__ import annotations
-
 from drivers.simulated.cell import SimulatedCell
 from hexacell.cell.simulation import FaultKind
 

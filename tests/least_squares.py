@@ -1,7 +1,5 @@
 """The paper's second solver, a cross-check that needs no derivatives (Abtahi et al. 2010, section 2)."""
 
-from __future__ import annotations
-
 from scipy.optimize import least_squares
 
 from hexacell.errors import ConvergenceError

@@ -1,7 +1,5 @@
 """Orders to a LinuxCNC of which a test wants a single query over the connection for commands."""
 
-from __future__ import annotations
-
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from hexacell.kinematics.pose import Pose
 

@@ -1,7 +1,5 @@
 """What takes long to make and is only looked at, made once for all processes that run tests."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import pickle

@@ -1,7 +1,5 @@
 """Measurements that a robot with gauges could give, aimed with its true geometry."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A Gough-Stewart platform as LinuxCNC has it: base and platform in a HAL file, zeros in the INI file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from hexacell.cell.loader import Cell, load_cell

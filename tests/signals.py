@@ -5,8 +5,6 @@ ignored or blocked, and every child inherits that. A test that sends signals set
 test run itself keeps what it was started with.
 """
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Iterator

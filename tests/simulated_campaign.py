@@ -4,8 +4,6 @@ It moves along the controller's straight lines and on its own geometry, so that 
 travel and singularity margin are put to the test and not assumed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.campaign.decisions import MeasurePose, StartPoint

@@ -1,7 +1,5 @@
 """A cell that is measured quickly and precisely, for tests of whole runs."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

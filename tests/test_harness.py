@@ -1,7 +1,5 @@
 """The leak check of the test suite: a test that leaks resources fails, one that cleans up passes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from textwrap import dedent
 

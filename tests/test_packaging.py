@@ -1,7 +1,5 @@
 """What is shipped: sdist and wheel, installed elsewhere; and the pins."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

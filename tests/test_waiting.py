@@ -1,7 +1,5 @@
 """No test waits for a fixed time, because a busy machine may take longer."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

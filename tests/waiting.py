@@ -4,8 +4,6 @@ No count of tries and no number of seconds stands in for an event. Where the eve
 time-out that pytest has for each test ends the wait and shows what waited.
 """
 
-from __future__ import annotations
-
 import asyncio
 import time
 from collections.abc import Callable

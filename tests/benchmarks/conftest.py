@@ -1,7 +1,5 @@
 """What all benchmarks share: the cell of Table 1, and the figures that they give."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Generator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Three gauges and six encoders inside this process, in simulated time, with the faults of both by name."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 ``python -m tests.benchmarks.figures`` writes the table, see ``make figures``.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """Robots, calibrations of them and processes that several benchmarks share."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor

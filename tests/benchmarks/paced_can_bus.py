@@ -5,8 +5,6 @@ while the driver works: by the processor time of this process, less that of the 
 does while frames are on the wire costs nothing, as in real time; other work on the machine does not count.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Iterator

@@ -3,8 +3,6 @@
 A variable of the environment of the same name takes precedence: ``ROBOTS=24 make bench ARGS=...``.
 """
 
-from __future__ import annotations
-
 import os
 
 SAMPLES: dict[str, dict[str, tuple[int, int]]] = {

@@ -6,8 +6,6 @@ whole program, with drivers and simulated devices. All have a clock of their own
 failed is a quick level.
 """
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """How soon a run in a process of its own can be left, whatever it is doing."""
 
-from __future__ import annotations
-
 import shutil
 import time
 from collections.abc import Callable

@@ -6,8 +6,6 @@ poses are those that a check chooses. The same through a day of +-7 K: legs of s
 in its own time, and a thermometer on each tells its temperature to 0.05 K.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -5,8 +5,6 @@ covariance, and changed: not at all, by drifts of the stated size and of 3 and 1
 directions that a check sees least.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass, replace
 

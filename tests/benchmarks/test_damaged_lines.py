@@ -3,8 +3,6 @@
 Three gauges are read as a run reads them, until their readings settle, each time at another place.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from random import Random
 

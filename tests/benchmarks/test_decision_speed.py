@@ -4,8 +4,6 @@ Times are of the processor, the quickest of some repeats. What must hold on any 
 numpy's time for many small solves.
 """
 
-from __future__ import annotations
-
 import copy
 import time
 from dataclasses import replace

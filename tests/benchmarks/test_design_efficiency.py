@@ -4,8 +4,6 @@ The best designs are compared with known ones and with poses that took no part, 
 which their certificates rest, with finite differences.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -4,8 +4,6 @@ The information of a calibration and of a night is that of Table 1's robot: 55 r
 (0.01 mm noise on joint variables and deviations). Each night's evidence is drawn with it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache

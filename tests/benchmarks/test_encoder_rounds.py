@@ -5,8 +5,6 @@ worked one after the other. On one processor they do; on two, what they do at th
 costs to wake the other processor, would count as well.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 

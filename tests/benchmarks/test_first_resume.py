@@ -4,8 +4,6 @@ The program runs as it is installed, in processes of its own. A sample on a smal
 is in ``make test-full`` (``tests/faults/test_killed.py``).
 """
 
-from __future__ import annotations
-
 import os
 import random
 import re

@@ -5,8 +5,6 @@ Each run is the real procedure with a robot drawn within the tolerances, on devi
 in ``make test`` (``tests/procedures/runs/test_gauge_trial.py``).
 """
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Iterator
 from itertools import cycle, islice

@@ -4,8 +4,6 @@ The fault is injected in the middle of a move within a set. What counts is the s
 from the event to the moment in which its sliders came to rest.
 """
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 from collections.abc import AsyncIterator

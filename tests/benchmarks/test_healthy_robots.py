@@ -6,8 +6,6 @@ the figures are printed beside them. Each is measured as a run measures it, iden
 verified; its true error at the task poses is known.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

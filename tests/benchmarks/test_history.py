@@ -1,7 +1,5 @@
 """The history of a cell with 10,000 runs: how long it takes to open."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

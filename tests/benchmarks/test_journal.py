@@ -1,7 +1,5 @@
 """What the journal costs: a record on the disk, and opening a long one."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

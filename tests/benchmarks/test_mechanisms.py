@@ -3,8 +3,6 @@
 Each is calibrated as a run does it, with the limits and the noise of the cell, and its result is verified.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache, partial
 

@@ -4,8 +4,6 @@ Robots are drawn within the tolerances and move along the controller's lines on 
 the program does not know. The targets are for 1,000, which take an hour of processor time.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial

@@ -3,8 +3,6 @@
 One in two hundred is a process of its own.
 """
 
-from __future__ import annotations
-
 import random
 import tempfile
 from collections import Counter

@@ -1,7 +1,5 @@
 """``hexacell study paper`` at its full size: the paper's figures in shape, and ours better."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from math import isfinite, isnan
 

@@ -4,8 +4,6 @@ Robots are drawn within the bundled cell's tolerances; each method is given the 
 poses that are chosen in three ways, see ``peers.robots``. Errors are those at held-out poses.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 

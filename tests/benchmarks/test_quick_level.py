@@ -5,8 +5,6 @@ the result's covariance allows, and each parameter drifts by up to 0.2 mm more. 
 level with the budget of the cell, and by a whole calibration from the drawing.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -6,8 +6,6 @@ poses move least: how far they still move, by the machine's own equations, is me
 would in the convention's frames.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

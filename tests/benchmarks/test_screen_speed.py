@@ -1,7 +1,5 @@
 """How soon the technician's screen shows live readings, answers a key, and is gone, whatever goes on."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import pty

@@ -3,8 +3,6 @@
 Times are of the processor, not of the wall, so that other work on the machine counts little.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

@@ -5,8 +5,6 @@ joint variables and deviations: errors against the Cramer-Rao bound, which is co
 central differences and not from the estimator's derivatives.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

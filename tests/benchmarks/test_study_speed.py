@@ -1,7 +1,5 @@
 """How long a study of many robots takes, each calibrated with orientations that hexacell chooses."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Robots built as their drawing allows, and robots that are not: how many are refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ That had other poses. Whether U holds for machines that have all effects of thei
 without the first-order propagation that is under test, is measured by ``test_worlds.py``.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ Worlds (``tests/benchmarks/worlds``) are measured at 5 points x 11 orientations 
 and stated with the uncertainty budget of their machine; what they really do at the task poses is known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """365 nights of a cell with a slow drift, a crash, a dead gauge for a week, a full disk and a power cut."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.errors import ExitCode

@@ -7,8 +7,6 @@ robots inside does better. Likewise two robots with faults in different legs are
 Phi(d / 2), where one is as likely as the other.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.special import ndtr, ndtri
 

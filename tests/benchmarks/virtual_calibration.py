@@ -1,7 +1,5 @@
 """A whole calibration of a virtual robot: measured as planned, identified, written, and verified."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

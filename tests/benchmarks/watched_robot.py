@@ -1,7 +1,5 @@
 """A watched virtual robot: what it is commanded to, and where that brings passive joints and legs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A folder with the demo's cell, and what makes it quick or short."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Commands in processes of their own: run to their end, or started and watched."""
 
-from __future__ import annotations
-
 import json
 import os
 import secrets

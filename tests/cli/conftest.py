@@ -1,7 +1,5 @@
 """The command line as it is used: typed in a folder, in a process of its own."""
 
-from __future__ import annotations
-
 import os
 import pty
 import shutil

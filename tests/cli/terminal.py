@@ -1,7 +1,5 @@
 """A terminal that a command is typed at."""
 
-from __future__ import annotations
-
 import os
 import select
 from dataclasses import dataclass, field

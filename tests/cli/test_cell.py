@@ -1,7 +1,5 @@
 """``hexacell cell``, and what every command reports about files it cannot use."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 

@@ -1,7 +1,5 @@
 """Shells complete what is typed: bash is asked by the script that the program prints for it."""
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """``apply`` and ``rollback`` as they are typed."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.cell.loader import load_cell

@@ -1,7 +1,5 @@
 """The demo, judged by the files it leaves rather than by its output."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """Each bundled mechanism does the whole job on the wire, in words of its own."""
 
-from __future__ import annotations
-
 import json
 import re
 

@@ -1,7 +1,5 @@
 """``hexacell devices``: on an empty machine, with every protocol on pseudo-terminals, watching one."""
 
-from __future__ import annotations
-
 import os
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """Encoders whose scales are off: they are told, written beside the others, and the machine passes."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

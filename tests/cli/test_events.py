@@ -1,7 +1,5 @@
 """``run --events FILE``: the journal's lines for another program, which the run never waits for."""
 
-from __future__ import annotations
-
 import os
 import threading
 

@@ -1,7 +1,5 @@
 """What a person sees where the program fails, or its output cannot be written."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

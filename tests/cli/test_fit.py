@@ -1,7 +1,5 @@
 """``hexacell fit``: the same result from a file, and every mistake that a file can have."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

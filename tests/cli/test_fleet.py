@@ -1,7 +1,5 @@
 """All cells that share a PostgreSQL, seen from one computer; a real server is started."""
 
-from __future__ import annotations
-
 import socket
 from datetime import UTC, datetime, timedelta
 

@@ -1,7 +1,5 @@
 """What a newcomer types first: nothing, a wrong command, ``--help``."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A run in a process of its own: it outlives its terminal, and nothing of it outlives its end."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import signal

@@ -1,7 +1,5 @@
 """``hexacell length``, and ``hexacell run --length-check``, as they are typed."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

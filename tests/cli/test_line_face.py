@@ -1,7 +1,5 @@
 """The whole job at a terminal that can show lines only: ``TERM=dumb``, as a screen reader has it."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """The log of a command: where it is asked for, and only there."""
 
-from __future__ import annotations
-
 import logging
 import re
 

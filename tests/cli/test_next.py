@@ -1,7 +1,5 @@
 """``hexacell next``: called record by record by an independent program."""
 
-from __future__ import annotations
-
 import csv
 import tomllib
 from collections.abc import Callable

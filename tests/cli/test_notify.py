@@ -1,7 +1,5 @@
 """Unattended runs tell who the cell file names; and ``hexacell notify`` lists, tries and sends."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """On systems that lack what it needs, a command says so in a line: Linux with that taken away."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """Everything that prevents a calibration is reported at once, before anything moves."""
 
-from __future__ import annotations
-
 import os
 import pty
 import re

@@ -1,7 +1,5 @@
 """Preflight of the plan: an infeasible plan is refused with the reason, others get a prediction."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """``--mode quick`` as it is typed: refused without a result, and from one calibration to the next check."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

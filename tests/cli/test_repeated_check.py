@@ -1,7 +1,5 @@
 """An unattended check that raised an alarm is made once more, and that one is the outcome."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

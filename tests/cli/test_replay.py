@@ -1,7 +1,5 @@
 """``hexacell replay``: its output and exit codes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """``hexacell report``: what the page of a run says, and that it says it of that run alone."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -3,8 +3,6 @@
 The order of children is that of PTB's schema 3.3.0, which is not in this repository.
 """
 
-from __future__ import annotations
-
 import json
 from xml.etree import ElementTree as ET
 

@@ -1,7 +1,5 @@
 """Approval of a new geometry: by limits, by a person, or not at all."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A run that is stopped, and resumed with the command that it printed."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil

@@ -1,7 +1,5 @@
 """What is printed when a run ends early."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.cell.loader import load_cell

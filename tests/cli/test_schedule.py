@@ -1,7 +1,5 @@
 """``hexacell schedule``: writes, shows and removes units of its own, and no others."""
 
-from __future__ import annotations
-
 import pytest
 
 UNITS = ["hexacell-simulated-hexaglide.service", "hexacell-simulated-hexaglide.timer"]

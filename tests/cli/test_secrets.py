@@ -1,7 +1,5 @@
 """Passwords reach no file of a run and no screen; files of runs belong to their user."""
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Iterator

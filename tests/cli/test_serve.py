@@ -1,7 +1,5 @@
 """``hexacell serve``: the results of a cell by OPC UA, until it is interrupted."""
 
-from __future__ import annotations
-
 import signal
 import sys
 

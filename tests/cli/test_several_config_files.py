@@ -1,7 +1,5 @@
 """A geometry in two files, as commands write and restore it; killed between the two by a real SIGKILL."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Signals while an engine runs: commands in their order, and no step is cut short."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import signal

@@ -1,7 +1,5 @@
 """A simulated cell in one process, and the program that calibrates it in another."""
 
-from __future__ import annotations
-
 import re
 import signal
 import tomllib

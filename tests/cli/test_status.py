@@ -1,7 +1,5 @@
 """``hexacell status``: cells at a glance, and metrics that Prometheus' own parser reads."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from datetime import timedelta

@@ -1,7 +1,5 @@
 """``hexacell study``: from the command to the table, the picture and what is kept."""
 
-from __future__ import annotations
-
 import json
 import signal
 from pathlib import Path

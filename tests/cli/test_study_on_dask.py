@@ -1,7 +1,5 @@
 """``hexacell study ... --scheduler``: the same results from a cluster as from processes."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest

@@ -1,7 +1,5 @@
 """``hexacell tui`` without a terminal, and what it loads before it shows something."""
 
-from __future__ import annotations
-
 import os
 import pty
 import signal

@@ -1,7 +1,5 @@
 """Runs that a scheduler starts: refused nights are explained, tried again, and ended in time."""
 
-from __future__ import annotations
-
 import json
 import re
 import signal

@@ -1,7 +1,5 @@
 """A cell that identifies the zeros of its encoders alone: on the wire, in every text, and honestly."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The cells in ``configs`` load, and agree with the paper's tables."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

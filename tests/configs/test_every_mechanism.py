@@ -1,7 +1,5 @@
 """The bundled cells of every mechanism load, and fit together."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

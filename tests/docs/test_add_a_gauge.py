@@ -1,7 +1,5 @@
 """The example of docs/add-a-gauge.md, taken from the page, passes the conformance suite and is found."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 import sys

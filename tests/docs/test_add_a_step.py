@@ -1,7 +1,5 @@
 """The page on adding a step: its step and its rule, in a copy of the program, with a run of its engine."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

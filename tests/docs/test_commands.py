@@ -1,7 +1,5 @@
 """Every command that a page shows is one that the program takes."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterator

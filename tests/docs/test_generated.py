@@ -1,7 +1,5 @@
 """Parts of the reference that are made from the program: no command, key, message or field is missing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from docs import draw, generated

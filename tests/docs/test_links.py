@@ -1,7 +1,5 @@
 """Every path and every link in the docs leads to a file."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

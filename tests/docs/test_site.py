@@ -1,7 +1,5 @@
 """The site of README and docs: no warning, no link that leads nowhere, nothing fetched from elsewhere."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The commands of tutorial and how-tos, typed as written, end as these say and print what they show."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

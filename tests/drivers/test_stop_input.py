@@ -1,7 +1,5 @@
 """The stop input forbids motion while it is active, and while its state is unknown."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Protects what a wire trace keeps of an exchange, how much memory it may take, and what is logged."""
 
-from __future__ import annotations
-
 import logging
 import tracemalloc
 

@@ -1,7 +1,5 @@
 """Around drivers: the worker thread with its jobs, and errors of libraries that name the device."""
 
-from __future__ import annotations
-
 import asyncio
 import termios
 import threading

@@ -5,8 +5,6 @@ gauges are put exactly around the ball and nothing is drawn. An interrupted and 
 therefore end with the very bytes that an uninterrupted one ends with.
 """
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The program in processes of its own that can be broken anywhere, and what it promises then."""
 
-from __future__ import annotations
-
 import pickle
 import shutil
 import subprocess

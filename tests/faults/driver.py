@@ -6,8 +6,6 @@ program as it is installed; only the number of candidate poses is smaller, which
 result is and not what becomes of it.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import pickle

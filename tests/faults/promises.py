@@ -1,7 +1,5 @@
 """Going on with a killed run as its user would, and checks of what is promised of it then."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Sequence

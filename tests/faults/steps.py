@@ -1,7 +1,5 @@
 """Kinds of steps, at each of which runs are broken."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -5,8 +5,6 @@ with another of them failing: the message, the content of the controller's confi
 run resumes once the disk works again are checked.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ in this process, and failures instead of deaths, are in ``tests/hexacell/config`
 loses what was written, in ``test_power_cut``.
 """
 
-from __future__ import annotations
-
 import random
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Every device unplugged at every kind of step, and plugged in again at once or before resuming."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

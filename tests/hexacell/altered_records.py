@@ -1,7 +1,5 @@
 """Records with other readings than those that were measured."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

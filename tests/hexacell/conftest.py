@@ -5,8 +5,6 @@ kinematics here are the leg equations and nothing else, solved in closed form an
 root finder with its own finite differences.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Parameters that are angles: in tolerances, limits and text they count in mrad where others do in mm."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What other packages may rely on: the names, and that they work together as the interface says."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

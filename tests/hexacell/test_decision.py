@@ -1,7 +1,5 @@
 """The decision rule."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

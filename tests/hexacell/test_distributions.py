@@ -1,7 +1,5 @@
 """Probabilities and quantiles, against closed forms of other kinds."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Plug-ins announced by installed packages, some of which are broken."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

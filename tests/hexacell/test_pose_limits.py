@@ -1,7 +1,5 @@
 """The limits that a pose would break, in words."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The robot of a cell: the drawing and the limits of its file, the geometry and frames of its config."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

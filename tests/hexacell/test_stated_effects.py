@@ -1,7 +1,5 @@
 """The effects of a cell, by the sizes that its file states."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.cell.bundled import bundled_config

@@ -1,7 +1,5 @@
 """A controller whose base is turned: gauges and level platforms are along its own axes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 Only one can run on a machine: a second one would end the first.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """A plain client of linuxcncrsh, apart from the program's own driver."""
 
-from __future__ import annotations
-
 import socket
 from types import TracebackType
 from typing import Self

@@ -1,7 +1,5 @@
 """The whole job at the real LinuxCNC; gauges and encoders follow its motors, under a hidden geometry."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The driver against the real LinuxCNC: what no query tells, and what an acknowledgement hides."""
 
-from __future__ import annotations
-
 import asyncio
 from functools import partial
 

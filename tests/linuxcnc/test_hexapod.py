@@ -1,7 +1,5 @@
 """The stock hexapod: its zeros are read when LinuxCNC starts; its motors stay where they are meanwhile."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

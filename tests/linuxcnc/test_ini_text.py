@@ -1,7 +1,5 @@
 """Variables of INI files as LinuxCNC's own ``inivar`` finds them, generated ones and its examples."""
 
-from __future__ import annotations
-
 import random
 import shutil
 import subprocess

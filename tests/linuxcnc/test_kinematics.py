@@ -1,7 +1,5 @@
 """The kinematics components in a running LinuxCNC against the program's own."""
 
-from __future__ import annotations
-
 import re
 from functools import partial
 

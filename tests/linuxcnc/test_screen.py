@@ -1,7 +1,5 @@
 """LinuxCNC with its own screen, AXIS, on a virtual display, and linuxcncrsh beside it."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

@@ -1,7 +1,5 @@
 """One command on mutated input, in this process, and what it may not do."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """Mutations of journals: as bytes, and of their content with the checksums made right again."""
 
-from __future__ import annotations
-
 import json
 import random
 import zlib

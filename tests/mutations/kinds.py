@@ -1,7 +1,5 @@
 """Which kinds of trials there are, and how often each is made."""
 
-from __future__ import annotations
-
 import random
 
 from tests.mutations import trials

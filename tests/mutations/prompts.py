@@ -1,7 +1,5 @@
 """Mutated answers, typed at a terminal whenever something is asked."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Sound cells and runs, from which mutated ones are made."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """A sample of the mutations of ``tests/benchmarks/test_mutations.py``."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Mutations of bytes and of TOML and CSV texts, as a careless or hostile hand makes them."""
 
-from __future__ import annotations
-
 import random
 import re
 from collections.abc import Callable, Sequence

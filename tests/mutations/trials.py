@@ -1,7 +1,5 @@
 """Trials: a kind of input is mutated, and a command is tried on it."""
 
-from __future__ import annotations
-
 import random
 import re
 from collections.abc import Callable

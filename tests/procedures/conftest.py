@@ -4,8 +4,6 @@ What moves and what is measured is the simulation's own truth; only the protocol
 that a whole run takes as long as its mathematics and nothing depends on the machine's clock.
 """
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable, Sequence
 from functools import partial

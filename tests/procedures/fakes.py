@@ -1,7 +1,5 @@
 """Devices without wires, on a clock that jumps, and a person who answers as told."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """A whole cell on fake devices: the simulated robot's own truth, without protocols."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace

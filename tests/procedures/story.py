@@ -1,7 +1,5 @@
 """Events and identifications as they would happen, short to write."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A cell, a recorded run, an application over them, and pictures that must stay the same."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import re

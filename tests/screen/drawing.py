@@ -1,7 +1,5 @@
 """Whether an application has drawn all that it was told."""
 
-from __future__ import annotations
-
 from textual.app import App
 from textual.screen import Screen
 from textual.widget import Widget

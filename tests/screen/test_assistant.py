@@ -1,7 +1,5 @@
 """The first-time assistant: from questions to a valid cell file, with every mistake named at once."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager

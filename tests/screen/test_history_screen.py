@@ -1,7 +1,5 @@
 """The runs of a real cell at the screen: gone back to, refused after an edit, compared, watched again."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 from collections.abc import AsyncIterator

@@ -1,7 +1,5 @@
 """Who presses every key, pastes whole files and resizes the terminal breaks nothing."""
 
-from __future__ import annotations
-
 import string
 
 import pytest

@@ -1,7 +1,5 @@
 """A technician's whole job at the screen, from mounting the gauges to approving the change."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import pytest

@@ -1,7 +1,5 @@
 """Keys that a person chose: taken over everywhere, and mistakes in the file named."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The planned poses at the screen: a key writes an exclusion into the cell file, or removes it."""
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 from pathlib import Path

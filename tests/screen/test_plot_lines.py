@@ -1,7 +1,5 @@
 """Pictures in characters."""
 
-from __future__ import annotations
-
 from hexacell.text.screens.plot_lines import plot_lines
 from hexacell.text.screens.views import PlotView, Series
 

@@ -1,7 +1,5 @@
 """The real program in tmux, with a cell that another process serves: measured, left, come back to."""
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 import signal

@@ -1,7 +1,5 @@
 """A run that is told by a test: the connection and the workplace of a screen, without processes."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator, Iterable, Sequence
 from dataclasses import dataclass, field

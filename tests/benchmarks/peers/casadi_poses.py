@@ -4,8 +4,6 @@ Readings of encoders and gauges are weighted by their noise, derivatives of firs
 and sparse. Building the expressions is part of the time, since every set of records has its own.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import casadi

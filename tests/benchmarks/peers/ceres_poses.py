@@ -4,8 +4,6 @@ Each record is one residual block of nine numbers, weighted by the noise, with t
 poses are eliminated by Ceres' Schur complement.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

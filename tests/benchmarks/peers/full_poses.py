@@ -4,8 +4,6 @@ It needs an instrument that three gauges are not: position and orientation in on
 Then each leg's seven numbers are a least-squares problem of its own, and the frames are the instrument's.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import least_squares
 

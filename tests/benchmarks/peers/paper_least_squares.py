@@ -4,8 +4,6 @@ Ordinary least squares of all differences between two records of a point (Abtahi
 forward kinematics by Newton from the commanded poses; the solver's own tolerances.
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Machines whose effects are drawn from the uncertainty budget that is stated of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Fixed campaigns of robots: poses that a run might have chosen, prepared once for a robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Encoders that do not show where their sliders are."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.kinematics.rotations import Array

@@ -4,8 +4,6 @@ A base frame and the turn of the platform frame are taught; errors that another 
 take away are none.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Gauges, stands and balls that do not show how far the ball has moved."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.kinematics.rotations import Array

@@ -5,8 +5,6 @@ not. The usual ones are those of a cell with glass scales and precision guides; 
 exists, what a careful shop would reach.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Legs that stretch, joints that run out, and everything that is warmer than when it was drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from enum import Enum
 

@@ -1,7 +1,5 @@
 """Rails that are not straight, not parallel, twisted; sliders that stop elsewhere each time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hexacell.kinematics.rotations import Array

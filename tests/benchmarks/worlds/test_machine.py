@@ -1,7 +1,5 @@
 """Worlds without imperfections are the product's robots; those with one differ as closed forms say."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

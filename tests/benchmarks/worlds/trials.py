@@ -1,7 +1,5 @@
 """One world measured, identified, stated and compared with what it really does."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache

@@ -4,8 +4,6 @@ The controller computes with the product's geometry. The machine is closed by ot
 (:mod:`~tests.benchmarks.worlds.closure`), with whatever is off in it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Our own encoders and controller pass what every driver of such a device must."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A trace of a driver with a simulated device becomes a test dialogue for the same driver."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.conformance import DialogueDiffers, recorded_bus, recorded_line, served_twin

@@ -1,7 +1,5 @@
 """Serial ports: which questions are asked on a line in which order, and the adapter behind a port."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, ClassVar
 

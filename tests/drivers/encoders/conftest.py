@@ -1,7 +1,5 @@
 """Six raw nodes on a bus, and banks that use it."""
 
-from __future__ import annotations
-
 import threading
 import uuid
 from collections.abc import AsyncIterator, Callable, Iterator

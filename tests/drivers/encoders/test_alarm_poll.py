@@ -1,7 +1,5 @@
 """How often the alarm entries are read, on a clock that only samples, pauses and SDO transfers move."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

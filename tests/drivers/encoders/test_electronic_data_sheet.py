@@ -1,7 +1,5 @@
 """Encoders against their maker's EDS file."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from pathlib import Path
 

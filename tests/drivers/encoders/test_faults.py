@@ -1,7 +1,5 @@
 """Emergencies, alarms, heartbeats and boot-up messages."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

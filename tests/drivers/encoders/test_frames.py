@@ -1,7 +1,5 @@
 """Discovery on a CAN bus: frames of strangers are told, and the node id of the only device is set."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial

@@ -1,7 +1,5 @@
 """Opening, closing and cancelling: no threads are left, and samples stay synchronized."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 

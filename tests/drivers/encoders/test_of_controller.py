@@ -1,7 +1,5 @@
 """Encoders that only the controller can read."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.encoders.bank import joint_variables

@@ -1,7 +1,5 @@
 """Opening: detection, identification and configuration of the nodes."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.encoders.cia406 import Cia406Bank

@@ -1,7 +1,5 @@
 """Sampling: six positions of one SYNC, or an error."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 import threading

@@ -1,7 +1,5 @@
 """A scripted serial port that expects these requests in this order and gives these answers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

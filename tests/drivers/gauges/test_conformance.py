@@ -1,7 +1,5 @@
 """Every gauge that hexacell announces passes the suite that a driver from elsewhere passes."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from typing import Any
 

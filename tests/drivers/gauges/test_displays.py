@@ -1,7 +1,5 @@
 """Displays and adapters of which only the value is asked, in dialogues as their manuals have them."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 import pytest

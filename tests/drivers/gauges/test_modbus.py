@@ -1,7 +1,5 @@
 """Gauges with Modbus RTU on pseudo-terminals: registers, words, exceptions, faults of the line."""
 
-from __future__ import annotations
-
 import asyncio
 import sys
 from typing import Any

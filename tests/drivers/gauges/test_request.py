@@ -1,7 +1,5 @@
 """Gauges that are described in the cell file alone: that are asked, and that send by themselves."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

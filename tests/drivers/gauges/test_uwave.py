@@ -1,7 +1,5 @@
 """Mitutoyo U-WAVE-R on a line where nobody asks: captured frames, freshness, channels, faults."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Simulated time for fake serial ports: it passes only while a read waits for bytes."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

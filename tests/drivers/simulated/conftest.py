@@ -1,7 +1,5 @@
 """The simulated Hexaglide on a clock that tests advance."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A whole simulated cell: every device answers on the wire, through the real drivers."""
 
-from __future__ import annotations
-
 import asyncio
 import socket
 import threading

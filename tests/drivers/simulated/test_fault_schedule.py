@@ -1,7 +1,5 @@
 """Faults of a simulated cell, injected at once and on schedule."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

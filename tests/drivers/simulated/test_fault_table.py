@@ -3,8 +3,6 @@
 ``HEXACELL_UPDATE_TABLES=1`` writes the table anew; a difference is then to be looked at before it is kept.
 """
 
-from __future__ import annotations
-
 import asyncio
 import math
 import os

@@ -1,7 +1,5 @@
 """Gauges and encoders that follow the joints which another program prints."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 

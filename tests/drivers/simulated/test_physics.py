@@ -1,7 +1,5 @@
 """The true state of the simulated robot: motions, positions, sensors with noise, places of the gauges."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

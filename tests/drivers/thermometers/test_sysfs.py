@@ -1,7 +1,5 @@
 """Thermometers that are read from a file: valid and invalid contents."""
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import AsyncIterator, Callable

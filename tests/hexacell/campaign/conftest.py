@@ -1,7 +1,5 @@
 """Plans of small cells, and campaigns that carry them out on the paper's robot without hardware."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

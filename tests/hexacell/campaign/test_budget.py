@@ -1,7 +1,5 @@
 """What measuring costs, what a budget still allows, and how records are shared among points."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """The alarm of a check: quiet on an unchanged robot, and what it says of one that changed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Checks of robots that were calibrated, and of one that was not, without hardware."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

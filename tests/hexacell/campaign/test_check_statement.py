@@ -1,7 +1,5 @@
 """Verdicts of a check, and how many more records would give one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The dry run of a plan on virtual robots; repeatable."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which of the robots within the tolerances can stand at a point, before they are calibrated."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The first records at a point, when little is known of the robot."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Information of planned sets and error at the task poses, compared with the estimator."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The chain of estimates: false records are left out; computed again it gives the same."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pilot records steer the choice of poses at the first point, and count for nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the systematic effects will make of a plan's result, before anything is measured."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The plan: which point, which pose and when to stop depend on the records so far only."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

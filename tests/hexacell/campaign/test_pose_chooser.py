@@ -1,7 +1,5 @@
 """The next pose for a robot that is not where the last record was taken."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """A fixed list of poses: read, and visited in its order where that is safe."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The quick level of a robot that drifted, without hardware."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

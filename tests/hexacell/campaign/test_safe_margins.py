@@ -1,7 +1,5 @@
 """Passive joints keep their limits at chosen poses for what is not known of the robot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is written to the controller: the same robot, in frames in which taught poses hardly move."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The forecast of verdicts against machines that are simulated without any linearization."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

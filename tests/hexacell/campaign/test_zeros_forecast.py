@@ -1,7 +1,5 @@
 """With zeros alone, what is forecast of error and verdict is what fit and verification then state."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A valid cell file, and loaders for changed texts of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Addresses in a cell file: of notifications and of a shared archive."""
 
-from __future__ import annotations
-
 from typing import get_args
 
 import pytest

@@ -1,7 +1,5 @@
 """Configs that travel with the package."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Reading a cell file: what it gives, and every way in which it can be wrong."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

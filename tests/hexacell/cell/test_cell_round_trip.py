@@ -1,7 +1,5 @@
 """Settings written as a cell file read back as the same settings."""
 
-from __future__ import annotations
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

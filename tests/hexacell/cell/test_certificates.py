@@ -1,7 +1,5 @@
 """Certificates of instruments, and what a report says of the machine, in the cell file."""
 
-from __future__ import annotations
-
 from datetime import date
 
 import pytest

@@ -1,7 +1,5 @@
 """``identify`` in ``[identification]``: all, or the zeros of the encoders alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

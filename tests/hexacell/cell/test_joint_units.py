@@ -1,7 +1,5 @@
 """Keys of the cell file are in the unit of the joint variables, and say so; no other is accepted."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

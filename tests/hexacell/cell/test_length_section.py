@@ -1,7 +1,5 @@
 """``[length_check]``: a fixture with two seats, and what a certificate cannot say."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

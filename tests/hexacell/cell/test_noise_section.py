@@ -1,7 +1,5 @@
 """``[noise]``: one figure for all instruments of a kind, or one each; how a run measures it."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.robot.model import noise_of

@@ -1,7 +1,5 @@
 """Where the controller's passwords come from, and who may read them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The [recovery] section: escalations that a cell may state, and those that it may not."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.cell.recovery import Action, AttendedRecovery, FailureKind, UnattendedRecovery

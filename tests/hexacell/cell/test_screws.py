@@ -1,7 +1,5 @@
 """Section ``[robot.screws]``: legs that are screws."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """``[[thermometers]]``: none, one or several, each with its own name."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.cell.loader import describe

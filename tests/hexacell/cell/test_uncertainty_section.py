@@ -1,7 +1,5 @@
 """``[uncertainty]``: sizes of a grade, those that replace them, and where each comes from."""
 
-from __future__ import annotations
-
 from typing import get_args
 
 import pytest

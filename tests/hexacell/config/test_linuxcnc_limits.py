@@ -1,7 +1,5 @@
 """Limits in a LinuxCNC INI file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The configs of bundled cells, as an owner may have changed them: written behind a link, and undone."""
 
-from __future__ import annotations
-
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path

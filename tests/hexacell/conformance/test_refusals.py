@@ -1,7 +1,5 @@
 """Each conformance test refuses a mechanism that breaks what it promises."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

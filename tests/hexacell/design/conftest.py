@@ -1,7 +1,5 @@
 """A robot at several stages of being known, with the paper's Table 1 errors hidden in it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

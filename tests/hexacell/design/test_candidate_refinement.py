@@ -1,7 +1,5 @@
 """Candidates are turned to where a record gains more, and stay within the limits and the travel."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

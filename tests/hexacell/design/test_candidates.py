@@ -1,7 +1,5 @@
 """Candidate orientations, and the commands that bring the controller to the intended joint variables."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

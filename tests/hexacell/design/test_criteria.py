@@ -1,7 +1,5 @@
 """What a record is worth: by the covariance before and after it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The record that separates two correlated parameters, compared with its effect once it is measured."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The pose measured next: informative, and inside the travel for any robot that the estimate allows."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The chance constraint on sampled robots: excluding targets in stages excludes the same ones."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

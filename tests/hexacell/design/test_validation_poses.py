@@ -1,7 +1,5 @@
 """Validation poses: commanded through the uncorrected controller, safe, far apart, with clear lines."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Runs of a robot with few parameters, whose records are linear: what is exact there needs no robot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Innovations of an unchanged robot are standard normal and independent; estimates by night are not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The watch: quiet on an unchanged robot, and what it says of one that changed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

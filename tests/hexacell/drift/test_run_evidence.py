@@ -1,7 +1,5 @@
 """The evidence of a run against its identification, on the paper's robot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Run lengths against published tables, against an approximation, and against drawn sums."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

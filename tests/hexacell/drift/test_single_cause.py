@@ -1,7 +1,5 @@
 """The test of single causes: as many false alarms as stated, and what it finds."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

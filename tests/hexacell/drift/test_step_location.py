@@ -1,7 +1,5 @@
 """A located step against a search that knows nothing of it, and against least squares with the step."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import ruptures

@@ -1,7 +1,5 @@
 """Identifications that several tests look at, computed once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Zeros alone: what is held stays, its tolerance is its uncertainty, and poses err least."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

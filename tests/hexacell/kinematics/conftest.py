@@ -1,7 +1,5 @@
 """Inverse kinematics of the paper's robot."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.kinematics.mechanism import inverse_kinematics

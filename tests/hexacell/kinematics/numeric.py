@@ -1,7 +1,5 @@
 """Poses for tests of kinematics, and the pose Jacobian by finite differences."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Where a robot goes when its controller computes with another geometry, and back."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

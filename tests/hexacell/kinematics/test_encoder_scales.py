@@ -1,7 +1,5 @@
 """Errors of the encoders' scales: as numbers of any mechanism, in cell file and config, and identified."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

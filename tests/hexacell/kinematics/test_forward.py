@@ -1,7 +1,5 @@
 """Newton's method and continuation against kinematics written for the tests alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given

@@ -1,7 +1,5 @@
 """The 42 numbers: their order, their names, and that they are read-only."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Joint variables and the encoders' zeros together, against geometries whose zeros were moved."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The legs and their distances, against closed forms and brute force."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The description of a mechanism's parameters: order, units, keys and messages."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

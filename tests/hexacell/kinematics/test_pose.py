@@ -1,7 +1,5 @@
 """Poses at the edges, and as arrays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """What a refused command says about others: itself, and all that are as far out along its axis."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

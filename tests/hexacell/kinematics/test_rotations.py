@@ -1,7 +1,5 @@
 """Rotations against scipy's, and the angle convention of the controllers by example."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

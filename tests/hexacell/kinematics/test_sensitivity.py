@@ -1,7 +1,5 @@
 """Derivatives of poses and singularity margins against finite differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given

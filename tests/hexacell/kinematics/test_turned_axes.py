@@ -1,7 +1,5 @@
 """Axes that turns about x and y put somewhere, with their derivatives, near zero and far from it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The room of gauges on either side, by where their plungers stood when they were zeroed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

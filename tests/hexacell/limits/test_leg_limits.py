@@ -1,7 +1,5 @@
 """Cones of passive joints and the distance of legs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

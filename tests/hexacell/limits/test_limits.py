@@ -1,7 +1,5 @@
 """Limits of commands and of the robot that they move."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Measurement files: read and written exactly, every mistake named with its line."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Records as arrays, and invalid sets of them."""
 
-from __future__ import annotations
-
 from operator import attrgetter
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is known of a robot, as in the tests of the pose choice."""
 
-from __future__ import annotations
-
 from tests.hexacell.design.conftest import know, limits, little, much
 
 __all__ = ["know", "limits", "little", "much"]

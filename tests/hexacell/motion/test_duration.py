@@ -1,7 +1,5 @@
 """Durations of ways: no piece is passed faster than allowed, and the fastest as fast as allowed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The straight line between two commands: checked over its whole length."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

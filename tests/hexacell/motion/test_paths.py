@@ -1,7 +1,5 @@
 """Paths with gauges at the ball: straight, over waypoints, or over the reference."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The next move back to the reference: on the path planned once, or else along the trail."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

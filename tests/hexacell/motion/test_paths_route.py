@@ -1,7 +1,5 @@
 """Routes of straight lines: the fewest that are clear, or none."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

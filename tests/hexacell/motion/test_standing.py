@@ -1,7 +1,5 @@
 """Whether a robot can stand at commands: many at once, as the line from each to itself says."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

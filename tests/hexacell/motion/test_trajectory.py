@@ -1,7 +1,5 @@
 """The actual path of a robot while its controller follows straight lines."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

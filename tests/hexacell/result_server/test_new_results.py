@@ -1,7 +1,5 @@
 """Each result is given once, and nothing is read while nothing changes."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.result_server import published_result as new_results

@@ -1,7 +1,5 @@
 """Results by OPC UA, as asyncua's own client on loopback sees them."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import math

@@ -1,7 +1,5 @@
 """An identification as a JSON document."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Two results compared, and the trend over many: chance is not called a change, a change is not missed."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 from typing import Any
 

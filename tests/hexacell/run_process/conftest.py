@@ -1,7 +1,5 @@
 """Sockets in a folder of their own, and clients of them."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager

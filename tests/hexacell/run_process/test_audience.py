@@ -1,7 +1,5 @@
 """Clients of a run: who gives commands, who is gone, and who is slow."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import socket

@@ -1,7 +1,5 @@
 """How a client leaves: not before the run has heard it."""
 
-from __future__ import annotations
-
 import asyncio
 
 from hexacell.run_process.client import HostConnection

@@ -1,7 +1,5 @@
 """A run in a host: told whole, paused when its terminal is gone, ended when nobody comes back."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager

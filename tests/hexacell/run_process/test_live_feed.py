@@ -1,7 +1,5 @@
 """Snapshots of live values: what is shown, how old it is, and how noisy at standstill."""
 
-from __future__ import annotations
-
 import pytest
 
 from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading

@@ -1,7 +1,5 @@
 """Messages on the wire: every kind of event, question and command arrives as it was sent."""
 
-from __future__ import annotations
-
 from datetime import datetime
 from pathlib import Path
 from typing import Any, get_args, get_type_hints

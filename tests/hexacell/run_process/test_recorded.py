@@ -1,7 +1,5 @@
 """A recorded run: told up to its cursor, forth, back and by itself."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator
 from datetime import UTC, datetime, timedelta

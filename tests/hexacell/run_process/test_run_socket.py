@@ -1,7 +1,5 @@
 """The socket of a run: for its owner alone, one process at a time, and nothing left of it."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import socket

@@ -1,7 +1,5 @@
 """A PostgreSQL of one's own, from Debian's packages: a cluster in a temporary folder, on a local socket."""
 
-from __future__ import annotations
-
 import os
 import pwd
 import shutil

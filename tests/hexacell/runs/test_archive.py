@@ -1,7 +1,5 @@
 """The archive keeps documents, and a file that is damaged, foreign or gone is no loss."""
 
-from __future__ import annotations
-
 import os
 import sqlite3
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Run folders: one a run, none written twice, and found again by name."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from pathlib import Path
 

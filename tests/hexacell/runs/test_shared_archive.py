@@ -1,7 +1,5 @@
 """Several cells share one PostgreSQL; a real one is started, see :mod:`postgresql_server`."""
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Small cells that are calibrated for real: simulated devices, real drivers, real files."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

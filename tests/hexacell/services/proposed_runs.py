@@ -1,7 +1,5 @@
 """Runs that proposed a change of a config, as files, without a run."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Runs of a cell on the disk, a night apart: a calibration and checks of a robot that may change."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The last accepted result, found in the folders of a cell's runs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A calibration from the cell file to its end, through real drivers and files."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import shutil

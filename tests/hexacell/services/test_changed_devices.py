@@ -1,7 +1,5 @@
 """What differs from the last run is told with the device."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

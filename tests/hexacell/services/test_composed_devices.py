@@ -1,7 +1,5 @@
 """Drivers loaded by name, opened together and closed together."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

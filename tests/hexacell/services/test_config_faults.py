@@ -1,7 +1,5 @@
 """``apply`` and ``rollback`` cut off at every call to the file system: the config is one or the other."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 import os

@@ -1,7 +1,5 @@
 """The history of a cell's config: each way of writing it leaves a record, which outlives its run."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from datetime import UTC, datetime

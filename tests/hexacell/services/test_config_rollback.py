@@ -1,7 +1,5 @@
 """Rollbacks of the controller's config: to any version that a run kept, and never over an edit."""
 
-from __future__ import annotations
-
 import os
 
 import pytest

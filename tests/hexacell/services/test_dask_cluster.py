@@ -1,7 +1,5 @@
 """Tasks of a study on a real Dask cluster, whose processes are killed."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Iterator

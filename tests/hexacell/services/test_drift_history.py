@@ -1,7 +1,5 @@
 """The watch over recorded runs: calibrations and checks enter, a crash is told with leg and time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the cell file excludes is never commanded; the screen writes and removes exclusions in the file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A run folder that was forged, its checksums right, is refused before anything moves or is written."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

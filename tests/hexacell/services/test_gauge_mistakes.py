@@ -1,7 +1,5 @@
 """Mistakes with the gauges, on the wire and from the start of a run: named before the second station."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.cell.simulation import FaultKind, SimulatedFault

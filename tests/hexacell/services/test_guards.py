@@ -1,7 +1,5 @@
 """Guards of the whole program with simulated devices, real drivers and the journal."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The runs of a cell so far: what became of each, the newest first, whatever some folders hold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

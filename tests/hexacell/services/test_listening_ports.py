@@ -1,7 +1,5 @@
 """A server that the network can reach is told from one that only this computer can."""
 
-from __future__ import annotations
-
 import socket
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Failures at the end of a run, through real drivers: the controller's config is correct in each case."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """A controller that is wrong about where the robot is: nothing moves, and the odd report is named."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import Any

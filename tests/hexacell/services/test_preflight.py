@@ -1,7 +1,5 @@
 """Preflight: all failures are in one report, and the robot does not move."""
 
-from __future__ import annotations
-
 import asyncio
 
 import numpy as np

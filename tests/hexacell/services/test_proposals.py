@@ -1,7 +1,5 @@
 """Proposals applied after their run: bit for bit, under the run's own gates, never over an edit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

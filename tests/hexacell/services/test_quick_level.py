@@ -1,7 +1,5 @@
 """The quick level from the cell file to its end: through real drivers and files."""
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 from dataclasses import dataclass, replace

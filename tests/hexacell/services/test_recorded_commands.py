@@ -1,7 +1,5 @@
 """The measurement file of a run belongs to what commanded it, whatever the controller has by now."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from pathlib import Path

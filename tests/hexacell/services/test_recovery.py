@@ -1,7 +1,5 @@
 """Devices unplugged and plugged in again in an unattended run: the run recovers by itself."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

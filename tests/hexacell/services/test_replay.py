@@ -1,7 +1,5 @@
 """A run folder, or a journal alone, is replayed in a folder of its own; nothing else is touched."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Old runs may be deleted; those whose result was applied never are, nor any that may still be needed."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from pathlib import Path
 

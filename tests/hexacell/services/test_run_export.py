@@ -1,7 +1,5 @@
 """The copy of a run has no secrets, and is the same run."""
 
-from __future__ import annotations
-
 import shutil
 
 import pytest

@@ -1,7 +1,5 @@
 """The index over the runs is as new as their folders, whatever became of it."""
 
-from __future__ import annotations
-
 import shutil
 from contextlib import closing
 from pathlib import Path

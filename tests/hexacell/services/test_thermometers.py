@@ -1,7 +1,5 @@
 """Thermometers of a cell file, from their files to the journal; their failures never end a run."""
 
-from __future__ import annotations
-
 import logging
 from pathlib import Path
 

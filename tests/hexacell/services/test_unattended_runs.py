@@ -1,7 +1,5 @@
 """Runs without a person: in quiet hours, refused and tried again, and ended at their reference in time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from typing import Any

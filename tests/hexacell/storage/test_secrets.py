@@ -1,7 +1,5 @@
 """Passwords are masked whole, and nothing else of a text is changed."""
 
-from __future__ import annotations
-
 import tomllib
 
 import pytest

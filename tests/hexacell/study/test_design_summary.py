@@ -1,7 +1,5 @@
 """What many calibrations say together, of outcomes that are known; and trials of real robots."""
 
-from __future__ import annotations
-
 import json
 from math import isnan
 

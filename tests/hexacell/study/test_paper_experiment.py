@@ -1,7 +1,5 @@
 """The paper's experiment in a simulation: what is left is the robot's repeatability."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The paper's simulation: both estimators on the same records, whoever computes it and however often."""
 
-from __future__ import annotations
-
 from math import inf
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The paper's method, eq. 5 to 13: all pairs, ordinary least squares."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A campaign on a virtual robot with all its moves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import chi2

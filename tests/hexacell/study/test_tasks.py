@@ -1,7 +1,5 @@
 """Tasks of a study: by any executor, each once, also where workers die."""
 
-from __future__ import annotations
-
 import os
 import signal
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor

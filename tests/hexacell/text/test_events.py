@@ -1,7 +1,5 @@
 """Text for events: what the run does now, and the lines that a run prints."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from hexacell.campaign.decisions import Forecast

@@ -1,7 +1,5 @@
 """What ``hexacell fit`` prints: the verdict first, nothing wider than a terminal, nothing left out."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

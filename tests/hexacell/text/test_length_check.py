@@ -1,7 +1,5 @@
 """The length scale as a person reads of it, and where the gauges are wanted in a length check."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.kinematics.pose import Pose

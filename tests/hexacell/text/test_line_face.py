@@ -1,7 +1,5 @@
 """Text at a plain terminal: where the run is, what the devices show, a recorded run told in lines."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 
 from hexacell.campaign.decisions import Forecast

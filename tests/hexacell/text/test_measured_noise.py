@@ -1,7 +1,5 @@
 """What a run says of the noise that it measured: figures, what is wrong, and what to do."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Text for the plan: what to do now, what the remaining records gain, what the plan will give."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

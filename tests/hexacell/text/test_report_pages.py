@@ -1,7 +1,5 @@
 """A report as HTML and as PDF/A: whole, the same each time, and nothing in it is taken for markup."""
 
-from __future__ import annotations
-
 from datetime import date
 from html.parser import HTMLParser
 

@@ -1,7 +1,5 @@
 """Text for a run: how to resume it is a command that can be typed."""
 
-from __future__ import annotations
-
 import shlex
 
 import pytest

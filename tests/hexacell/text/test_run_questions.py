@@ -1,7 +1,5 @@
 """Questions as they are put on a terminal: what they are about first, what to type last."""
 
-from __future__ import annotations
-
 from drivers.interfaces import StartupAction
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose

@@ -1,7 +1,5 @@
 """The words of the screens: gauges that are being placed, questions, guidance, faults, records."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 

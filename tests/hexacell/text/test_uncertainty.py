@@ -1,7 +1,5 @@
 """The uncertainty budget as ``fit`` prints it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """The verdicts of calibrations and checks, as a person reads them."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 
 import pytest

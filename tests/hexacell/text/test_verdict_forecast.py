@@ -1,7 +1,5 @@
 """What preflight says of the limits: how likely a healthy machine passes, and what would help."""
 
-from __future__ import annotations
-
 from hexacell.dry_run.verdict_forecast import NOISE, VerdictForecast
 from hexacell.text.planning import verdict_forecast_lines
 from hexacell.verdict.decision import ErrorLimits, Verdict

@@ -1,7 +1,5 @@
 """A machine with systematic effects, solved by leg equations alone, and the estimate from its records."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product

@@ -1,7 +1,5 @@
 """The uncertainty budget: its lines, their sum, and what no record can show."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Effects of mechanisms with and without rails."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

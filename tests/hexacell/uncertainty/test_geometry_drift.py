@@ -1,7 +1,5 @@
 """The drift of a geometry as a prior, and its marginal likelihood."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

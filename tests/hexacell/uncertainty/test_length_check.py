@@ -1,7 +1,5 @@
 """The length by the robot against a certified one, on machines that are solved by leg equations alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

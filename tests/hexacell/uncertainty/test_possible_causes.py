@@ -1,7 +1,5 @@
 """What may be wrong where residuals are too large: the cause that was simulated explains most of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

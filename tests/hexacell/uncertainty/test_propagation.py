@@ -4,8 +4,6 @@ Such a machine is solved by its leg equations, its exact records are fitted agai
 commands the machine with what was found.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

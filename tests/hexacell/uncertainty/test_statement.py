@@ -1,7 +1,5 @@
 """The statement of accuracy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import chi2, ncx2

@@ -1,7 +1,5 @@
 """A machine whose ball is measured in two seats, solved by leg equations alone."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

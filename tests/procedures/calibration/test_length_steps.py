@@ -1,7 +1,5 @@
 """A length check of a calibrated machine on fake devices, and what may go wrong between the seats."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime

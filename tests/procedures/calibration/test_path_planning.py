@@ -1,7 +1,5 @@
 """From any position of the robot: a checked line, a checked route, or a refusal; and the way back."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Preflight reports all failures at once, and the robot does not move."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable
 

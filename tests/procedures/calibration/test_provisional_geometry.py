@@ -1,7 +1,5 @@
 """A provisional geometry: applied between two points, and always reverted."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

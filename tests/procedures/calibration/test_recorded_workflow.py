@@ -1,7 +1,5 @@
 """A run measures the points and poses that the plan decides, in its order and until its end."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path

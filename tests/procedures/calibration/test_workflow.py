@@ -1,7 +1,5 @@
 """The next step, as a table of past events and what follows where a run does not go straight on."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

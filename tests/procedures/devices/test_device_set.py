@@ -1,7 +1,5 @@
 """All devices together: failures are named at once; one that answers again must be the one of before."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 from dataclasses import replace

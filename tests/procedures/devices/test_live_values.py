@@ -1,7 +1,5 @@
 """Live values: the latest answer of every device with its age, whatever asked for it."""
 
-from __future__ import annotations
-
 import asyncio
 from dataclasses import replace
 

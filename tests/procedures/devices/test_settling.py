@@ -1,7 +1,5 @@
 """Settling: readings must agree for the time stated in the cell file."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from typing import cast

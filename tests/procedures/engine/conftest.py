@@ -1,7 +1,5 @@
 """Runs that have come to where they are disturbed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

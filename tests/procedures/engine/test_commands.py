@@ -1,7 +1,5 @@
 """Commands to a running engine: which interrupt a step, which wait for its end, and their events."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import AsyncIterator, Callable

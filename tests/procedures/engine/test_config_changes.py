@@ -1,7 +1,5 @@
 """A config that changes during a run: what is reverted at an early end, edits, geometries not verified."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The engine: steps are journalled before and after; any error or cancellation stops motion in place."""
 
-from __future__ import annotations
-
 import asyncio
 from typing import Any
 

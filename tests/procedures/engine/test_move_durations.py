@@ -1,7 +1,5 @@
 """Every move of a run gets a duration, by where gauges are; simulated sliders keep to the speeds."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

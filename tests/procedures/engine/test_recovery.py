@@ -1,7 +1,5 @@
 """Recovery from failures of devices: what an unattended run tries, a person chooses, the policy says."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """A run interrupted anywhere resumes: no record is lost, and open sets are confirmed or invalidated."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Who may make the controller ready: the cell file, a person, or nobody but a person at the controller."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Doing a step: what is read becomes a record on the base's axes, or a refusal with its reason."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

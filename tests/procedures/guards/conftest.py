@@ -4,8 +4,6 @@ Devices take as long to answer as real ones, moves last, and every task that sle
 own moment, in order; so how long something took is exact, and none of it on the wall.
 """
 
-from __future__ import annotations
-
 import asyncio
 import heapq
 import itertools

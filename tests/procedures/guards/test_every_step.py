@@ -3,8 +3,6 @@
 Time is simulated, so figures are exact; the benchmark measures them with real drivers in real time.
 """
 
-from __future__ import annotations
-
 import asyncio
 import shutil
 from collections.abc import Awaitable, Callable

@@ -1,7 +1,5 @@
 """What a controller reports beside its encoders: which one is odd, and whether it still works."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Each guard applied to a snapshot: no trip without a fault, otherwise a problem and an action."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from types import SimpleNamespace

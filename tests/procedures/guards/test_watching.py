@@ -1,7 +1,5 @@
 """Supervision of an action by the guards: its beginning, its end, and what must not trip."""
 
-from __future__ import annotations
-
 import asyncio
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A journal in a folder of its own, empty or written."""
 
-from __future__ import annotations
-
 import zlib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A torn last line is dropped; damaged journals and unknown versions are refused with the line."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

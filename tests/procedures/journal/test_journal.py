@@ -1,7 +1,5 @@
 """The journal: events are read back as they were appended, by one writer, whatever the disk does."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import json

@@ -1,7 +1,5 @@
 """The docs have the meaning, and for numbers the unit, of every field of the journal."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Two events side by side: numbers within rounding are the same, everything else is exact."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Replaying a journal reproduces its events; any other event is reported as a difference."""
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import random

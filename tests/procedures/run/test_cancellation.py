@@ -1,7 +1,5 @@
 """Shielded work is completed despite cancellation."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

@@ -1,7 +1,5 @@
 """Questions: what the broker accepts as an answer, and what an unattended run reports instead of one."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

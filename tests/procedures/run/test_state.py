@@ -1,7 +1,5 @@
 """Steps and events are data that survive JSON; the state of a run is a fold over its events."""
 
-from __future__ import annotations
-
 from typing import Any, get_args
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Mistakes with the gauges of a rig: exchanged, turned round, in inches, dead."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from typing import Any

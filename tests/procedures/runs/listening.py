@@ -1,7 +1,5 @@
 """Listeners that step in at a moment of a run or let it fail, and what its journal says of it."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Approval of a new geometry: by the gates, or by a person."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.config.change import ConfigChange

@@ -1,7 +1,5 @@
 """A test of the model that fails narrowly asks for new records, which alone tell whether by chance."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Failures while measuring, a robot that is not where the run left it, and how the run goes on or ends."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A controller that refuses poses: they are journalled, never sent again, and the run goes on."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from typing import Any

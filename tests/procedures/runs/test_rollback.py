@@ -1,7 +1,5 @@
 """A result that is worse, cannot be loaded or meets an edited config is taken back; writes are recorded."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

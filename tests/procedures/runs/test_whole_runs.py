@@ -1,7 +1,5 @@
 """Whole runs on fake devices, and the files of their run folders."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

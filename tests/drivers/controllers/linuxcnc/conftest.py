@@ -1,7 +1,5 @@
 """A server that follows a script, and drivers that talk to it."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Answers that are cancelled, late, garbled or cut off are never taken for that to the next query."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

@@ -1,7 +1,5 @@
 """Moves: arrival is verified by the position, and a refusal is reported with its reason."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

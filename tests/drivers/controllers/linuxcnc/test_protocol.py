@@ -1,7 +1,5 @@
 """The linuxcncrsh protocol: commands and answers, without a connection."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Reloading the config: switching off, the owner's reload command, switching on; no slider moves."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import shutil

@@ -1,7 +1,5 @@
 """``hexacell-restart-linuxcnc`` against a ``linuxcnc`` that notes when it begins and ends."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

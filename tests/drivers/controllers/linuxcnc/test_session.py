@@ -1,7 +1,5 @@
 """Opening and closing: the greeting, and errors for unexpected or missing answers."""
 
-from __future__ import annotations
-
 import asyncio
 import socket
 

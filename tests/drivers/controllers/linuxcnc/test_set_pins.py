@@ -1,7 +1,5 @@
 """``hexacell-set-pins`` against a ``halcmd`` that keeps pins in a file."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Preparing for motion: every state is verified after its command is acknowledged."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

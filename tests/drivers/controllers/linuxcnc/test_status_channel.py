@@ -1,7 +1,5 @@
 """The status of the machine, read over a second connection while the first one waits for a move."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

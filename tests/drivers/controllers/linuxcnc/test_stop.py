@@ -1,7 +1,5 @@
 """Stopping: over a separate connection, until the machine is at rest."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

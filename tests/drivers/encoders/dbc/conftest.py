@@ -1,7 +1,5 @@
 """Encoders on a virtual bus, and a DBC file that describes them."""
 
-from __future__ import annotations
-
 import uuid
 from pathlib import Path
 from typing import Any

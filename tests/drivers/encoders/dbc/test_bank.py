@@ -1,7 +1,5 @@
 """Encoders that a DBC file describes, on a virtual bus."""
 
-from __future__ import annotations
-
 import asyncio
 import sys
 from collections.abc import Callable

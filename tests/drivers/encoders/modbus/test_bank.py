@@ -1,7 +1,5 @@
 """Encoders with Modbus RTU on a pseudo-terminal: requests, one instant, faults of devices and line."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Parity: pyserial sends it and never checks it."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

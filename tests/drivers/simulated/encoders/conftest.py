@@ -1,7 +1,5 @@
 """A simulated bank with positions that show which sample they belong to, and ways to reach it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Faults of simulated encoders that no cell file can plan; legs count from 1."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import replace
 from functools import partial

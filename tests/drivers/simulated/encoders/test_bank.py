@@ -1,7 +1,5 @@
 """The real driver against the simulated bank: inside one process, over a pty, over a socket."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from functools import partial

@@ -1,7 +1,5 @@
 """What a simulated encoder does on the wire, seen without the driver."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.clock import CellClock

@@ -1,7 +1,5 @@
 """The slcan adapter: its ASCII protocol, and python-can's own slcan against it."""
 
-from __future__ import annotations
-
 import os
 import uuid
 from functools import partial

@@ -1,7 +1,5 @@
 """Simulated instruments answer byte for byte as their manuals say."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A machine that moves on a straight line in time, behind a simulated controller."""
 
-from __future__ import annotations
-
 import socket
 import threading
 from collections.abc import Callable, Iterator

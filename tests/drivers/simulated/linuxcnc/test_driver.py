@@ -1,7 +1,5 @@
 """The driver and the simulated controller over a real socket: they must agree, faults included."""
 
-from __future__ import annotations
-
 import asyncio
 
 import pytest

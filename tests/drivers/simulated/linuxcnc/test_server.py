@@ -1,7 +1,5 @@
 """The simulated controller against traces of LinuxCNC 2.9.0~pre1: the same bytes."""
 
-from __future__ import annotations
-
 import pytest
 
 NEW_CLIENT = [

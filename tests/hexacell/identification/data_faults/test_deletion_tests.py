@@ -1,7 +1,5 @@
 """A cause is named only where the rest of the records proves it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

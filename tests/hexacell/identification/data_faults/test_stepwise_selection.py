@@ -1,7 +1,5 @@
 """Bad records are found, named and left out; good records are kept."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

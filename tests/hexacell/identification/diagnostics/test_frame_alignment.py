@@ -1,7 +1,5 @@
 """Frames are fitted before errors are compared, and chosen so that taught poses move least."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A change of the geometry is measured where frames, and the ball's mounting, do not matter."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

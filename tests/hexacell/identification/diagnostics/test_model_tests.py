@@ -1,7 +1,5 @@
 """Further records update an identification, and test it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

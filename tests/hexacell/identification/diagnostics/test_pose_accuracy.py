@@ -1,7 +1,5 @@
 """Predicted pose errors, against a simulated machine."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from typing import Any

@@ -1,7 +1,5 @@
 """Robots built within their tolerances, and beyond: in any frames, with the ball anywhere allowed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

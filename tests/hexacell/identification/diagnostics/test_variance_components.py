@@ -1,7 +1,5 @@
 """Noise levels by the residuals, against known ones and against the likelihood itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

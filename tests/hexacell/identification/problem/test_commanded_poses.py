@@ -1,7 +1,5 @@
 """Commanded poses: under which geometry, in which frames, and the start poses from them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Data that cannot identify are refused, with what is missing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

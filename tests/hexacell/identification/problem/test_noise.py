@@ -1,7 +1,5 @@
 """The noise of a record: that of each instrument, propagated to the ball."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

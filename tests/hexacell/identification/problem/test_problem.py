@@ -1,7 +1,5 @@
 """The problem of records, from that of some of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The chi-square test of the residuals, and its sentence."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Data without noise give the exact geometry, even with singularities between start and solution."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

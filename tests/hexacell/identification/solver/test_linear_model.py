@@ -1,7 +1,5 @@
 """The least costs against dense generalized least squares with the full covariance of all records."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Stations placed by hand: rotated slightly against the base, with gauges of slightly wrong scale."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

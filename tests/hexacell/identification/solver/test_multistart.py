@@ -1,7 +1,5 @@
 """Start points of the solver: drawn within the tolerances, solved in one batch, the best ones first."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The tolerance prior: it determines what the data do not, and gives no bias elsewhere."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

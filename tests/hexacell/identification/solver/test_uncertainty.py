@@ -1,7 +1,5 @@
 """The covariance of an identification, against many repetitions of one measurement."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import chi2

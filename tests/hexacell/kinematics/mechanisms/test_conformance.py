@@ -1,7 +1,5 @@
 """The mechanisms that come with the package pass what every other one must."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The frame convention: 35 free parameters of 42 numbers, for a geometry in any frames."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The Gough-Stewart platform's leg equation, its frames, and the words that it has for them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

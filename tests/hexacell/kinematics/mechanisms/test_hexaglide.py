@@ -1,7 +1,5 @@
 """The Hexaglide's leg equation: what closes, how it changes, and its inverse on every branch."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

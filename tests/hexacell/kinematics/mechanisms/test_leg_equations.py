@@ -1,7 +1,5 @@
 """Constraints and derivatives of each mechanism, against its leg equation written for the tests alone."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Cranks: known angles, frames, the size that nothing measures, and joints that turn with the crank."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Legs that are screws: their correction against its formula, leg by leg, and in every choice of frames."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

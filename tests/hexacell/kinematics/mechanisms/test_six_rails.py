@@ -1,7 +1,5 @@
 """Rails of any direction: the leg equation, directions in two numbers, frames, the Hexaglide among them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Servers on loopback are reached at once, and again at once where they refuse."""
 
-from __future__ import annotations
-
 import pytest
 
 

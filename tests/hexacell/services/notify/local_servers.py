@@ -1,7 +1,5 @@
 """Servers on loopback that take notices: HTTP, MQTT 3.1.1 and mail; each may refuse, or never answer."""
 
-from __future__ import annotations
-
 import socket
 import socketserver
 import ssl

@@ -1,7 +1,5 @@
 """Notices and addresses for tests."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Where the secrets of an address come from, and that none is shown."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Mail and chat, through apprise, at a server on loopback."""
 
-from __future__ import annotations
-
 import email
 import json
 import sys

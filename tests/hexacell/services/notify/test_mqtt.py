@@ -1,7 +1,5 @@
 """A broker keeps the last notice as the state of the cell."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.cell.operation import Occasion

@@ -1,7 +1,5 @@
 """Who is told, in which order, and what waits where somebody is not."""
 
-from __future__ import annotations
-
 import errno
 import os
 import threading

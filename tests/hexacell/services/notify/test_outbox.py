@@ -1,7 +1,5 @@
 """What is kept to be told survives, is told once, and is bounded."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 
 import pytest

@@ -1,7 +1,5 @@
 """What a run is worth telling for, and what is told of it."""
 
-from __future__ import annotations
-
 import pytest
 
 from hexacell.cell.loader import Cell

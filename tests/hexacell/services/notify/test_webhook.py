@@ -1,7 +1,5 @@
 """A webhook gets the notice as JSON; what it refuses, or never answers, is told without secrets."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Quiet hours: over midnight, on some days, one after the other, and none."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 
 import pytest

@@ -1,7 +1,5 @@
 """Units and crontab lines: what they start is what was meant, whatever signs are in a path."""
 
-from __future__ import annotations
-
 import shlex
 import shutil
 import subprocess

@@ -40,6 +40,7 @@ from hexacell.identification.solver.measurement_model import (
     predict,
 )
 from hexacell.identification.solver.result import Identification, Solution, Termination
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_sensitivity
@@ -157,7 +158,7 @@ def solve_around_singularities(
         aside = ~used & ~restored
         if not aside.any():
             break
-        restorable, their_poses = _restorable(problem, free, aside)
+        restorable, their_poses = _restorable(problem, solution.prediction.geometry, aside)
         if not restorable.any():
             break
         every = problem.start.with_rows(used, poses).with_rows(restorable, their_poses)
@@ -166,11 +167,11 @@ def solve_around_singularities(
     return kept, solution
 
 
-def _restorable(problem: Problem, free: Array, aside: Mask) -> tuple[Mask, PoseBatch]:
+def _restorable(problem: Problem, geometry: Geometry, aside: Mask) -> tuple[Mask, PoseBatch]:
     """Which of the records set aside are clear of singularities at a geometry, and their poses."""
-    some = problem.subset(aside)
-    solved = some.solve_poses(free)
-    sensitivity = pose_sensitivity(some.mechanism, some.geometry(free), solved.poses, some.joints)
+    joints = problem.joints[aside]
+    solved = problem.commands[aside].solve_poses(geometry, joints)
+    sensitivity = pose_sensitivity(problem.mechanism, geometry, solved.poses, joints)
     clear = solved.found & ~is_singular(sensitivity.joints[:, :3])
     restorable = np.zeros(problem.records, dtype=bool)
     restorable[aside] = clear

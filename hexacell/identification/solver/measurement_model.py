@@ -20,6 +20,7 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Problem
 from hexacell.kinematics.forward import ForwardResult, apply_twist, forward_kinematics
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import free_sensitivity
@@ -33,6 +34,7 @@ class Prediction:
     """The measurement model at one geometry, linearized.
 
     Attributes:
+        geometry: of the free parameters, which the poses close.
         residuals: (n, 3), mm: predicted position minus measured deviation, with each point's unknown
             constant.
         weights: (n, 3, 3), 1/mm^2: inverse covariance of one record.
@@ -42,6 +44,7 @@ class Prediction:
     """
 
     free: Array
+    geometry: Geometry
     poses: PoseBatch
     residuals: Array
     weights: Array
@@ -64,10 +67,12 @@ def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
         free: (p,) free parameters, mm.
         poses: that close their geometry at the joint variables of the records.
     """
-    sensitivity = free_sensitivity(problem.mechanism, problem.geometry(free), poses, problem.joints)
+    geometry = problem.geometry(free)
+    sensitivity = free_sensitivity(problem.mechanism, geometry, poses, problem.joints)
     by_joints = sensitivity.joints[:, :3]
     return Prediction(
         free=free,
+        geometry=geometry,
         poses=poses,
         residuals=poses.positions - problem.deviations,
         weights=problem.noise.record_weights(by_joints),

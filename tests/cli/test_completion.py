@@ -2,7 +2,6 @@
 
 import argparse
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -76,15 +75,3 @@ def test_bash_offers_what_a_value_can_be(folder):
         ("completion", ""): sorted(SHELLS),
     }
     assert {words: asked_of_bash(folder, *words) for words in offered} == offered
-
-
-def test_nothing_slow_is_imported_for_it(tmp_path):
-    code = (
-        "import sys; from hexacell.cli.app import main; main(['completion', 'bash']); print(*sys.modules)"
-    )
-    told = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    loaded = set(told.stdout.splitlines()[-1].split())
-    assert "shtab" in loaded
-    assert loaded.isdisjoint({"numpy", "scipy", "pydantic", "textual", "matplotlib", "rich"})

@@ -57,13 +57,6 @@ def test_an_edit_is_refused_politely(cell, typed_here) -> None:
     assert refused.err.splitlines()[-1].endswith("undo the edit and repeat, or calibrate again")
 
 
-def test_unattended_what_needs_a_person_is_refused(cell, typed_here) -> None:
-    run = propose_run(cell, gates=(MET, GRAVE))
-    refused = typed_here("apply", run.folder.path)
-    assert (refused.code, cell.config_path.read_bytes()) == (4, run.before)
-    assert "Beyond: S1x." in refused.err
-
-
 def test_what_is_grave_needs_the_cells_name(cell, start, terminal) -> None:
     run = propose_run(cell, gates=(MET, GRAVE))
     process = start("apply", run.folder.path, stdin=terminal.slave, stderr=terminal.slave)

@@ -28,7 +28,7 @@ def imported(folder: Path, *arguments: str) -> set[str]:
     return {line.rpartition("|")[2].strip().partition(".")[0] for line in ended.stderr.splitlines()}
 
 
-@pytest.mark.parametrize("arguments", [["run", "--help"], []])
+@pytest.mark.parametrize("arguments", [["run", "--help"], ["completion", "bash"], []])
 def test_help_imports_nothing_slow(tmp_path, arguments):
     modules = imported(tmp_path, *arguments)
     assert "hexacell" in modules

@@ -2,14 +2,11 @@
 
 import pytest
 
-from hexacell.kinematics.pose import Pose
 from hexacell.results.result import LengthResult, LengthSource
-from hexacell.text.run import question_text
 from hexacell.text.verdict import earlier_scale_line, length_text, not_checked, scale_lines
 from hexacell.verdict.decision import JudgedError, Verdict
 from hexacell.verdict.length_check import LengthStatement
 from hexacell.verdict.outcome import length_line
-from procedures.run.questions import ask_mounting
 
 SIZES = {
     "noise of the readings": 8.0,
@@ -73,16 +70,3 @@ def test_a_check_that_contradicts_itself_says_why() -> None:
     found = stated(length_of(1000.0, "the gauges were zeroed"), Verdict.NOT_EVALUATED)
     assert "  the length check says nothing: the gauges were zeroed" in length_text(found)
     assert length_line(found) == "length check: not evaluated (the gauges were zeroed)"
-
-
-def test_a_mounting_is_asked_for_with_what_not_to_do() -> None:
-    for mounting, seat, words in (
-        (1, 1, "Clamp the fixture with its first seat there"),
-        (3, 1, "Mount them the same way round. Do not zero them"),
-    ):
-        text = question_text(ask_mounting(mounting, seat, Pose(150.0, 0.0, 500.0)))
-        assert (
-            f"Mount the gauges in seat {seat} of the fixture (mounting {mounting})\nThe robot holds" in text
-        )
-        assert words in text
-        assert ("and zero the gauges" in " ".join(text.split())) == (mounting == 1)

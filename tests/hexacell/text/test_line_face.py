@@ -1,33 +1,13 @@
-"""Text at a plain terminal: where the run is, what the devices show, a recorded run told in lines."""
+"""Text at a plain terminal: what the devices show, a recorded run told in lines."""
 
 from datetime import UTC, datetime, timedelta
 
-from hexacell.campaign.decisions import Forecast
 from hexacell.run_process.messages import EncoderSnapshot, GaugeSnapshot, LiveSnapshot
-from hexacell.text.line_face import gauges_text, run_status_text, run_story, story_text
+from hexacell.text.line_face import gauges_text, run_story, story_text
 from procedures.journal.journal import Entry
 from procedures.run.keys import Phase, SetKey
-from procedures.run.state import RunState
 from procedures.steps import events
 from tests.procedures.story import Story
-
-RECORD = Story(SetKey(phase=Phase.IDENTIFY, point=2)).sampled(3, (0.1234, -0.5, 2.0))
-FORECAST = Forecast(now_mm=0.311, next_mm=0.3, end_mm=0.063, records=10, minutes=12.0)
-
-
-def test_where_the_run_is() -> None:
-    assert isinstance(RECORD, events.RecordTaken)
-    text = run_status_text("point 2, orientation 4", RunState(), 61, RECORD, FORECAST)
-    assert text.splitlines() == [
-        "Now: point 2, orientation 4",
-        "Done: 0 of 61 records and closings of points",
-        "Last record: point 2, orientation 3: x +0.123, y -0.500, z +2.000 mm",
-        "Predicted error at the task: 0.311 mm now, 0.063 at the end, 12 minutes left",
-    ]
-    assert run_status_text(None, RunState(), 61, None, None).splitlines() == [
-        "Now: connecting",
-        "Done: 0 of 61 records and closings of points",
-    ]
 
 
 def test_what_the_devices_show() -> None:

@@ -14,8 +14,7 @@ from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet
 from hexacell.noise.measured_noise import AveragingForecast
 from hexacell.services.offline import PlanTrial
-from hexacell.text.layout import duration
-from hexacell.text.planning import forecast_text, plan_trial_lines, run_forecast_line
+from hexacell.text.planning import forecast_text, plan_trial_lines
 
 FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
 
@@ -35,18 +34,6 @@ def test_a_forecast_says_what_records_gain_and_u_where_the_effects_are_known():
     assert text.endswith("continuing gains 0.250 mm, U 0.200 mm then in 24 records, about 12 minutes.")
 
 
-def test_a_run_states_what_the_remaining_records_gain():
-    for changes, rest in (
-        ({}, "0.290 mm; in 12 minutes 0.060"),
-        ({"records": 1}, "0.290 mm"),
-        ({"systematic_mm": 0.08}, "0.290 mm, U 0.602; in 12 minutes 0.060, U 0.200"),
-        ({"systematic_mm": 0.08, "records": 1}, "0.290 mm, U 0.602"),
-    ):
-        line = run_forecast_line(FORECAST.model_copy(update=changes))
-        assert line == f"  predicted error at the task {rest}"
-    assert [duration(minutes) for minutes in (1.4, 1.6)] == ["84 seconds", "2 minutes"]
-
-
 def lines(target_mm=None, **changes):
     values = {
         "drawn": 3,
@@ -60,15 +47,6 @@ def lines(target_mm=None, **changes):
     return [
         *plan_trial_lines(PlanTrial(DryRunResult(**(values | changes)), {1: 0.0, 2: 0.0625}, target_mm))
     ]
-
-
-def test_the_text_of_a_predicted_plan():
-    first, second = lines(drawn=2)
-    assert first == (
-        "55 records at 5 points will give about 0.021 mm at the worst of your task poses (one sigma), "
-        "in about 40 minutes."
-    )
-    assert second.startswith("Point 2: 6% of the robots within the tolerances cannot reach it")
 
 
 def test_the_part_of_the_encoders_is_told():

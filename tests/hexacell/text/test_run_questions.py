@@ -3,7 +3,6 @@
 from drivers.interfaces import StartupAction
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
-from hexacell.results.result import ExpectedImprovement
 from hexacell.results.written_geometry import TaskDisplacement
 from hexacell.text.line_face import TypedAnswer, request_text, typed_answer
 from hexacell.text.run import question_text
@@ -23,42 +22,13 @@ from procedures.run.questions import (
     ask_startup,
 )
 
+PLACEMENT = ask_placement(SetKey(phase=Phase.IDENTIFY, point=3), Pose(1.0, 2.0, 3.0))
 CHOICES = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)
 FAILURE = ask_recovery("It broke.", CHOICES)
 APPROVAL = ask_approval([], "-1", cell="bench")
 GRAVE = ask_approval(
     [AcceptanceGate(name="a", passed=False, sentence="b.", needs_cell_name=True)], "-1", cell="bench"
 )
-
-
-def placement(phase: Phase) -> Question:
-    return ask_placement(SetKey(phase=phase, point=3), Pose(1.0, 2.0, 3.0))
-
-
-def test_placing_gauges_names_the_point_and_the_pose() -> None:
-    for phase, place in (
-        (Phase.IDENTIFY, "point 3"),
-        (Phase.BEFORE, "held-out point 3"),
-        (Phase.AFTER, "held-out point 3 with the new geometry"),
-    ):
-        text = question_text(placement(phase))
-        beginning = f"\nPut the gauges around the ball at {place}\nThe robot holds the ball at X1.000 "
-        assert text.startswith(beginning)
-        assert text.endswith("Press Enter when they are in place, or type a to abort: ")
-
-
-def test_an_approval_shows_the_change_then_every_gate() -> None:
-    gates = [
-        AcceptanceGate(name="converged", passed=True, sentence="The solver ended."),
-        AcceptanceGate(name="small change", passed=False, sentence="It is 9 mm.", needs_person=True),
-    ]
-    improvement = ExpectedImprovement(now_mm=4.931, expanded_mm=0.0581)
-    assert question_text(ask_approval(gates, "-1\n+2", None, improvement, cell="bench")) == (
-        "\nThe change:\n-1\n+2\nok  The solver ended.\nNO  It is 9 mm.\n"
-        "Largest position error at the task poses: 4.93 mm with the current config, 0 +-\n"
-        "    0.058 mm with this one.\n"
-        "Write the new geometry into the controller's config?\nType yes or no: "
-    )
 
 
 def test_approval_and_acceptance_say_what_must_be_taught_anew_before_it_asks() -> None:
@@ -74,7 +44,7 @@ def test_approval_and_acceptance_say_what_must_be_taught_anew_before_it_asks() -
 
 def test_what_a_question_offers_is_an_answer_and_nothing_else() -> None:
     offered: list[tuple[Question, dict[str, str | None], tuple[str, ...]]] = [
-        (placement(Phase.IDENTIFY), {"\n": "placed"}, ("a\n", "m\n", "yes\n", "no\n", "placed\n")),
+        (PLACEMENT, {"\n": "placed"}, ("a\n", "m\n", "yes\n", "no\n", "placed\n")),
         (
             FAILURE,
             {"redo\n": "redo-set", "Measure again\n": "measure-again", "a": "abort"},

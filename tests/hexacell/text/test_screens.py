@@ -3,7 +3,6 @@
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from drivers.interfaces import StartupAction
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.checks.check_result import CheckResult, ParameterChange
 from hexacell.kinematics.pose import Pose
@@ -21,17 +20,15 @@ from hexacell.run_process.messages import (
     StatusChanged,
 )
 from hexacell.text.parameters import parameter_table, rows_of_run
-from hexacell.text.screens.live import device_lines, mounting_advice, travel_bar
+from hexacell.text.screens.live import device_lines, mounting_advice
 from hexacell.text.screens.measuring import fault_view, guidance, record_lines
-from hexacell.text.screens.questions import question_view
 from hexacell.text.screens.reviewing import review_texts
 from hexacell.text.screens.run_picture import RunPicture, Setback, picture_after
 from hexacell.text.screens.views import Urgency
 from hexacell.verdict.decision import Verdict
-from hexacell.verdict.verification import Verification
 from procedures.engine.command_loop import Status
 from procedures.run.keys import Phase, SetKey
-from procedures.run.questions import Question, ask_acceptance, ask_mounting, ask_startup
+from procedures.run.questions import ask_mounting
 from procedures.run.state import fold
 from procedures.run.trips import Guard
 from procedures.steps import events
@@ -77,15 +74,6 @@ def test_a_gauge_says_how_it_is_to_be_moved() -> None:
     assert [mounting_advice(gauge(**changes), 1.0) for changes, _ in moves] == [said for _, said in moves]
 
 
-def test_a_plunger_is_shown_in_its_travel() -> None:
-    assert [travel_bar(place, 6.25) for place in (0.0, -6.25, 99.0, None)] == [
-        "[--------O--------]",
-        "[O-------+--------]",
-        "[--------+-------O]",
-        "[--------+--------]",
-    ]
-
-
 def test_a_device_that_is_silent_gets_older_by_itself() -> None:
     snapshot = LiveSnapshot(gauges=(gauge(),), encoders=EncoderSnapshot(positions=(0.0,) * 6, age_s=0.1))
     assert "0.1 s" in device_lines(snapshot)[0][0]
@@ -107,31 +95,6 @@ def test_what_is_urgent_is_said_in_words_too() -> None:
         ("controller EMERGENCY STOP; drive 3", Urgency.ALARM),
         ("stop line  NO MOTION: the door is open", Urgency.ALARM),
     ]
-
-
-def test_a_question_says_what_it_is_about_and_what_each_answer_does() -> None:
-    asked: list[tuple[Question, tuple[str, ...], list[str]]] = [
-        (
-            ask_mounting(2, 2, Pose(0.0, 0.0, 500.0)),
-            ("Mount the gauges in seat 2 of the fixture (mounting 2)", "Do not zero them, and leave"),
-            ["they are in place: measure"],
-        ),
-        (
-            ask_startup(StartupAction.RESET_ESTOP, "it is stopped", is_theirs=True),
-            ("The controller is not ready", "this program does not. Is it reset?"),
-            ["yes", "no"],
-        ),
-        (
-            ask_acceptance("0.1 mm", Verification(verdict=Verdict.CONDITIONAL_PASS)),
-            ("The result did not pass.", "Without your word the old one is restored."),
-            ["yes, keep it", "no, restore the old config"],
-        ),
-    ]
-    for question, words, labels in asked:
-        view = question_view(question, None)
-        said = "\n".join((view.title, *view.paragraphs))
-        assert [text for text in words if text not in said] == []
-        assert [choice.label for choice in view.choices] == labels
 
 
 def test_guidance_says_what_happens_now() -> None:

@@ -28,19 +28,6 @@ def assessed_of(identified, noisy, paper):
     return assessed
 
 
-def test_a_simulation_has_the_noise_and_what_no_record_shows(assessed_of) -> None:
-    assessed = assessed_of(grade="ideal")
-    title, noise, standard, expanded, *unseen = budget_table(assessed.budget).splitlines()
-    assert title.split()[-4:] == ["size", "result", "direct", "both"]
-    worst = f"{assessed.accuracy.after.position_largest_mm:.3f}"
-    assert noise.split()[-2:] == [worst, worst]
-    assert standard.split()[-1] == worst
-    assert expanded.split()[-1] == f"{assessed.budget.expanded_mm:.3f}"
-    text = " ".join(" ".join(unseen).split())
-    assert text.startswith("Not checked, as no record shows it: scale common to all encoders (")
-    assert "ball beside the tool's centre (0.58 mm by 1 mm)." in text
-
-
 def test_every_effect_of_the_grade_that_matters_has_a_line(assessed_of) -> None:
     budget = assessed_of(grade="ordinary").budget
     lines = budget_table(budget).splitlines()

@@ -75,7 +75,8 @@ class TestAPersonAtTheTerminal:
         process, question, cell = waiting
         lines = question.replace("\r\n", "\n").splitlines()
         assert {"--- config-before", "+++ config-after"} <= set(lines)
-        assert len([line for line in lines if line.startswith("ok  ")]) == 5
+        assert len([line for line in lines if line.startswith("ok  ")]) == 4
+        assert not any(line.startswith("NO  ") for line in lines)
         terminal.type("yes\n")
         assert ended(process, terminal) == 0
         assert cell.controller.read_bytes() != (demo.run / "config-before").read_bytes()

@@ -133,7 +133,11 @@ def test_a_study_that_is_given_up_waits_for_no_task(shared, tmp_path: Path) -> N
     ("content", "words"),
     [
         ("__version__ = '0.0.1'\n", f"has hexacell 0.0.1, this computer {__version__}. Install hexacell=="),
-        ("raise ImportError('numpy')\n", "has no hexacell that can be imported, this computer"),
+        pytest.param(
+            "raise ImportError('numpy')\n",
+            "has no hexacell that can be imported, this computer",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_worker_with_another_version_is_named(tmp_path: Path, content: str, words: str) -> None:

@@ -7,12 +7,14 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 from drivers.simulated.encoders.bank import Positions, SimulatedDbcBank, SimulatedEncoderBank
 from drivers.simulated.encoders.modbus_bank import SimulatedModbusBank
 from drivers.simulated.fault_schedule import CellFaults, FaultSchedule
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController
-from drivers.simulated.physics import RobotPhysics
+from drivers.simulated.physics import USUAL_REACH_MM, RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
 from drivers.simulated.serial_line import PtyLine
 from drivers.simulated.served_device import ServedGroup
@@ -74,6 +76,25 @@ def encoder_bank(
     return SimulatedEncoderBank(encoders, positions, clock, latency_s=latency_s)
 
 
+TRIED_SHARE = 0.3
+"""Share of the gauges' travel that the ball is moved by at most while they are tried, and some more."""
+
+
+def _station_reach_mm(settings: CellSettings) -> float | None:
+    """How far the ball may be from the gauges before they are moved to it.
+
+    However small the machine is, they are moved from one point to the next, and not while they are tried.
+    """
+    assert settings.simulation is not None  # noqa: S101 - only such cells are simulated
+    if settings.simulation.station_reach_mm is not None:
+        return settings.simulation.station_reach_mm
+    points = np.array([*settings.identification.points, *settings.verification.points])
+    apart = np.linalg.norm(points[:, None] - points, axis=-1)
+    nearest = np.min(apart, where=apart > 0.0, initial=np.inf)
+    tried = TRIED_SHARE * min(gauge.travel_mm for gauge in settings.gauges)
+    return min(USUAL_REACH_MM, max(tried, 0.5 * float(nearest)))
+
+
 def _plunger_mm(physics: RobotPhysics, gauge: GaugeSettings) -> float:
     """The position of one gauge's plunger, mm, in the instrument's own direction."""
     return gauge.mounting.reading(physics.gauge_displacement(gauge.axis))
@@ -103,7 +124,8 @@ class SimulatedCell(ServedGroup):
         clock = CellClock(settings.timing.clock_factor)
         home = Pose(*settings.identification.points[0])
         commanding, fixture = layout.read(*config), settings.length_check
-        self.physics = RobotPhysics(mechanism, simulation, clock, commanding, home, fixture)
+        simulated = simulation.model_copy(update={"station_reach_mm": _station_reach_mm(settings)})
+        self.physics = RobotPhysics(mechanism, simulated, clock, commanding, home, fixture)
         self.machine = SimulatedMachine(
             mechanism,
             layout,

@@ -27,6 +27,8 @@ from hexacell.kinematics.rotations import Array
 
 RAMP_S = 0.2
 """Time to reach the speed of a motion, and to slow down at its end."""
+USUAL_REACH_MM = 30.0
+"""Distance from the gauges beyond which they are moved to the ball, where points are not nearer."""
 AXES = "xyz"
 RINGING_HZ = 8.0
 FIRST, SECOND = 0, 1
@@ -98,6 +100,7 @@ class GaugePlaces:
         ball: Array,
     ) -> None:
         self._settings = settings
+        self._reach_mm = settings.station_reach_mm or USUAL_REACH_MM
         self._fixture = fixture
         self._random = random
         self._seat: int | None = None
@@ -111,7 +114,7 @@ class GaugePlaces:
 
     def follow(self, ball: Array) -> None:
         """Move the gauges to the ball, where that is at rest, if it is no longer at them."""
-        if np.linalg.norm(ball - self.station) <= self._settings.station_reach_mm:
+        if np.linalg.norm(ball - self.station) <= self._reach_mm:
             return
         seat = self._seat_at(ball)
         if self._fixture is None or seat is None or self._seat is None or seat == self._seat:
@@ -149,7 +152,7 @@ class GaugePlaces:
         seats = np.array([self._fixture.first_seat, self._fixture.second_seat])
         distances = np.linalg.norm(seats - ball, axis=1)
         nearest = int(distances.argmin())
-        return nearest if distances[nearest] <= self._settings.station_reach_mm else None
+        return nearest if distances[nearest] <= self._reach_mm else None
 
 
 def _about_z(degrees: float) -> Array:

@@ -147,8 +147,10 @@ class SimulationSettings(Section):
         "it starts in emergency stop, switched off and not homed",
         max_length=len(STARTUP_WORDS),
     )
-    station_reach_mm: Positive = key(
-        30.0, "distance from the gauges beyond which they are moved to the ball at rest, mm"
+    station_reach_mm: Positive | None = key(
+        None,
+        "distance from the gauges beyond which they are moved to the ball at rest, mm; by default 30, or "
+        "half of the smallest distance of two points",
     )
     joints_command: tuple[Text, ...] = key(
         (),

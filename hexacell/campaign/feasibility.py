@@ -17,6 +17,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.motion.path_check import is_clear
 from hexacell.robot.pose_limits import broken_limits
 from hexacell.robot.virtual_robot import VirtualRobot, robots_within_tolerances
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 LARGEST_SHARE = 0.5
 """Share of the robots within the tolerances that may be unable to take the reference of a point."""
@@ -24,6 +25,11 @@ LARGEST_SHARE = 0.5
 LARGEST_SHARE_UNKNOWN = 0.5
 """Share of the error at the worst task pose that records may leave of what the drawing does; with more the
 robot would hardly be better."""
+
+
+TIMES_THE_LIMIT = 10.0
+"""Times the limit that the error may be predicted to be, with two sigma: a plan that leaves more measures too
+little, whatever the noise."""
 
 
 def reach_failures(plan: Plan) -> Iterator[HexacellError]:
@@ -209,12 +215,14 @@ def _no_better(plan: Plan) -> Iterator[HexacellError]:
     now = plan.forecaster.worst_error(start, plan.robot.belief())
     end = plan.forecaster.worst_error(start, plan.predicted_belief())
     limit = plan.settings.acceptance.position_mm
-    if now is None or end is None or end <= LARGEST_SHARE_UNKNOWN * now or 2.0 * end <= limit:
+    if now is None or end is None or COVERAGE_FACTOR * end <= limit:
+        return
+    if end <= LARGEST_SHARE_UNKNOWN * now and COVERAGE_FACTOR * end <= TIMES_THE_LIMIT * limit:
         return
     records = sum(plan.forecaster.planned(start).values())
     yield UsageError(
         f"{records} records leave an error of {end:.3g} mm at the worst task pose, one sigma, where the "
-        f"drawing with its tolerances leaves {now:.3g}: the robot would hardly be better",
+        f"limit is {limit:g} and the drawing with its tolerances leaves {now:.3g}",
         subject="[identification]",
         action="Allow more tilt, more orientations, or points farther apart; gauges and encoders of "
         "another noise need other figures in [noise]",

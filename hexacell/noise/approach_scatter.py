@@ -87,7 +87,7 @@ class RepeatedApproaches(Frozen):
     degrees_of_freedom: int
     ball_mm: float
     ratio: float
-    ratio_as_drawn: float
+    ratio_as_drawn: float | None = None
     source: ScatterSource | None = None
     unit: JointUnit = JointUnit.MM
     excess: float = 0.0
@@ -98,7 +98,8 @@ class RepeatedApproaches(Frozen):
     def ratio_at_most(self) -> float:
         """Upper limit of the true ratio, with 95 % confidence."""
         freedom = self.degrees_of_freedom
-        return self.ratio_as_drawn * float(np.sqrt(freedom / chi_square_limit(freedom, CONFIDENCE)))
+        ratio = self.ratio if self.ratio_as_drawn is None else self.ratio_as_drawn
+        return ratio * float(np.sqrt(freedom / chi_square_limit(freedom, CONFIDENCE)))
 
 
 def approach_scatter(

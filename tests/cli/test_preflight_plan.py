@@ -25,7 +25,10 @@ IMPOSSIBLE: dict[str, tuple[tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         ("identification point 1: no orientation surely keeps the ball inside", "gauge_travel_mm = 0.05"),
     ),
     "tolerances": ((("S_mm = 7.0", "S_mm = 150.0"),), ("identification point 1", "cannot reach it")),
-    "tilt": ((("tilt_deg = 45.0", "tilt_deg = 0.5"),), ("parameters undetermined", "Allow more tilt")),
+    "tilt": (
+        (("tilt_deg = 45.0", "tilt_deg = 0.5"),),
+        ("at the worst task pose, one sigma, where the limit is 0.3", "Allow more tilt"),
+    ),
     "budget": (
         (("orientations = 11", "orientations = 11\nbudget_records = 12"),),
         ("the budget of 12 records allows 11 records at 1 points, 30 equations for 35", "Allow 14 records"),

@@ -101,7 +101,8 @@ class TestAPersonAtTheTerminal:
         assert cell.controller.read_bytes() == (demo.run / "config-before").read_bytes()
 
     def test_places_gauges_and_is_asked_how_to_go_on_after_a_fault(self, quick_cell, start, terminal):
-        quick_cell.edit(BY_HAND, ("[acceptance]", "[acceptance]\ndrift_mm = 0.00001"))
+        fixed = ("[guards]", '[guards]\nlimits = "fixed"')
+        quick_cell.edit(BY_HAND, ("[acceptance]", "[acceptance]\ndrift_mm = 0.00001"), fixed)
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
         first = terminal.read_until(PLACED)
         assert "The robot holds the ball at X0.000 Y0.000 Z550.000" in first

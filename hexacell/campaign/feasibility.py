@@ -28,8 +28,8 @@ robot would hardly be better."""
 
 
 TIMES_THE_LIMIT = 10.0
-"""Times the limit that the error may be predicted to be, with two sigma: a plan that leaves more measures too
-little, whatever the noise."""
+"""Times the limit that the error may be predicted to be, with two sigma: a plan that leaves more measures
+too little, whatever the noise."""
 
 
 def reach_failures(plan: Plan) -> Iterator[HexacellError]:
